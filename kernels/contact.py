@@ -1,0 +1,267 @@
+"""Owns node-to-surface penalty contact: slave forces, and their reactions gathered by the master nodes."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.friction import release, stick_slip
+from warp_mca.kernels.projection import closest_point, face_tangents, interpolate, shape
+from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
+
+wp.set_module_options({"enable_backward": False})
+
+# A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
+_EDGE_REACH = 1.02
+
+
+@wp.struct
+class Spring:
+    """State of every slave node's springs; arrays have shape (slave_count,).
+
+    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1.
+    weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
+    far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
+    force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
+    penetration so far [m].
+    """
+
+    tangential: wp.array(dtype=wp.vec3d)
+    force: wp.array(dtype=wp.vec3d)
+    face: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.vec4d)
+    energy: wp.array(dtype=wp.float64)
+    friction: wp.array(dtype=wp.float64)
+    drive: wp.array(dtype=wp.float64)
+    impulse: wp.array(dtype=wp.vec3d)
+    normal_impulse: wp.array(dtype=wp.float64)
+    stick_impulse: wp.array(dtype=wp.float64)
+    depth: wp.array(dtype=wp.float64)
+
+
+@cache
+def spring_function(friction: bool) -> Any:
+    """The function that turns a gap into force and bookkeeping; without `friction` it has no tangential part."""
+
+    @wp.func
+    def press(s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k: wp.float64, mu: wp.float64, spring: Spring):
+        Fn = -k * gap
+        force = Fn * normal
+        energy = wp.float64(0.5) * Fn * Fn / k
+        if wp.static(friction):
+            Ft, work, stick = stick_slip(spring.tangential[s], du, normal, mu * Fn, k)
+            force += Ft
+            energy += wp.float64(0.5) * wp.dot(Ft, Ft) / k
+            spring.tangential[s] = Ft
+            spring.friction[s] = spring.friction[s] + work
+            if stick == 1:
+                spring.stick_impulse[s] = spring.stick_impulse[s] + Fn
+        spring.energy[s] = energy
+        spring.force[s] = force
+        spring.impulse[s] = spring.impulse[s] + force
+        spring.normal_impulse[s] = spring.normal_impulse[s] + Fn
+        spring.depth[s] = wp.max(spring.depth[s], -gap)
+        return force
+
+    return press
+
+
+@cache
+def open_function(friction: bool) -> Any:
+    """The function that clears the springs of a node that lost its contact."""
+
+    @wp.func
+    def open_contact(s: int, k: wp.float64, spring: Spring):
+        if spring.face[s] >= 0:
+            if wp.static(friction):
+                spring.friction[s] = spring.friction[s] + release(spring.tangential[s], k)
+                spring.tangential[s] = wp.vec3d()
+            spring.energy[s] = wp.float64(0.0)
+            spring.force[s] = wp.vec3d()
+            spring.face[s] = -1
+
+    return open_contact
+
+
+@cache
+def surface_kernel(friction: bool) -> Any:
+    """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal."""
+    press = spring_function(friction)
+    open_contact = open_function(friction)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def touch_surface(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        u_search: wp.array(dtype=wp.vec3d),
+        slave: wp.array(dtype=wp.int32),
+        stiffness: wp.array(dtype=wp.float64),
+        face: wp.array2d(dtype=wp.int32),
+        count: wp.array(dtype=wp.int32),
+        candidate: wp.array2d(dtype=wp.int32),
+        mu: wp.float64,
+        margin: wp.float64,
+        dt: wp.float64,
+        spring: Spring,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        flag_out: wp.array(dtype=wp.int32),
+    ):
+        s = wp.tid()
+        i = slave[s]
+        if moved_too_far(u[i], u_search[i], margin):
+            flag_out[STALE] = 1
+        best = int(-1)
+        best_gap = wp.float64(0.0)
+        best_size = wp.float64(0.0)
+        best_normal = wp.vec3d()
+        best_weight = wp.vec4d()
+        x = X[i] + u[i]
+        for c in range(count[s]):
+            f = candidate[s, c]
+            i0 = face[f, 0]
+            i1 = face[f, 1]
+            i2 = face[f, 2]
+            i3 = face[f, 3]
+            # coordinates relative to the slave keep the digits that the gap needs
+            p0 = X[i0] + u[i0] - x
+            p1 = X[i1] + u[i1] - x
+            p2 = X[i2] + u[i2] - x
+            p3 = X[i3] + u[i3] - x
+            at = closest_point(wp.vec3d(), p0, p1, p2, p3)
+            reach = wp.float64(_EDGE_REACH)
+            if wp.abs(at[0]) <= reach and wp.abs(at[1]) <= reach:
+                along_xi, along_eta = face_tangents(at[0], at[1], p0, p1, p2, p3)
+                area_normal = wp.cross(along_xi, along_eta)
+                normal = wp.normalize(area_normal)
+                w = shape(at[0], at[1])
+                gap = -wp.dot(interpolate(w, p0, p1, p2, p3), normal)
+                size = wp.float64(2.0) * wp.sqrt(wp.length(area_normal))
+                if gap < wp.float64(0.0) and gap > -size:
+                    # the shallowest face wins; the lower number at a tie, whatever the order of the search
+                    if best < 0 or gap > best_gap or (gap == best_gap and f < best):
+                        best = f
+                        best_gap = gap
+                        best_normal = normal
+                        best_weight = w
+                        best_size = size
+        if best >= 0:
+            if best_gap < wp.float64(-0.5) * best_size:
+                flag_out[TOO_DEEP] = 1
+            moving = interpolate(best_weight, v[face[best, 0]], v[face[best, 1]], v[face[best, 2]], v[face[best, 3]])
+            force = press(s, best_gap, best_normal, dt * (v[i] - moving), stiffness[s], mu, spring)
+            spring.face[s] = best
+            spring.weight[s] = best_weight
+            contact_force_out[i] = contact_force_out[i] + force
+        else:
+            open_contact(s, stiffness[s], spring)
+
+    return touch_surface
+
+
+@wp.kernel(enable_backward=False)
+def react(
+    u: wp.array(dtype=wp.vec3d),
+    u_search: wp.array(dtype=wp.vec3d),
+    master: wp.array(dtype=wp.int32),
+    face_offset: wp.array(dtype=wp.int32),
+    face_of_node: wp.array(dtype=wp.int32),
+    face: wp.array2d(dtype=wp.int32),
+    face_count: wp.array(dtype=wp.int32),
+    face_slave: wp.array2d(dtype=wp.int32),
+    margin: wp.float64,
+    spring: Spring,
+    contact_force_out: wp.array(dtype=wp.vec3d),
+    flag_out: wp.array(dtype=wp.int32),
+):
+    """Each master node gathers its share of the reactions on the faces around it, in a fixed order."""
+    m = wp.tid()
+    i = master[m]
+    if moved_too_far(u[i], u_search[i], margin):
+        flag_out[STALE] = 1
+    total = wp.vec3d()
+    touched = int(0)
+    for j in range(face_offset[m], face_offset[m + 1]):
+        f = face_of_node[j]
+        for q in range(wp.min(face_count[f], face_slave.shape[1])):
+            s = face_slave[f, q]
+            if spring.face[s] == f:
+                touched = int(1)
+                for c in range(4):
+                    if face[f, c] == i:
+                        w = spring.weight[s]
+                        total -= w[c] * spring.force[s]
+    if touched == 1:
+        contact_force_out[i] = contact_force_out[i] + total
+
+
+@cache
+def plane_kernel(friction: bool) -> Any:
+    """Kernel: contact of slave nodes with an analytic plane that may move along itself."""
+    press = spring_function(friction)
+    open_contact = open_function(friction)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def touch_plane(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        slave: wp.array(dtype=wp.int32),
+        stiffness: wp.array(dtype=wp.float64),
+        point: wp.vec3d,
+        normal: wp.vec3d,
+        velocity: wp.vec3d,
+        mu: wp.float64,
+        dt: wp.float64,
+        spring: Spring,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+    ):
+        s = wp.tid()
+        i = slave[s]
+        gap = wp.dot(X[i] - point + u[i], normal)
+        if gap < wp.float64(0.0):
+            force = press(s, gap, normal, dt * (v[i] - velocity), stiffness[s], mu, spring)
+            spring.face[s] = 0
+            spring.drive[s] = spring.drive[s] + dt * wp.dot(force, velocity)
+            contact_force_out[i] = contact_force_out[i] + force
+        else:
+            open_contact(s, stiffness[s], spring)
+
+    return touch_plane
+
+
+@wp.kernel(enable_backward=False)
+def sum_springs(
+    row: wp.array(dtype=wp.int32),
+    column: int,
+    width: int,
+    spring: Spring,
+    partial_out: wp.array3d(dtype=wp.float64),
+):
+    """Sums over the slaves into eight columns, and a fresh start for what is summed over the record interval."""
+    k = wp.tid()
+    energy = wp.float64(0.0)
+    friction = wp.float64(0.0)
+    drive = wp.float64(0.0)
+    impulse = wp.vec3d()
+    normal = wp.float64(0.0)
+    stick = wp.float64(0.0)
+    for s in range(k, spring.energy.shape[0], width):
+        energy += spring.energy[s]
+        friction += spring.friction[s]
+        drive += spring.drive[s]
+        impulse += spring.impulse[s]
+        normal += spring.normal_impulse[s]
+        stick += spring.stick_impulse[s]
+        spring.impulse[s] = wp.vec3d()
+        spring.normal_impulse[s] = wp.float64(0.0)
+        spring.stick_impulse[s] = wp.float64(0.0)
+    r = row[0]
+    partial_out[r, column, k] = energy
+    partial_out[r, column + 1, k] = friction
+    partial_out[r, column + 2, k] = drive
+    partial_out[r, column + 3, k] = impulse[0]
+    partial_out[r, column + 4, k] = impulse[1]
+    partial_out[r, column + 5, k] = impulse[2]
+    partial_out[r, column + 6, k] = normal
+    partial_out[r, column + 7, k] = stick

@@ -1,0 +1,40 @@
+"""Owns the contact laws at a point: penalty force along the normal, Coulomb stick-slip along the surface."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def stick_slip(
+    f_old: wp.vec3d, du: wp.vec3d, normal: wp.vec3d, limit: wp.float64, k: wp.float64
+) -> tuple[wp.vec3d, wp.float64, int]:
+    """Return mapping on the tangential spring.
+
+    Args:
+        f_old: tangential force on the slave so far [N].
+        du: motion of the slave relative to the master since then [m].
+        normal: unit normal of the master.
+        limit: mu F_n [N].
+        k: stiffness of the spring [N/m].
+
+    Returns:
+        The tangential force [N]; the energy that slip dissipated [J], trapezoidal as central differences count
+        work; 1 where the point sticks.
+    """
+    f_start = f_old - wp.dot(f_old, normal) * normal
+    trial = f_start - k * (du - wp.dot(du, normal) * normal)
+    size = wp.length(trial)
+    f = trial
+    stick = int(1)
+    if size > limit:
+        f = (limit / size) * trial
+        stick = int(0)
+    work = wp.float64(0.5) * wp.dot(f_start + f, trial - f) / k
+    return f, work, stick
+
+
+@wp.func
+def release(f_old: wp.vec3d, k: wp.float64) -> wp.float64:
+    """Energy [J] that a tangential spring still held when its contact opened: it is lost, as if by slip."""
+    return wp.float64(0.5) * wp.dot(f_old, f_old) / k

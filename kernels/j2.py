@@ -1,0 +1,61 @@
+"""Owns J2 plasticity with bilinear hardening, kinematic to isotropic, as a closed-form radial return.
+
+Simo and Hughes, Computational Inelasticity (1998), box 3.2, in total form: with Prager's rule the back stress is
+(2/3) (1 - beta) H eps_p, so that the plastic strain and its equivalent are all the history there is.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.scalars import scalars
+
+wp.set_module_options({"enable_backward": False})
+
+HISTORY_SIZE = 6  # xx, yy, xy, yz, xz of the plastic strain, and the equivalent plastic strain
+
+
+@cache
+def return_map(precision: str) -> Any:
+    """The function (e, eps_p, p, G, sigma_y, H, beta) -> (S, eps_p, p) in the scalars of `precision`.
+
+    e: deviatoric strain [-]; eps_p: plastic strain [-], symmetric and traceless; p: equivalent plastic strain [-];
+    G, sigma_y, H [Pa]; beta [-]; S: deviatoric stress [Pa].
+    """
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+
+    @wp.func
+    def j2_return(e: mat33, eps_p: mat33, p: R, G: R, sigma_y: R, H: R, beta: R):
+        S = R(2.0) * G * (e - eps_p)
+        xi = S - (R(2.0) / R(3.0)) * (R(1.0) - beta) * H * eps_p
+        xi_eq2 = R(1.5) * wp.ddot(xi, xi)
+        radius = sigma_y + beta * H * p
+        if xi_eq2 > radius * radius:
+            xi_eq = wp.sqrt(xi_eq2)
+            dp = (xi_eq - radius) / (R(3.0) * G + H)
+            d_eps = (R(1.5) * dp / xi_eq) * xi
+            S = S - R(2.0) * G * d_eps
+            eps_p = eps_p + d_eps
+            p = p + dp
+        return S, eps_p, p
+
+    return j2_return
+
+
+@cache
+def plastic_energy(precision: str) -> Any:
+    """The function (eps_p, p, sigma_y, H, beta) -> plastic work per volume [J/m^3]: a function of state here.
+
+    The integral of sigma : d eps_p = sigma_y p + beta H p^2 / 2 + (1 - beta) H (eps_p : eps_p) / 3.
+    """
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+
+    @wp.func
+    def j2_plastic_energy(eps_p: mat33, p: R, sigma_y: R, H: R, beta: R):
+        stored = (R(1.0) - beta) * H * wp.ddot(eps_p, eps_p) / R(3.0)
+        return sigma_y * p + R(0.5) * beta * H * p * p + stored
+
+    return j2_plastic_energy

@@ -1,0 +1,39 @@
+"""Owns the rotation of an element: the orthogonal factor of its centroid deformation gradient."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.scalars import scalars
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def nearest_rotation(precision: str) -> Any:
+    """The function F -> Q with F = Q U, by Higham's iteration Q <- (Q + Q^-T) / 2.
+
+    It acts on the singular values only and squares their distance from one: a stretch of 10 % falls to 7e-11 in
+    four iterations, below float32's rounding in three. Higham, SIAM J. Sci. Stat. Comput. 7 (1986) 1160.
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    iterations = 3 if precision == "mixed" else 4
+
+    @wp.func
+    def polar_rotation(F: mat33):
+        Q = F
+        for _ in range(wp.static(iterations)):
+            r0 = vec3(Q[0, 0], Q[0, 1], Q[0, 2])
+            r1 = vec3(Q[1, 0], Q[1, 1], Q[1, 2])
+            r2 = vec3(Q[2, 0], Q[2, 1], Q[2, 2])
+            k0 = wp.cross(r1, r2)
+            k1 = wp.cross(r2, r0)
+            k2 = wp.cross(r0, r1)
+            half = R(0.5) / wp.dot(r0, k0)
+            cofactor = mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
+            Q = R(0.5) * Q + half * cofactor
+        return Q
+
+    return polar_rotation

@@ -1,0 +1,34 @@
+"""Owns the scalar, vector and matrix types of a precision."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+
+@dataclass(frozen=True)
+class Scalars:
+    """Types of one element precision; nodes are float64 always, because v dt would vanish in float32 positions.
+
+    Attributes:
+        real: Warp scalar type of element arithmetic and history.
+        vec3, mat33: three-vector and 3 x 3 matrix of it.
+        mat43, mat83: one row for each edge of a direction, and one for each node of a hexahedron.
+    """
+
+    real: Any
+    vec3: Any
+    mat33: Any
+    mat43: Any
+    mat83: Any
+
+
+@cache
+def scalars(precision: str) -> Scalars:
+    """The element types of `precision`: "mixed" computes elements in float32, "float64" in float64."""
+    if precision == "mixed":
+        real, vec3, mat33 = wp.float32, wp.vec3f, wp.mat33f
+    else:
+        real, vec3, mat33 = wp.float64, wp.vec3d, wp.mat33d
+    return Scalars(real, vec3, mat33, wp.types.matrix((4, 3), real), wp.types.matrix((8, 3), real))

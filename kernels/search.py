@@ -1,0 +1,110 @@
+"""Owns the broad phase of contact: which master faces each slave node may touch before the next search."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+# Entries of the flag array that the host reads with every batch of records.
+OVERFLOW, STALE, TOO_DEEP = 0, 1, 2
+
+
+@wp.kernel(enable_backward=False)
+def face_bounds(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    origin: wp.vec3d,
+    margin: wp.float64,
+    lower_out: wp.array(dtype=wp.vec3f),
+    upper_out: wp.array(dtype=wp.vec3f),
+    face_count_out: wp.array(dtype=wp.int32),
+):
+    """Box of each face, deepened inwards by the face's size and widened by the margin; relative to `origin`,
+    so that float32 bounds stay fine. Clears the counts of the lists that `find_candidates` fills."""
+    f = wp.tid()
+    a = X[face[f, 0]] + u[face[f, 0]] - origin
+    b = X[face[f, 1]] + u[face[f, 1]] - origin
+    c = X[face[f, 2]] + u[face[f, 2]] - origin
+    d = X[face[f, 3]] + u[face[f, 3]] - origin
+    normal = wp.float64(0.5) * wp.cross(c - a, d - b)  # its length is the area
+    area = wp.length(normal)
+    inward = (-wp.sqrt(area) / area) * normal
+    lower = wp.min(wp.min(a, b), wp.min(c, d))
+    upper = wp.max(wp.max(a, b), wp.max(c, d))
+    reach = wp.vec3d(margin, margin, margin)
+    lower = wp.min(lower, lower + inward) - reach
+    upper = wp.max(upper, upper + inward) + reach
+    lower_out[f] = wp.vec3f(wp.float32(lower[0]), wp.float32(lower[1]), wp.float32(lower[2]))
+    upper_out[f] = wp.vec3f(wp.float32(upper[0]), wp.float32(upper[1]), wp.float32(upper[2]))
+    face_count_out[f] = 0
+
+
+@wp.kernel(enable_backward=False)
+def find_candidates(
+    bvh: wp.uint64,
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    slave: wp.array(dtype=wp.int32),
+    origin: wp.vec3d,
+    count_out: wp.array(dtype=wp.int32),
+    candidate_out: wp.array2d(dtype=wp.int32),
+    face_count_out: wp.array(dtype=wp.int32),
+    face_slave_out: wp.array2d(dtype=wp.int32),
+    u_search_out: wp.array(dtype=wp.vec3d),
+    flag_out: wp.array(dtype=wp.int32),
+):
+    """List the faces near each slave node, and the slaves near each face; a full list raises the overflow flag."""
+    s = wp.tid()
+    i = slave[s]
+    u_search_out[i] = u[i]
+    x = X[i] + u[i] - origin
+    point = wp.vec3f(wp.float32(x[0]), wp.float32(x[1]), wp.float32(x[2]))
+    query = wp.bvh_query_aabb(bvh, point, point)
+    f = int(0)
+    found = int(0)
+    while wp.bvh_query_next(query, f):
+        if found < candidate_out.shape[1]:
+            candidate_out[s, found] = f
+            place = wp.atomic_add(face_count_out, f, 1)
+            if place < face_slave_out.shape[1]:
+                face_slave_out[f, place] = s
+            else:
+                flag_out[OVERFLOW] = 1
+        else:
+            flag_out[OVERFLOW] = 1
+        found += 1
+    count_out[s] = wp.min(found, candidate_out.shape[1])
+
+
+@wp.kernel(enable_backward=False)
+def sort_lists(
+    face_count: wp.array(dtype=wp.int32),
+    face_slave_out: wp.array2d(dtype=wp.int32),
+):
+    """Sort each face's slaves, because threads filled the list in any order and sums must repeat bit for bit."""
+    f = wp.tid()
+    n = wp.min(face_count[f], face_slave_out.shape[1])
+    for a in range(1, n):
+        value = face_slave_out[f, a]
+        b = a - 1
+        while b >= 0 and face_slave_out[f, b] > value:
+            face_slave_out[f, b + 1] = face_slave_out[f, b]
+            b = b - 1
+        face_slave_out[f, b + 1] = value
+
+
+@wp.kernel(enable_backward=False)
+def mark_masters(
+    u: wp.array(dtype=wp.vec3d),
+    node: wp.array(dtype=wp.int32),
+    u_search_out: wp.array(dtype=wp.vec3d),
+):
+    """Remember where the master nodes were at the search."""
+    i = node[wp.tid()]
+    u_search_out[i] = u[i]
+
+
+@wp.func
+def moved_too_far(u: wp.vec3d, u_search: wp.vec3d, margin: wp.float64) -> bool:
+    """Whether a node moved more than half the margin since the search, so that a contact might be missed."""
+    return wp.length_sq(u - u_search) > wp.float64(0.25) * margin * margin

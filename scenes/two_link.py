@@ -1,0 +1,168 @@
+"""A falling two-link manipulator strikes a rough moving plate with its tip.
+
+Parameters are those of Table 1 of "Frictional impact analysis of an elastoplastic multi-link robotic system using a
+multi-timescale modelling approach"; where the table contradicts itself, the rods have a radius of 13 mm.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import warp_mca as mca
+from warp_mca import Param
+
+PRESETS: dict[str, dict[str, object]] = {
+    "quick": {},
+    "standard": {
+        "section": 10, "ring": 5, "axial_OA": 30, "axial_AB": 36, "focus_size": 0.35e-3, "focus_layers": 7,
+        "plate_core_x": 18, "plate_core_z": 10, "plate_core_depth": 6, "plate_layers": 12, "plate_extension": 16,
+    },
+    "paper": {
+        "section": 18, "ring": 7, "axial_OA": 55, "axial_AB": 62, "focus_size": 0.2e-3, "focus_layers": 12,
+        "plate_core_x": 28, "plate_core_z": 18, "plate_core_depth": 10, "plate_layers": 18, "plate_extension": 24,
+    },
+}
+
+
+def _approach_angle(length: float, radius: float, H: float, gravity: float, theta: tuple[float, float]) -> float:
+    """Angle of the lower link at contact [rad], by the slender-rod chain: where the tip's mesh must be fine."""
+    from warp_mca.chain import Chain, slender_link
+    from warp_mca.rigid import swing
+
+    links = (slender_link("OA", (length, 0.0), mass=1.0, hinge_out=(length, 0.0)), slender_link("AB", (length, 0.0), mass=1.0))
+    chain = Chain(links=links, origin=(0.0, 0.0), gravity=(0.0, -gravity))
+    centre = length - radius
+
+    def gap(_t: float, angle) -> float:
+        return H - length * math.cos(angle[0]) - centre * math.cos(angle[1]) - radius
+
+    return round(float(swing(chain, theta, (0.0, 0.0), gap, t_max=5.0).theta[1]), 3)
+
+
+def build(
+    *,
+    mu: Annotated[float, Param("coefficient of friction", low=0.0, high=10.0)] = 0.47,
+    v_plate: Annotated[float, Param("initial velocity of the plate along x", unit="m/s", low=-50.0, high=50.0)] = 0.0,
+    H: Annotated[float, Param("height of hinge O above the plate", unit="m", low=0.0, exclusive=True)] = 0.37,
+    gravity: Annotated[float, Param("acceleration of gravity", unit="m/s^2", low=0.0, exclusive=True)] = 9.8,
+    theta_OA: Annotated[float, Param("initial angle of OA from the downward vertical", unit="deg", low=-180.0, high=180.0)] = 90.0,
+    theta_AB: Annotated[float, Param("initial angle of AB from the downward vertical", unit="deg", low=-180.0, high=180.0)] = 90.0,
+    length: Annotated[float, Param("length of each rod", unit="m", low=0.0, exclusive=True)] = 0.21,
+    radius: Annotated[float, Param("radius of rods and tip", unit="m", low=0.0, exclusive=True)] = 0.013,
+    plate_length: Annotated[float, Param("length of the plate, along x", unit="m", low=0.0, exclusive=True)] = 1.2,
+    plate_width: Annotated[float, Param("width of the plate, along z", unit="m", low=0.0, exclusive=True)] = 0.1,
+    plate_height: Annotated[float, Param("thickness of the plate", unit="m", low=0.0, exclusive=True)] = 0.05,
+    rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 2700.0,
+    nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.27,
+    E_tip: Annotated[float, Param("Young's modulus of the hemispherical tip", unit="Pa", low=0.0, exclusive=True)] = 70e9,
+    E_body: Annotated[float, Param("Young's modulus of the rods' cylinders", unit="Pa", low=0.0, exclusive=True)] = 70e9,
+    E_plate: Annotated[float, Param("Young's modulus of the plate", unit="Pa", low=0.0, exclusive=True)] = 70e9,
+    E_t_tip: Annotated[float, Param("tangent modulus of the tip", unit="Pa", low=0.0)] = 27e9,
+    E_t_body: Annotated[float, Param("tangent modulus of the rods' cylinders", unit="Pa", low=0.0)] = 27e9,
+    E_t_plate: Annotated[float, Param("tangent modulus of the plate", unit="Pa", low=0.0)] = 27e9,
+    sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
+    beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
+    plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
+    rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
+    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "axis",
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 1.0,
+    two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
+    duration: Annotated[float, Param("simulated time after contact", unit="s", low=0.0, exclusive=True)] = 0.6e-3,
+    output_interval: Annotated[float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)] = 1e-6,
+    time_step_scale: Annotated[float, Param("share of the stable time step", low=0.0, high=1.0)] = 0.9,
+    section: Annotated[int, Param("cells along each side of a rod's core, even", low=2)] = 6,
+    ring: Annotated[int, Param("cells from a rod's core to its surface", low=1)] = 3,
+    axial_OA: Annotated[int, Param("cells along OA", low=1)] = 12,
+    axial_AB: Annotated[int, Param("cells along the cylinder of AB", low=1)] = 18,
+    axial_ratio: Annotated[float, Param("length of AB's cells at the hinge over those at the tip", low=0.0, exclusive=True)] = 2.0,
+    focus_size: Annotated[float, Param("cell size at the contact, on the tip and on the plate", unit="m", low=0.0, exclusive=True)] = 0.6e-3,
+    focus_layers: Annotated[int, Param("cells from the fine patch of the tip to its coarse mesh", low=1)] = 4,
+    plate_core_x: Annotated[int, Param("fine cells of the plate along x, even", low=2)] = 10,
+    plate_core_z: Annotated[int, Param("fine cells of the plate along z, even", low=2)] = 6,
+    plate_core_depth: Annotated[int, Param("fine cells of the plate downwards", low=1)] = 3,
+    plate_layers: Annotated[int, Param("cells from the plate's fine core to its local box", low=1)] = 8,
+    plate_extension: Annotated[int, Param("cells along x from the local box to each end", low=1)] = 10,
+) -> mca.Scene:
+    """The scene of Table 1, Fig. 1 of the paper, with any of its values changed."""
+    theta = (math.radians(theta_OA), math.radians(theta_AB))
+
+    def aluminium(E: float, E_t: float) -> mca.Elastic:
+        if plastic:
+            return mca.J2Bilinear(E=E, nu=nu, rho=rho, sigma_y=sigma_y, E_t=E_t, beta=beta)
+        return mca.Elastic(E=E, nu=nu, rho=rho)
+
+    upper = mca.Rod(radius=radius, length=length, tip="flat", section=section, ring=ring, axial=axial_OA)
+    lower = mca.Rod(
+        radius=radius,
+        length=length,
+        section=section,
+        ring=ring,
+        axial=axial_AB,
+        axial_ratio=axial_ratio,
+        focus_angle=_approach_angle(length, radius, H, gravity, theta),
+        focus_size=focus_size,
+        focus_layers=focus_layers,
+    )
+    plate = mca.Plate(
+        length=plate_length,
+        width=plate_width,
+        height=plate_height,
+        core=(plate_core_x, plate_core_z),
+        core_depth=plate_core_depth,
+        core_size=focus_size,
+        layers=plate_layers,
+        extension=plate_extension,
+    )
+    rod, tip = aluminium(E_body, E_t_body), aluminium(E_tip, E_t_tip)
+    tip_centre = (length - radius, 0.0, 0.0)
+    top = mca.Surface(body="plate", nodes="contact")
+    return mca.Scene(
+        name="two_link",
+        bodies=(
+            mca.Body(name="OA", geometry=upper, material=rod),
+            mca.Body(name="AB", geometry=lower, material={"tip": tip, "body": rod}),
+            mca.Body(
+                name="plate",
+                geometry=plate,
+                material=aluminium(E_plate, E_t_plate),
+                position=(0.0, -H, 0.0),
+                velocity=(v_plate, 0.0, 0.0),
+            ),
+        ),
+        joints=(
+            mca.Revolute(name="O", body="OA", at=(0.0, 0.0, 0.0), nodes=joint_nodes),  # pyright: ignore[reportArgumentType]
+            mca.Revolute(name="A", body="OA", at=(length, 0.0, 0.0), other="AB", nodes=joint_nodes),  # pyright: ignore[reportArgumentType]
+        ),
+        contacts=(
+            mca.Contact(
+                slave=mca.Surface(body="AB", nodes="contact"), master=top, mu=mu, penalty=penalty, two_way=two_way
+            ),
+        ),
+        fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
+        gravity=(0.0, -gravity, 0.0),
+        rigid=mca.RigidPhase(
+            theta=theta,
+            theta_dot=(0.0, 0.0),
+            tip=mca.Tip(body="AB", centre=tip_centre, radius=radius),
+            target=top,
+            inertia=rigid_inertia,  # pyright: ignore[reportArgumentType]
+        ),
+        impact=mca.ImpactPhase(
+            duration=duration, output_interval=output_interval, time_step_scale=time_step_scale
+        ),
+        tip=mca.Point(body="AB", at=tip_centre),
+        target=mca.Point(body="plate", at=(0.0, 0.0, 0.0)),
+    )
+
+
+def check(result: mca.Result) -> list[str]:
+    """What a run with the default parameters must show."""
+    found = []
+    if len(result.summary["contacts"]) != 1:
+        found.append(f"expected one contact, found {result.summary['contacts']}")
+    if not 0.36e-3 <= result.summary["contact_duration"] <= 0.45e-3:
+        found.append(f"contact lasted {result.summary['contact_duration']:.3g} s instead of 0.36 to 0.45 ms")
+    if len(result.summary["F_n_peaks"]) != 2:
+        found.append(f"expected two peaks of F_n, found {len(result.summary['F_n_peaks'])}")
+    return found

@@ -1,0 +1,96 @@
+"""Owns the public names of warp_mca: `import warp_mca as mca`, then `mca.Scene`, `mca.run`, `mca.load`, …
+
+What needs Warp, scipy, gmsh or meshio is loaded at first use, so that the import itself is quick and light.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from warp_mca.errors import GuardError, McaError, RequestError
+from warp_mca.scene import (
+    Body,
+    Contact,
+    Elastic,
+    Fixed,
+    ImpactPhase,
+    J2Bilinear,
+    Point,
+    Prescribed,
+    Revolute,
+    RigidPhase,
+    RigidPlane,
+    Scene,
+    Surface,
+    Tip,
+)
+
+if TYPE_CHECKING:
+    from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod
+    from warp_mca.registry import Param, make_scene
+    from warp_mca.report.quality import quality_table
+    from warp_mca.results import Result, load
+    from warp_mca.simulation import mesh, run
+
+__version__ = "0.1.0"
+
+_LAZY = {
+    "Box": "warp_mca.geometry",
+    "Mesh": "warp_mca.geometry",
+    "MeshFile": "warp_mca.geometry",
+    "Plate": "warp_mca.geometry",
+    "Rod": "warp_mca.geometry",
+    "Param": "warp_mca.registry",
+    "make_scene": "warp_mca.registry",
+    "Result": "warp_mca.results",
+    "load": "warp_mca.results",
+    "quality_table": "warp_mca.report.quality",
+    "mesh": "warp_mca.simulation",
+    "run": "warp_mca.simulation",
+}
+
+__all__ = [
+    "Scene",
+    "Body",
+    "Elastic",
+    "J2Bilinear",
+    "Contact",
+    "Surface",
+    "RigidPlane",
+    "Revolute",
+    "Fixed",
+    "Prescribed",
+    "Point",
+    "Tip",
+    "RigidPhase",
+    "ImpactPhase",
+    "Box",
+    "Rod",
+    "Plate",
+    "MeshFile",
+    "Mesh",
+    "Param",
+    "make_scene",
+    "mesh",
+    "quality_table",
+    "run",
+    "load",
+    "Result",
+    "McaError",
+    "RequestError",
+    "GuardError",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'warp_mca' has no attribute {name!r}")
+    value = getattr(import_module(_LAZY[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,180 @@
+"""Owns the command line: warp-mca run | build | scenes.
+
+Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+import warp_mca as mca
+from warp_mca import registry
+from warp_mca.errors import McaError, bad_value
+from warp_mca.scene import Scene
+from warp_mca.scene_file import SUFFIX, Origin
+
+WELCOME = """\
+warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
+elastoplastic finite elements with frictional contact take over.
+
+  warp-mca run two_link                            falling two-link manipulator strikes a rough plate (Table 1)
+  warp-mca run two_link --preset paper --device cuda:0
+  warp-mca run two_link --set mu=0.3 --set v_plate=0.8 --out slippery
+  warp-mca run my_scene.py                         a scene of your own, in Python
+  warp-mca build two_link --preset paper -o paper.mca && warp-mca run paper.mca
+  warp-mca scenes                                  scenes, presets and parameters
+
+warp-mca COMMAND --help lists the options; README.md has an example in Python."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be run or built.
+
+    Attributes:
+        scene: built from its parameters.
+        label: names the default output folder.
+        source: the scene file, or None when a model file was given.
+        origin: the built-in scene and its parameters, or None.
+        meshes: those of a model file, or None.
+    """
+
+    scene: Scene
+    label: str
+    source: registry.SceneSource | None = None
+    origin: Origin | None = None
+    meshes: dict[str, mca.Mesh] | None = None
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports a bad command in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Carry out one command.
+
+    Args:
+        argv: without the program's name; the process's own if None.
+
+    Returns:
+        The exit status.
+    """
+    try:
+        args = _parser().parse_args(argv)
+        args.command(args)
+    except McaError as error:
+        print("warp-mca: error:", " ".join(str(error).split()), file=sys.stderr)
+        return error.exit_status
+    except KeyboardInterrupt:
+        print("warp-mca: interrupted, nothing was written", file=sys.stderr)
+        return 130
+    except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands
+        return stop.code if isinstance(stop.code, int) else 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="warp-mca", description="Impact of flexible machines.", allow_abbrev=False)
+    parser.add_argument("--version", action="version", version=f"warp-mca {mca.__version__}")
+    parser.set_defaults(command=lambda args: print(WELCOME))
+    commands = parser.add_subparsers(metavar="COMMAND")
+
+    run = commands.add_parser("run", help="run a scene or a built model", allow_abbrev=False)
+    _add_scene(run)
+    run.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    run.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
+    run.add_argument("--duration", type=float, metavar="SECONDS", help="of the impact phase (default: the scene's)")
+    run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
+    run.add_argument("--force", action="store_true", help="replace results that the folder holds already")
+    run.add_argument("--viewer", default="none", choices=("rerun", "none"), help="(default: %(default)s)")
+    run.set_defaults(command=_run)
+
+    build = commands.add_parser("build", help="make the meshes of a scene and store them with it", allow_abbrev=False)
+    _add_scene(build)
+    build.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="model file, suffix .mca")
+    build.set_defaults(command=_build)
+
+    scenes = commands.add_parser("scenes", help="list scenes, presets and parameters", allow_abbrev=False)
+    scenes.add_argument("scene", nargs="*", metavar="SCENE", help="name or Python file (default: all built-in ones)")
+    scenes.set_defaults(command=_scenes)
+    return parser
+
+
+def _add_scene(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
+    parser.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
+    help_text = "change a parameter; may be given several times"
+    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
+
+
+def _request(args: argparse.Namespace) -> Request:
+    """Build the scene that the arguments ask for."""
+    from warp_mca import scene_file
+
+    overrides = registry.parse_overrides(args.settings)
+    if Path(args.scene).suffix != SUFFIX:
+        source = registry.load_source(args.scene)
+        values = source.resolve(args.preset, overrides)
+        preset = args.preset or source.default_preset
+        origin = Origin(source.name, preset, values) if source.builtin else None
+        label = f"{source.name}-{preset}" if preset else source.name
+        return Request(source.build(values), label, source, origin)
+    if args.preset is not None:
+        raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
+    stored = scene_file.changed(scene_file.load(args.scene), overrides)
+    return Request(stored.scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
+
+
+def _run(args: argparse.Namespace) -> None:
+    from warp_mca.report.console import print_summary, progress_bar
+    from warp_mca.results import FILES
+
+    if args.viewer != "none":
+        raise bad_value("--viewer", args.viewer, "this version has no live viewer yet; use --viewer none")
+    request = _request(args)
+    out = args.out or Path(request.label)
+    with progress_bar() as progress:
+        result = mca.run(
+            request.scene,
+            device=args.device,
+            precision=args.precision,
+            duration=args.duration,
+            out=out,
+            force=args.force,
+            meshes=request.meshes,
+            progress=progress,
+        )
+    print_summary(result, [str(out / name) for name in FILES])
+    as_designed = not args.settings and args.duration is None
+    if request.source and request.source.check and as_designed:
+        for message in request.source.check(result):
+            print(f"check: {message}")
+
+
+def _build(args: argparse.Namespace) -> None:
+    from warp_mca import scene_file
+    from warp_mca.report.console import print_quality
+
+    target = scene_file.check_path(args.output)
+    if Path(args.scene).suffix == SUFFIX:
+        raise bad_value("scene", args.scene, "this is a built model; name a built-in scene or a Python file")
+    request = _request(args)
+    meshes = mca.mesh(request.scene)
+    quality = mca.quality_table(request.scene, meshes)
+    scene_file.save(target, request.scene, meshes, request.origin)
+    print_quality(quality)
+    print(f"wrote {target}")
+
+
+def _scenes(args: argparse.Namespace) -> None:
+    from warp_mca.report.console import print_scenes
+
+    print_scenes([registry.load_source(name) for name in args.scene or registry.scene_names()])

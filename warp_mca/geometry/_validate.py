@@ -1,0 +1,51 @@
+"""Owns the checks that the recipes make on their values."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+
+from warp_mca.errors import bad_value
+
+
+def lengths(owner: str, /, **values: float) -> None:
+    """Each value must be a finite number above 0."""
+    for name, value in values.items():
+        if not (_is_number(value) and value > 0.0):
+            raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
+
+
+def finite(owner: str, /, **values: float) -> None:
+    """Each value must be a finite number."""
+    for name, value in values.items():
+        if not _is_number(value):
+            raise bad_value(f"{owner}.{name}", value, "give a finite number")
+
+
+def counts(owner: str, /, **values: int) -> None:
+    """Each value must be a whole number above 0."""
+    for name, value in values.items():
+        if not _is_count(value):
+            raise bad_value(f"{owner}.{name}", value, "give a whole number above 0")
+
+
+def even_counts(owner: str, /, **values: int) -> None:
+    """Each value must be an even number above 0, so that the middle is a grid line."""
+    for name, value in values.items():
+        if not (_is_count(value) and value % 2 == 0):
+            raise bad_value(f"{owner}.{name}", value, "give an even number above 0")
+
+
+def entries(owner: str, count: int, /, **values: tuple) -> None:
+    """Each value must be a tuple of `count` entries."""
+    for name, value in values.items():
+        if not (isinstance(value, (tuple, list)) and len(value) == count):
+            raise bad_value(f"{owner}.{name}", value, f"give {count} numbers")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_count(value: object) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool) and value > 0

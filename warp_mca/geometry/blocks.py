@@ -1,0 +1,205 @@
+"""Owns `Blocks`: hexahedral multi-block meshes, described by their corner points and meshed transfinitely by gmsh."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import ModuleType
+
+import numpy as np
+
+from warp_mca.errors import RequestError
+from warp_mca.geometry.mesh import Mesh
+
+# Faces and edges of a block by the position of their corners; edges are grouped by the direction they run in.
+_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_EDGES = (((0, 1), (3, 2), (4, 5), (7, 6)), ((0, 3), (1, 2), (4, 7), (5, 6)), ((0, 4), (1, 5), (2, 6), (3, 7)))
+_LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
+_one_at_a_time = threading.Lock()  # gmsh keeps one global state
+
+
+def growth(length: float, count: int, before: float) -> float:
+    """Factor q by which `count` cells must grow, one from the next, to fill `length` after a cell of size `before`.
+
+    Solves sum(before * q**i, i = 1..count) = length, so q < 1 means that the cells shrink.
+    """
+    low, high = 1e-3, 1e3
+    for _ in range(100):
+        q = (low * high) ** 0.5
+        low, high = (q, high) if before * sum(q**i for i in range(1, count + 1)) < length else (low, q)
+    return q
+
+
+class Blocks:
+    """Hexahedral blocks that share corners, edges and faces; equal calls in equal order give bit-identical meshes.
+
+    Points are handles returned by `point`. Edges are straight unless `arc` bends them, faces are interpolated from
+    their edges unless `on_sphere` puts them on a sphere.
+    """
+
+    def __init__(self) -> None:
+        self._points: list[tuple[float, float, float]] = []
+        self._arcs: dict[frozenset[int], int] = {}
+        self._growth: dict[tuple[int, int], float] = {}
+        self._count: dict[tuple[int, int], int] = {}
+        self._spheres: dict[frozenset[int], int] = {}
+        self._blocks: list[tuple[tuple[int, ...], str]] = []
+        self._faces: dict[str, list[frozenset[int]]] = {}
+
+    def point(self, position: Sequence[float]) -> int:
+        """Handle of a new point at `position` [m], shape (3,)."""
+        x, y, z = (float(value) for value in position)
+        self._points.append((x, y, z))
+        return len(self._points) - 1
+
+    def position(self, point: int) -> np.ndarray:
+        """Coordinates of a point [m], shape (3,), float64."""
+        return np.array(self._points[point])
+
+    def arc(self, a: int, b: int, centre: int) -> None:
+        """Makes the edge a-b the circle arc (of less than half a turn) about the point `centre`."""
+        self._arcs[frozenset((a, b))] = centre
+
+    def grow(self, a: int, b: int, factor: float) -> None:
+        """Makes each cell of the edge a-b `factor` times as long as the one before, from a to b."""
+        self._growth[a, b] = factor
+        self._growth[b, a] = 1.0 / factor
+
+    def on_sphere(self, corners: Sequence[int], centre: int) -> None:
+        """Puts the face with these corners, whose edges must be arcs about `centre`, on the sphere about it."""
+        self._spheres[frozenset(corners)] = centre
+
+    def name_face(self, name: str, corners: Sequence[int]) -> None:
+        """Adds the nodes of the face with these corners to the node set `name`."""
+        self._faces.setdefault(name, []).append(frozenset(corners))
+
+    def block(self, corners: Sequence[int], divisions: tuple[int, int, int], cells: str) -> None:
+        """Adds a block to the cell set `cells`.
+
+        Args:
+            corners: eight points in the order of a VTK hexahedron.
+            divisions: number of cells along the edges 0-1, 0-3 and 0-4.
+            cells: name of the cell set.
+
+        Raises:
+            RequestError: a neighbour divides a shared edge differently.
+        """
+        for edges, count in zip(_EDGES, divisions, strict=True):
+            for i, j in edges:
+                a, b = corners[i], corners[j]
+                if self._count.setdefault((min(a, b), max(a, b)), count) != count:
+                    raise RequestError(f"blocks that share the edge {a}-{b} divide it differently: give equal divisions")
+        self._blocks.append((tuple(corners), cells))
+
+    def mesh(self) -> Mesh:
+        """Meshes all blocks.
+
+        Raises:
+            RequestError: gmsh cannot be loaded, or cannot mesh these blocks.
+        """
+        with _gmsh() as gmsh:
+            try:
+                surfaces, volumes = self._draw(gmsh.model.geo)
+                gmsh.model.geo.synchronize()
+                gmsh.model.mesh.generate(3)
+                return self._read(gmsh.model.mesh, surfaces, volumes)
+            except Exception as error:  # gmsh raises nothing more specific
+                raise RequestError(f"gmsh could not mesh the blocks ({error}): change the recipe's values") from error
+
+    def _draw(self, geo: ModuleType) -> tuple[dict[frozenset[int], int], list[int]]:
+        """Emits the geometry; returns gmsh's surface tags by corners and its volume tags in block order."""
+        points = [geo.addPoint(*position) for position in self._points]
+        curves: dict[tuple[int, int], int] = {}
+        surfaces: dict[frozenset[int], int] = {}
+
+        def curve(a: int, b: int) -> int:
+            if (b, a) in curves:
+                return -curves[b, a]
+            if (a, b) not in curves:
+                centre = self._arcs.get(frozenset((a, b)))
+                ends = points[a], points[b]
+                tag = geo.addLine(*ends) if centre is None else geo.addCircleArc(ends[0], points[centre], ends[1])
+                count = self._count[min(a, b), max(a, b)]
+                geo.mesh.setTransfiniteCurve(tag, count + 1, "Progression", self._growth.get((a, b), 1.0))
+                curves[a, b] = tag
+            return curves[a, b]
+
+        def surface(corners: list[int]) -> int:
+            key = frozenset(corners)
+            if key not in surfaces:
+                loop = geo.addCurveLoop([curve(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)])
+                centre = self._spheres.get(key)
+                tag = geo.addSurfaceFilling([loop], sphereCenterTag=-1 if centre is None else points[centre])
+                geo.mesh.setTransfiniteSurface(tag, cornerTags=[points[corner] for corner in corners])
+                geo.mesh.setRecombine(2, tag)
+                surfaces[key] = tag
+            return surfaces[key]
+
+        volumes = []
+        for corners, _ in self._blocks:
+            shell = geo.addSurfaceLoop([surface([corners[i] for i in face]) for face in _FACES])
+            volumes.append(geo.addVolume([shell]))
+            geo.mesh.setTransfiniteVolume(volumes[-1], [points[corner] for corner in corners])
+        return surfaces, volumes
+
+    def _read(self, meshed: ModuleType, surfaces: dict[frozenset[int], int], volumes: list[int]) -> Mesh:
+        """Collects hexahedra and sets; nodes that no hexahedron uses (arc centres) are left out."""
+        blocks = [meshed.getElementsByType(5, tag)[1].reshape(-1, 8) for tag in volumes]
+        tags, hexahedra = np.unique(np.concatenate(blocks), return_inverse=True)
+        all_tags, coordinates, _ = meshed.getNodes()
+        rank = np.argsort(all_tags)
+        points = coordinates.reshape(-1, 3)[rank][np.searchsorted(all_tags[rank], tags)]
+
+        owner = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
+        of_block = np.array([cells for _, cells in self._blocks])
+        cell_sets = {name: np.flatnonzero(of_block[owner] == name).astype(np.int32) for name in dict.fromkeys(of_block)}
+        node_sets = {}
+        for name, faces in self._faces.items():
+            on_faces = [meshed.getNodes(2, surfaces[face], includeBoundary=True)[0] for face in faces]
+            node_sets[name] = np.searchsorted(tags, np.unique(np.concatenate(on_faces))).astype(np.int32)
+        hexahedra = _outwards(points, hexahedra.reshape(-1, 8).astype(np.int32))
+        return Mesh(points, hexahedra, node_sets, {str(name): cells for name, cells in cell_sets.items()})
+
+
+def _outwards(points: np.ndarray, hexahedra: np.ndarray) -> np.ndarray:
+    """Swaps bottom and top of the elements that gmsh numbered left-handed."""
+    p = points[hexahedra]
+    u = p[:, [1, 2, 5, 6]].sum(1) - p[:, [0, 3, 4, 7]].sum(1)
+    v = p[:, [2, 3, 6, 7]].sum(1) - p[:, [0, 1, 4, 5]].sum(1)
+    w = p[:, 4:].sum(1) - p[:, :4].sum(1)
+    left_handed = np.einsum("ij,ij->i", np.cross(u, v), w) < 0.0
+    return np.where(left_handed[:, None], np.roll(hexahedra, 4, axis=1), hexahedra)
+
+
+@contextmanager
+def _gmsh() -> Iterator[ModuleType]:
+    """A silent gmsh with an empty model of our own; a session that the caller had open is left as it was."""
+    try:
+        import gmsh
+    except ImportError as error:
+        raise RequestError(f"gmsh cannot be imported ({error}): install it with pip install gmsh") from error
+    except OSError as error:
+        raise RequestError(
+            f"gmsh lacks a system library ({error}): install them with apt-get install {_LIBRARIES}"
+        ) from error
+    with _one_at_a_time:
+        mine = not gmsh.isInitialized()
+        if mine:
+            gmsh.initialize(readConfigFiles=False, interruptible=False)  # signal handlers need the main thread
+        before = None if mine else gmsh.model.getCurrent()
+        options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.ElementOrder": 1}
+        saved = {name: gmsh.option.getNumber(name) for name in options}
+        try:
+            for name, value in options.items():
+                gmsh.option.setNumber(name, value)
+            gmsh.model.add("warp_mca")
+            yield gmsh
+        finally:
+            if mine:
+                gmsh.finalize()
+            else:
+                gmsh.model.remove()
+                gmsh.model.setCurrent(before)
+                for name, value in saved.items():
+                    gmsh.option.setNumber(name, value)

@@ -1,0 +1,50 @@
+"""Owns `Box`: a brick of equal cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_mca.geometry import _validate
+from warp_mca.geometry.mesh import Mesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A brick with edges along the axes; node sets xmin, xmax, ymin, ymax, zmin, zmax, cell set body.
+
+    Attributes:
+        size: lengths along x, y, z [m].
+        divisions: number of cells along x, y, z.
+        origin: corner of least x, y, z [m].
+    """
+
+    size: tuple[float, float, float]
+    divisions: tuple[int, int, int]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _validate.entries("Box", 3, size=self.size, divisions=self.divisions, origin=self.origin)
+        for value in self.size:
+            _validate.lengths("Box", size=value)
+        for value in self.divisions:
+            _validate.counts("Box", divisions=value)
+        for value in self.origin:
+            _validate.finite("Box", origin=value)
+
+    def build(self) -> Mesh:
+        """The mesh, numbered with x running fastest, then y, then z."""
+        nx, ny, nz = self.divisions
+        axes = [o + s * np.arange(n + 1) / n for o, s, n in zip(self.origin, self.size, self.divisions, strict=True)]
+        z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
+        index = np.arange(x.size, dtype=np.int32).reshape(nz + 1, ny + 1, nx + 1)
+        first = index[:-1, :-1, :-1].reshape(-1, 1)
+        dy, dz = nx + 1, (nx + 1) * (ny + 1)
+        hexahedra = first + np.array([0, 1, dy + 1, dy, dz, dz + 1, dz + dy + 1, dz + dy], dtype=np.int32)
+        node_sets = {}
+        for axis, name in enumerate("zyx"):
+            for side, where in (("min", 0), ("max", -1)):
+                node_sets[name + side] = index.take(where, axis=axis).ravel()
+        points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+        return Mesh(points, hexahedra, node_sets, {"body": np.arange(len(hexahedra), dtype=np.int32)})

@@ -1,0 +1,74 @@
+"""Owns changes to finished meshes: mirroring, dropping unused nodes, moving single nodes to exact places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from warp_mca.errors import bad_value
+from warp_mca.geometry.mesh import Mesh
+
+_MIRRORED = [0, 3, 2, 1, 4, 7, 6, 5]  # keeps the Jacobian of a reflected hexahedron positive
+
+
+def mirror(mesh: Mesh, axis: int, rename: Mapping[str, str] | None = None) -> Mesh:
+    """The mesh and its reflection, joined at the plane where coordinate `axis` is 0.
+
+    Args:
+        mesh: lies on one side of the plane; what touches it within rounding is put exactly on it.
+        axis: 0, 1 or 2.
+        rename: node sets whose reflection goes by another name instead of joining the set.
+    """
+    points = snapped(mesh.points, axis, 0.0)
+    image = np.arange(len(points), dtype=np.int32)
+    off = np.flatnonzero(points[:, axis] != 0.0)
+    image[off] = len(points) + np.arange(len(off), dtype=np.int32)
+    reflected = points[off].copy()
+    reflected[:, axis] *= -1.0
+
+    node_sets = {name: nodes for name, nodes in mesh.node_sets.items()}
+    for name, nodes in mesh.node_sets.items():
+        other = (rename or {}).get(name, name)
+        node_sets[other] = np.unique(np.append(node_sets.get(other, nodes[:0]), image[nodes]))
+    cell_sets = {name: np.append(cells, cells + len(mesh.hexahedra)) for name, cells in mesh.cell_sets.items()}
+    return Mesh(
+        np.concatenate([points, reflected]),
+        np.concatenate([mesh.hexahedra, image[mesh.hexahedra][:, _MIRRORED]]),
+        node_sets,
+        {name: cells.astype(np.int32) for name, cells in cell_sets.items()},
+    )
+
+
+def snapped(points: np.ndarray, axis: int, value: float) -> np.ndarray:
+    """Copy of `points` (count, 3) whose coordinates `axis` within rounding of `value` [m] equal it exactly."""
+    points = points.copy()
+    tolerance = 1e-10 * np.ptp(points, axis=0).max()
+    points[np.abs(points[:, axis] - value) < tolerance, axis] = value
+    return points
+
+
+def pinned(points: np.ndarray, place: Sequence[float]) -> np.ndarray:
+    """Copy of `points` (count, 3) whose node within rounding of `place` [m] lies exactly there.
+
+    Raises:
+        RequestError: no node lies there.
+    """
+    points = points.copy()
+    distance = np.linalg.norm(points - np.asarray(place), axis=1)
+    nearest = int(distance.argmin())
+    if distance[nearest] > 1e-9 * np.ptp(points, axis=0).max():
+        raise bad_value("place", tuple(place), "no node of the mesh lies there; use even divisions")
+    points[nearest] = place
+    return points
+
+
+def compact(mesh: Mesh) -> Mesh:
+    """The mesh without the nodes that no element uses; sets keep the nodes that are left."""
+    used = np.unique(mesh.hexahedra)
+    if len(used) == len(mesh.points):
+        return mesh
+    index = np.full(len(mesh.points), -1, dtype=np.int32)
+    index[used] = np.arange(len(used), dtype=np.int32)
+    node_sets = {name: index[nodes][index[nodes] >= 0] for name, nodes in mesh.node_sets.items()}
+    return Mesh(mesh.points[used], index[mesh.hexahedra], node_sets, mesh.cell_sets)

@@ -1,0 +1,1 @@
+"""Recorders: what writes a run's results while it goes on."""

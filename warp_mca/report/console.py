@@ -1,0 +1,131 @@
+"""Owns what the command line shows: tables of scenes and mesh quality, a run's summary, the progress bar."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from warp_mca.registry import SceneSource
+    from warp_mca.report.quality import Quality
+    from warp_mca.results import Result
+
+PIPED_WIDTH = 120  # characters in a line when the output is not a terminal
+
+
+def console() -> Console:
+    """Standard output, plain: names and paths are shown as they are."""
+    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False, emoji=False)
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
+    """A function (stage, share done) that moves a bar with the time left, or None when no one is watching."""
+    if not (sys.stdout.isatty() and sys.stderr.isatty()):
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description:8}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task, shown = bar.add_task("", total=None), ""
+
+        def tell(stage: str, done: float) -> None:
+            nonlocal shown
+            if stage != shown:
+                bar.reset(task, description=stage, total=None)
+                shown = stage
+            if done > 0.0:
+                bar.update(task, total=1.0, completed=done)
+
+        yield tell
+
+
+def print_scenes(sources: Sequence[SceneSource]) -> None:
+    """Each scene with its presets, and unit, default and range of every parameter."""
+    out = console()
+    for source in sources:
+        out.print(f"\n{source.name}: {source.description}", style="bold")
+        for name, values in source.presets.items():
+            default = " (default)" if name == source.default_preset else ""
+            out.print(f"  preset {name}{default}: {', '.join(f'{k}={_text(v)}' for k, v in values.items()) or '-'}")
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        for heading in ("parameter", "default", "unit", "range", "meaning"):
+            table.add_column(heading, overflow="fold")
+        defaults = source.resolve()
+        for name, parameter in source.parameters.items():
+            param = parameter.param
+            table.add_row(name, _text(defaults[name]), param.unit, param.range or "any", param.description)
+        out.print(table)
+
+
+def print_quality(quality: Quality) -> None:
+    """Size and shape of each body's mesh, and the element that sets the stable step."""
+    out = console()
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("body")
+    for heading in ("elements", "nodes", "min scaled Jacobian [-]", "shortest edge [mm]"):
+        table.add_column(heading, justify="right")
+    for row in quality.bodies:
+        shape = f"{row.min_scaled_jacobian:.3f}", f"{1e3 * row.min_edge:.3f}"
+        table.add_row(row.body, f"{row.elements:,}", f"{row.nodes:,}", *shape)
+    total = sum(row.elements for row in quality.bodies), sum(row.nodes for row in quality.bodies)
+    table.add_row("total", *(f"{count:,}" for count in total))
+    out.print(table)
+    place = ", ".join(f"{1e3 * x:.2f}" for x in quality.at)
+    out.print(
+        f"smallest stable step {quality.stable_dt:.4g} s, set by element {quality.element} of {quality.body} "
+        f"at ({place}) mm in its frame"
+    )
+
+
+def print_summary(result: Result, files: Sequence[str]) -> None:
+    """The figures of a run that one looks at first, its warnings, and the files written."""
+    out = console()
+    table = Table.grid(padding=(0, 2, 0, 0))
+    for label, text in _figures(result.summary):
+        table.add_row(label, text)
+    out.print(table)
+    for warning in result.warnings:
+        out.print(f"warning: {warning}")
+    for file in files:
+        out.print(f"wrote {file}", soft_wrap=True)
+
+
+def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    if summary.get("t_contact") is not None:
+        yield (
+            "hand-off",
+            f"t = {summary['t_contact']:.6f} s, v_n = {summary['v_n']:.4f}, v_t = {summary['v_t']:.4f} m/s",
+        )
+    peaks = ", ".join(f"{_force(F)} at {1e3 * t:.3f} ms" for t, F in summary["F_n_peaks"])
+    yield "F_n peaks", peaks or "none"
+    yield "F_t", f"{_force(summary['F_t_min'])} to {_force(summary['F_t_max'])}"
+    yield "contact", _spans(summary["contacts"])
+    yield "sticking", _spans(summary["sticks"])
+    yield "plastic strain", f"{summary['max_plastic_strain']:.3g} at most"
+    yield "energy error", f"{100.0 * summary['energy_error']:.2g} %"
+    size = f"{summary['n_elements']:,} elements, {summary['n_steps']:,} steps of {summary['dt']:.3g} s"
+    yield "model", f"{size}, {1e3 * summary['simulated_time']:g} ms"
+    yield "wall time", ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in summary["wall"].items())
+    rate = summary["element_steps_per_s"]
+    if rate is not None:
+        yield "rate", f"{rate / 1e6:.2f} M element-steps/s on {summary['device']}, {summary['precision']}"
+
+
+def _force(value: float) -> str:
+    return f"{value / 1e3:.3f} kN" if abs(value) >= 1e3 else f"{value:.3g} N"
+
+
+def _spans(spans: Sequence[Sequence[float]]) -> str:
+    total = sum(end - start for start, end in spans)
+    return f"{1e3 * total:.3f} ms in {len(spans)} interval{'s' if len(spans) != 1 else ''}" if spans else "none"
+
+
+def _text(value: object) -> str:
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

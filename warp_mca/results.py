@@ -1,0 +1,244 @@
+"""Owns what a run leaves behind: `Result`, its summary, and the folder it is saved in and loaded from."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+
+from warp_mca.errors import RequestError, bad_value
+from warp_mca.history import Array, contact_intervals, force_peaks, stick_intervals
+
+HISTORY_COLUMNS = (
+    "time_s",
+    "F_n_N",
+    "F_t_N",
+    "stick_fraction",
+    "tip_vx",
+    "tip_vy",
+    "plate_vx",
+    "E_kinetic",
+    "E_internal",
+    "E_plastic",
+    "E_contact",
+    "E_friction",
+    "E_total_error",
+)
+FILES = ("summary.json", "history.csv", "forces.png")
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished run.
+
+    Attributes:
+        summary: the figures of `summary.json`, see docs/outputs.md.
+        history: one array for each column of `history.csv`, each shape (row_count,), float64.
+        path: folder that it was saved in or loaded from, or None.
+        warnings: what the run noticed without stopping, one sentence each.
+    """
+
+    summary: dict[str, object]
+    history: dict[str, Array]
+    path: Path | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> Array:
+        """Time after first contact [s], the end of each output interval, shape (row_count,)."""
+        return self.history["time_s"]
+
+    @property
+    def F_n(self) -> Array:
+        """Normal force on the tip's body [N], mean over each output interval, shape (row_count,)."""
+        return self.history["F_n_N"]
+
+    @property
+    def F_t(self) -> Array:
+        """Tangential force on the tip's body [N], mean over each output interval, shape (row_count,)."""
+        return self.history["F_t_N"]
+
+    def __getitem__(self, column: str) -> Array:
+        """The history column of that name, shape (row_count,)."""
+        if column not in self.history:
+            raise KeyError(f"{column}: the history has {', '.join(self.history)}")
+        return self.history[column]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFacts:
+    """What the simulation alone knows and the summary reports. What a scene lacks is None.
+
+    Attributes:
+        scene: its name.
+        n_elements, n_nodes: size of the model.
+        dt: time step [s].
+        n_steps: finite-element steps done.
+        simulated_time: of the impact phase [s].
+        wall: wall-clock seconds by stage: rigid, mesh, compile, fe, output.
+        device, precision, element: what it ran on and with.
+        energy_error: largest imbalance as a share of initial energy and external work [-].
+        energy: ledger at the end [J].
+        max_plastic_strain: greatest equivalent plastic strain [-].
+        parameters: of the scene.
+        t_contact: when the rigid phase ended [s].
+        v_n, v_t: velocity of the tip's centre at hand-off [m/s], downwards and along +x.
+        theta, theta_dot: of the links at hand-off [rad], [rad/s].
+        more: further figures, added to the summary as they are.
+    """
+
+    scene: str
+    n_elements: int
+    n_nodes: int
+    dt: float
+    n_steps: int
+    simulated_time: float
+    wall: Mapping[str, float]
+    device: str
+    precision: str
+    element: str
+    energy_error: float
+    energy: Mapping[str, float]
+    max_plastic_strain: float
+    parameters: Mapping[str, object] = field(default_factory=dict)
+    t_contact: float | None = None
+    v_n: float | None = None
+    v_t: float | None = None
+    theta: tuple[float, ...] = ()
+    theta_dot: tuple[float, ...] = ()
+    more: Mapping[str, object] = field(default_factory=dict)
+
+
+def summarise(history: Mapping[str, Array], facts: RunFacts) -> dict[str, object]:
+    """The contents of `summary.json`: `facts`, and what is read off the history.
+
+    Args:
+        history: by column, see `HISTORY_COLUMNS`.
+        facts: of the run.
+    """
+    from warp_mca import __version__
+
+    time, F_n, F_t = history["time_s"], history["F_n_N"], history["F_t_N"]
+    contacts = contact_intervals(time, F_n)
+    peaks = force_peaks(time, F_n)
+    known = {f.name: getattr(facts, f.name) for f in fields(facts) if f.name != "more"}
+    fe_wall = facts.wall.get("fe", 0.0)
+    return {
+        **known,
+        "wall": dict(facts.wall),
+        "energy": dict(facts.energy),
+        "parameters": dict(facts.parameters),
+        "theta": list(facts.theta),
+        "theta_dot": list(facts.theta_dot),
+        "F_n_first_peak": peaks[0][1] if peaks else None,
+        "F_n_peaks": [list(peak) for peak in peaks],
+        "F_n_max": float(np.max(F_n, initial=0.0)),
+        "F_t_min": float(np.min(F_t, initial=0.0)),
+        "F_t_max": float(np.max(F_t, initial=0.0)),
+        "contacts": [list(contact) for contact in contacts],
+        "contact_duration": sum(end - start for start, end in contacts),
+        "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],
+        "element_steps_per_s": facts.n_elements * facts.n_steps / fe_wall if fe_wall > 0.0 else None,
+        "version": __version__,
+        **facts.more,
+    }
+
+
+def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> Path:
+    """The folder as a path, when results may be written there.
+
+    Raises:
+        RequestError: it is a file, cannot be written to, or holds results and `force` is off.
+    """
+    path = Path(directory)
+    existing = _nearest(path)
+    if not existing.is_dir():
+        raise bad_value("out", str(path), f"{existing} is not a folder; name another")
+    if not os.access(existing, os.W_OK):
+        raise bad_value("out", str(path), f"{existing} cannot be written to; name another folder")
+    if not force and any((path / name).exists() for name in FILES):
+        raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
+    return path
+
+
+def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
+    """Write summary.json, history.csv and forces.png, all or none of them.
+
+    Args:
+        result: of a run.
+        directory: is made if need be.
+        force: replace results that are there already.
+
+    Returns:
+        The result with its `path` set.
+
+    Raises:
+        RequestError: as in `check_output`.
+    """
+    from warp_mca.report.forces import save_forces
+
+    path = check_output(directory, force=force)
+    # Written beside the folder first: a run that fails half-way leaves nothing behind.
+    staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=_nearest(path)))
+    try:
+        summary = {**result.summary, "warnings": list(result.warnings)}
+        (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
+        _write_history(staging / "history.csv", result.history)
+        save_forces(staging / "forces.png", result)
+        path.mkdir(parents=True, exist_ok=True)
+        for name in FILES:
+            (staging / name).replace(path / name)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return Result(result.summary, result.history, path, result.warnings)
+
+
+def load(directory: str | os.PathLike[str]) -> Result:
+    """The result that a run saved in `directory`.
+
+    Raises:
+        RequestError: there is none, or its files cannot be read.
+    """
+    path = Path(directory)
+    try:
+        summary = json.loads((path / "summary.json").read_text(encoding="utf-8"))
+        warnings = tuple(summary.pop("warnings", ()))
+        with (path / "history.csv").open(encoding="utf-8") as file:
+            names = file.readline().strip().split(",")
+            rows = np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2).reshape(-1, len(names))
+    except FileNotFoundError as error:
+        raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
+    except (OSError, ValueError, AttributeError) as error:
+        raise bad_value("results", str(path), "its files are damaged; run again") from error
+    return Result(summary, dict(zip(names, rows.T.copy(), strict=True)), path, warnings)
+
+
+def _nearest(path: Path) -> Path:
+    """The path itself, or the closest of its parents that exists."""
+    return next(p for p in (path, *path.absolute().parents) if p.exists())
+
+
+def _write_history(path: Path, history: Mapping[str, Array]) -> None:
+    missing = [name for name in HISTORY_COLUMNS if name not in history]
+    if missing:
+        raise RequestError(f"history: the columns {', '.join(missing)} are missing; give every one of HISTORY_COLUMNS")
+    names = [*HISTORY_COLUMNS, *(name for name in history if name not in HISTORY_COLUMNS)]
+    rows = np.column_stack([np.asarray(history[name], dtype=np.float64) for name in names])
+    # repr gives the shortest text that reads back as the same float64.
+    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _plain(value: object) -> object:
+    """NumPy numbers and arrays, tuples and mappings as JSON knows them."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    return str(value)

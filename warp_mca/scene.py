@@ -1,0 +1,407 @@
+"""Owns the public vocabulary of a scene: materials, bodies, joints, contacts, constraints, phases.
+
+A scene is plain, immutable data. Every class checks its own values and raises `RequestError` with the field,
+the value and the remedy. Nothing here meshes, allocates or imports Warp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+from warp_mca.errors import bad_value
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+    from warp_mca.geometry.recipe import Recipe
+
+Vec3 = tuple[float, float, float]
+
+
+def _positive(owner: str, **values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
+
+
+def _finite(owner: str, **values: Vec3) -> None:
+    for name, value in values.items():
+        if len(value) != 3 or not all(math.isfinite(component) for component in value):
+            raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elastic:
+    """Isotropic linear elasticity.
+
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio [-], in (-1, 0.5).
+        rho: density [kg/m^3].
+    """
+
+    E: float
+    nu: float
+    rho: float
+
+    def __post_init__(self) -> None:
+        _positive(type(self).__name__, E=self.E, rho=self.rho)
+        if not -1.0 < self.nu < 0.5:
+            raise bad_value(f"{type(self).__name__}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K = E / (3 (1 - 2 nu)) [Pa]."""
+        return self.E / (3.0 * (1.0 - 2.0 * self.nu))
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + nu)) [Pa]."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+
+@dataclass(frozen=True, kw_only=True)
+class J2Bilinear(Elastic):
+    """Von Mises plasticity with bilinear uniaxial response.
+
+    Attributes:
+        sigma_y: initial yield stress [Pa].
+        E_t: tangent modulus of the uniaxial response beyond yield [Pa], in [0, E).
+        beta: share of isotropic hardening [-]: 0 kinematic, 1 isotropic.
+    """
+
+    sigma_y: float
+    E_t: float
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _positive("J2Bilinear", sigma_y=self.sigma_y)
+        if not 0.0 <= self.E_t < self.E:
+            raise bad_value("J2Bilinear.E_t", self.E_t, f"the tangent modulus must lie in [0, E = {self.E:g})")
+        if not 0.0 <= self.beta <= 1.0:
+            raise bad_value("J2Bilinear.beta", self.beta, "must lie between 0 (kinematic) and 1 (isotropic)")
+
+    @property
+    def hardening_modulus(self) -> float:
+        """H = E E_t / (E - E_t) [Pa], the slope of yield stress over equivalent plastic strain."""
+        return self.E * self.E_t / (self.E - self.E_t)
+
+
+Material = Elastic | J2Bilinear
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A deformable body.
+
+    Attributes:
+        name: unique in the scene.
+        geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
+        material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
+        element: element formulation.
+        position: of the body frame's origin [m].
+        rotation: of the body frame, as a rotation vector [rad].
+        velocity: initial velocity of the body frame's origin [m/s].
+        angular_velocity: initial angular velocity about the body frame's origin [rad/s].
+    """
+
+    name: str
+    geometry: Recipe | Mesh
+    material: Material | Mapping[str, Material]
+    element: Literal["hex8"] = "hex8"
+    position: Vec3 = (0.0, 0.0, 0.0)
+    rotation: Vec3 = (0.0, 0.0, 0.0)
+    velocity: Vec3 = (0.0, 0.0, 0.0)
+    angular_velocity: Vec3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.element != "hex8":
+            raise bad_value(f"Body {self.name}.element", self.element, "the element known here is hex8")
+        _finite(
+            f"Body {self.name}",
+            position=self.position,
+            rotation=self.rotation,
+            velocity=self.velocity,
+            angular_velocity=self.angular_velocity,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """A material point: the mesh node of `body` that lies nearest to `at` [m] in the body's frame."""
+
+    body: str
+    at: Vec3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """The boundary faces of `body` that the node set `nodes` covers; "boundary" is the whole skin."""
+
+    body: str
+    nodes: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidPlane:
+    """An immovable, analytic half-space; the free side is where `normal` points.
+
+    Attributes:
+        point: any point of the plane [m].
+        normal: its normal [-]; need not have unit length.
+        velocity: of the plane along itself [m/s], as of a belt.
+    """
+
+    point: Vec3 = (0.0, 0.0, 0.0)
+    normal: Vec3 = (0.0, 1.0, 0.0)
+    velocity: Vec3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _finite("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
+        if math.hypot(*self.normal) == 0.0:
+            raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
+        if abs(sum(v * n for v, n in zip(self.velocity, self.normal, strict=True))) > 1e-12 * math.hypot(*self.velocity):
+            raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """Node-to-surface penalty contact with stick-slip friction.
+
+    Attributes:
+        slave: surface whose nodes are kept out of the master.
+        master: surface of another body, or a rigid plane.
+        mu: coefficient of friction [-]; 0 runs no friction at all.
+        penalty: factor f of the penalty stiffness k = f K A^2 / V [-].
+        two_way: the master's nodes are also kept out of the slave's faces.
+    """
+
+    slave: Surface
+    master: Surface | RigidPlane
+    mu: float = 0.0
+    penalty: float = 1.0
+    two_way: bool = False
+
+    def __post_init__(self) -> None:
+        _positive("Contact", penalty=self.penalty)
+        if not (math.isfinite(self.mu) and self.mu >= 0.0):
+            raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
+        if self.two_way and isinstance(self.master, RigidPlane):
+            raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
+        if isinstance(self.master, Surface) and self.master.body == self.slave.body:
+            raise bad_value("Contact.master.body", self.master.body, "name a body other than the slave's")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Revolute:
+    """A hinge ("re-joint"): pairs of coincident nodes on the hinge axis move as one.
+
+    Attributes:
+        name: unique in the scene.
+        body: first body.
+        at: a point of the hinge axis in the frame of `body` [m].
+        other: second body, or None for the ground.
+        other_at: the same point in the frame of `other` [m].
+        axis: direction of the hinge axis in the frame of both bodies [-].
+        nodes: "axis" ties every node on the axis, as a pin does; "ends" the two outermost pairs, as the paper does.
+    """
+
+    name: str
+    body: str
+    at: Vec3
+    other: str | None = None
+    other_at: Vec3 = (0.0, 0.0, 0.0)
+    axis: Vec3 = (0.0, 0.0, 1.0)
+    nodes: Literal["axis", "ends"] = "axis"
+
+    def __post_init__(self) -> None:
+        _finite(f"Revolute {self.name}", at=self.at, other_at=self.other_at, axis=self.axis)
+        if self.nodes not in ("axis", "ends"):
+            raise bad_value(f"Revolute {self.name}.nodes", self.nodes, "choose axis or ends")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed:
+    """Nodes of a set that keep their initial velocity along some axes: no acceleration there.
+
+    Attributes:
+        body: body that owns the set.
+        nodes: node set of its mesh.
+        axes: any of the letters x, y, z in the world frame.
+    """
+
+    body: str
+    nodes: str
+    axes: str = "xyz"
+
+    def __post_init__(self) -> None:
+        if not self.axes or set(self.axes) - set("xyz"):
+            raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prescribed:
+    """Nodes of a set whose velocity along one axis follows a table, held constant beyond its ends.
+
+    Attributes:
+        body: body that owns the set.
+        nodes: node set of its mesh.
+        axis: one of the letters x, y, z in the world frame.
+        times: [s], increasing, counted from the start of the impact phase.
+        velocities: [m/s], as many as times.
+    """
+
+    body: str
+    nodes: str
+    axis: str
+    times: tuple[float, ...]
+    velocities: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if self.axis not in ("x", "y", "z"):
+            raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
+        if len(self.times) != len(self.velocities) or not self.times:
+            raise bad_value("Prescribed.velocities", self.velocities, "give one velocity for each time")
+        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise bad_value("Prescribed.times", self.times, "list them in increasing order")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tip:
+    """The sphere of a chain's last link that will touch the target first.
+
+    Attributes:
+        body: the link that carries it.
+        centre: of the sphere in that body's frame [m].
+        radius: [m].
+    """
+
+    body: str
+    centre: Vec3
+    radius: float
+
+    def __post_init__(self) -> None:
+        _finite("Tip", centre=self.centre)
+        _positive("Tip", radius=self.radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidPhase:
+    """The large timescale: a planar chain of rigid links swings until its tip reaches the target.
+
+    The links and their hinges are read off the scene's revolute joints, from the ground outwards. Angles are
+    measured from the downward vertical, positive clockwise about z seen from +z (the paper's convention):
+    a link at angle theta points along (-sin theta, -cos theta, 0).
+
+    Attributes:
+        theta: initial angle of each link [rad].
+        theta_dot: initial angular velocity of each link [rad/s].
+        tip: the sphere whose touch ends the phase.
+        target: contact surface that it will touch.
+        inertia: "mesh" takes mass, centre and inertia from the finite-element mesh; "slender" takes uniform
+            slender rods from hinge to hinge (the paper's Eq. 3).
+        centre_target: the target's body is placed so that its frame origin lies under the tip at contact.
+        t_max: give up when nothing was touched by then [s].
+    """
+
+    theta: tuple[float, ...]
+    theta_dot: tuple[float, ...]
+    tip: Tip
+    target: Surface | RigidPlane
+    inertia: Literal["mesh", "slender"] = "mesh"
+    centre_target: bool = True
+    t_max: float = 5.0
+
+    def __post_init__(self) -> None:
+        if len(self.theta) != len(self.theta_dot) or not self.theta:
+            raise bad_value("RigidPhase.theta_dot", self.theta_dot, "give one angle and one rate for each link")
+        if self.inertia not in ("mesh", "slender"):
+            raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
+        _positive("RigidPhase", t_max=self.t_max)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactPhase:
+    """The small timescale: explicit finite elements.
+
+    Attributes:
+        duration: simulated time [s].
+        output_interval: time between rows of the history [s].
+        time_step_scale: share of the stable time step that is used [-], in (0, 1].
+        energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-].
+    """
+
+    duration: float
+    output_interval: float = 1e-6
+    time_step_scale: float = 0.9
+    energy_tolerance: float = 0.01
+
+    def __post_init__(self) -> None:
+        _positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
+        _positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
+        if self.output_interval > self.duration:
+            raise bad_value("ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}")
+        if not 0.0 < self.time_step_scale <= 1.0:
+            raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """Everything that a run needs to know.
+
+    Attributes:
+        name: of the scene.
+        bodies: at least one.
+        impact: the finite-element phase.
+        rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
+        joints, contacts, fixed, prescribed: what binds the bodies.
+        gravity: [m/s^2].
+        tip: point whose velocity the history lists as tip_vx, tip_vy.
+        target: point whose velocity the history lists as plate_vx.
+        parameters: the values that a built-in scene was made from, for the record.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    impact: ImpactPhase
+    rigid: RigidPhase | None = None
+    joints: tuple[Revolute, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    fixed: tuple[Fixed, ...] = ()
+    prescribed: tuple[Prescribed, ...] = ()
+    gravity: Vec3 = (0.0, 0.0, 0.0)
+    tip: Point | None = None
+    target: Point | None = None
+    parameters: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        if not names:
+            raise bad_value("Scene.bodies", (), "give at least one body")
+        if len(set(names)) != len(names):
+            raise bad_value("Scene.bodies", names, "give each body a name of its own")
+        _finite("Scene", gravity=self.gravity)
+        for field_name, body in self._named_bodies():
+            if body not in names:
+                raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+
+    def _named_bodies(self) -> list[tuple[str, str]]:
+        named = [("Fixed.body", item.body) for item in self.fixed]
+        named += [("Prescribed.body", item.body) for item in self.prescribed]
+        named += [(f"Revolute {item.name}.body", item.body) for item in self.joints]
+        named += [(f"Revolute {item.name}.other", item.other) for item in self.joints if item.other is not None]
+        named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
+        named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
+        named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
+        if self.rigid:
+            named.append(("RigidPhase.tip.body", self.rigid.tip.body))
+            if isinstance(self.rigid.target, Surface):
+                named.append(("RigidPhase.target.body", self.rigid.target.body))
+        return named
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return next(body for body in self.bodies if body.name == name)

@@ -1,0 +1,219 @@
+"""Owns the model file (.mca): a scene with the meshes of its bodies, made where gmsh is and run where the GPU is.
+
+It is an npz archive: the entry `header` is JSON, every other entry an array that the header refers to. The scene is
+written as nested objects whose `$type` names a class of `warp_mca.scene` or `warp_mca.geometry`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warp_mca.geometry
+import warp_mca.scene
+from warp_mca.errors import bad_value
+from warp_mca.geometry import Mesh
+from warp_mca.registry import load_source
+from warp_mca.scene import Scene
+
+SUFFIX = ".mca"
+FORMAT = "warp_mca model 1"
+
+# What reading a file that is no model file can raise, from the archive down to the classes' own checks.
+_DAMAGE = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile, zlib.error)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The built-in scene that a model was built from.
+
+    Attributes:
+        scene: its name.
+        preset: the preset chosen, or None.
+        parameters: every parameter's value.
+    """
+
+    scene: str
+    preset: str | None = None
+    parameters: Mapping[str, object] = field(default_factory=dict)
+
+
+class StoredModel(NamedTuple):
+    """What a model file holds: the scene, a mesh for each body by its name, and where the scene came from if known."""
+
+    scene: Scene
+    meshes: dict[str, Mesh]
+    origin: Origin | None
+
+
+def check_path(path: str | os.PathLike[str]) -> Path:
+    """The path, when a model file can be written there.
+
+    Raises:
+        RequestError: the suffix is not .mca, or the folder does not exist or cannot be written to.
+    """
+    checked = Path(path)
+    if checked.suffix != SUFFIX:
+        raise bad_value("output", str(path), f"give the model file the suffix {SUFFIX}")
+    if checked.is_dir() or not (checked.parent.is_dir() and os.access(checked.parent, os.W_OK)):
+        raise bad_value("output", str(path), "name a file in a folder that exists and can be written to")
+    return checked
+
+
+def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh], origin: Origin | None = None) -> None:
+    """Write a model file, whole or not at all; an older one is replaced.
+
+    Args:
+        path: with suffix .mca.
+        scene: to store. A geometry that is no recipe of warp_mca's own is stored as the mesh it made.
+        meshes: of every body, by its name.
+        origin: the built-in scene it came from, so that parameters can be changed later.
+
+    Raises:
+        RequestError: as in `check_path`.
+    """
+    target = check_path(path)
+    arrays: list[NDArray] = []
+    known = _vocabulary()
+    bodies = tuple(
+        body if type(body.geometry).__name__ in known else dataclasses.replace(body, geometry=meshes[body.name])
+        for body in scene.bodies
+    )
+    content = {
+        "format": FORMAT,
+        "scene": _encoded(dataclasses.replace(scene, bodies=bodies), arrays),
+        "meshes": {name: _encoded(mesh, arrays) for name, mesh in meshes.items()},
+        "origin": dataclasses.asdict(origin) if origin else None,
+    }
+    entries: dict[str, Any] = {f"array{i}": array for i, array in enumerate(arrays)}
+    entries["header"] = np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
+    _write_atomically(target, lambda file: np.savez_compressed(file, **entries))
+
+
+def load(path: str | os.PathLike[str]) -> StoredModel:
+    """Read a model file; needs neither gmsh nor meshio.
+
+    Raises:
+        RequestError: there is no such file, or it is no model file of this version.
+    """
+    if not Path(path).is_file():
+        raise bad_value("scene", str(path), "there is no such file")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            content = json.loads(archive["header"].tobytes())
+            if content["format"] != FORMAT:
+                raise ValueError(content["format"])
+            arrays = {name: archive[name] for name in archive.files}
+        scene = _decoded(content["scene"], arrays)
+        meshes = {name: _decoded(mesh, arrays) for name, mesh in content["meshes"].items()}
+        origin = Origin(**content["origin"]) if content["origin"] else None
+        if not isinstance(scene, Scene) or set(meshes) != {body.name for body in scene.bodies}:
+            raise ValueError("scene")
+    except _DAMAGE as error:
+        remedy = "it is damaged or of another version; make it again with warp-mca build"
+        raise bad_value("model file", str(path), remedy) from error
+    return StoredModel(scene, meshes, origin)
+
+
+def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel:
+    """The model with some parameters of its built-in scene changed, on the meshes it has.
+
+    Args:
+        stored: a model file's contents.
+        overrides: values, or their text, by parameter name.
+
+    Raises:
+        RequestError: the scene was not built in, a value is not allowed, or it takes another mesh.
+    """
+    if not overrides:
+        return stored
+    names = ", ".join(overrides)
+    if stored.origin is None:
+        raise bad_value("--set", names, "only models of built-in scenes can be changed; set it when building the model")
+    source = load_source(stored.origin.scene)
+    values = source.resolve(None, {**stored.origin.parameters, **overrides})
+    scene = source.build(values)
+    before = {body.name: body.geometry for body in stored.scene.bodies}
+    after = {body.name: body.geometry for body in scene.bodies}
+    differing = [name for name in after if name not in before or not _same(before[name], after[name])]
+    if differing or len(before) != len(after):
+        bodies = f" of {', '.join(differing)}" if differing else ""
+        raise bad_value("--set", names, f"it changes the mesh{bodies}; build the model again with it")
+    return StoredModel(scene, stored.meshes, dataclasses.replace(stored.origin, parameters=values))
+
+
+def _vocabulary() -> dict[str, type]:
+    """The classes that a file may name: the dataclasses of the scene and of the geometry recipes."""
+    members = {**vars(warp_mca.geometry), **vars(warp_mca.scene)}
+    return {name: item for name, item in members.items() if isinstance(item, type) and dataclasses.is_dataclass(item)}
+
+
+def _encoded(value: object, arrays: list[NDArray]) -> object:
+    """`value` as JSON; arrays are put into `arrays`, the same one once, and referred to by their place there."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        members = {f.name: _encoded(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
+        return {"$type": type(value).__name__, **members}
+    if isinstance(value, np.ndarray):
+        place = next((i for i, array in enumerate(arrays) if array is value), len(arrays))
+        if place == len(arrays):
+            arrays.append(value)
+        return {"$array": place}
+    if isinstance(value, Mapping):
+        return {str(key): _encoded(item, arrays) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_encoded(item, arrays) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _decoded(value: object, arrays: Mapping[str, NDArray]) -> Any:
+    """The inverse of `_encoded`; every sequence becomes a tuple."""
+    if isinstance(value, list):
+        return tuple(_decoded(item, arrays) for item in value)
+    if not isinstance(value, dict):
+        return value
+    if "$array" in value:
+        return arrays[f"array{value['$array']}"]
+    members = {key: _decoded(item, arrays) for key, item in value.items() if key != "$type"}
+    return _vocabulary()[value["$type"]](**members) if "$type" in value else members
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two geometries are equal; meshes have no truth value of their own."""
+    if isinstance(one, Mesh) or isinstance(other, Mesh):
+        if not (isinstance(one, Mesh) and isinstance(other, Mesh)):
+            return False
+        arrays: list[NDArray] = []
+        others: list[NDArray] = []
+        alike = _encoded(one, arrays) == _encoded(other, others)
+        return alike and all(map(np.array_equal, arrays, others))
+    return one == other
+
+
+def _write_atomically(target: Path, write: Callable[[IO[bytes]], None]) -> None:
+    descriptor, name = tempfile.mkstemp(prefix=f".{target.name}-", dir=target.parent)
+    temporary = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            write(file)
+        temporary.chmod(0o666 & ~_umask())  # mkstemp lets only the owner read
+        temporary.replace(target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

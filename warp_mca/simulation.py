@@ -1,0 +1,238 @@
+"""Owns the only time loop: mesh, swing, hand over, step, record, guard, report."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.errors import GuardError, bad_value
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.handoff import HandOff, hand_off
+from warp_mca.ledger import Ledger
+from warp_mca.model import Model, build_model, nodal_masses
+from warp_mca.results import Result, RunFacts, check_output, save, summarise
+from warp_mca.scene import Scene
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+# Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
+SPEED_RESERVE = 4.0
+COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How an output interval is divided.
+
+    Attributes:
+        dt: time step [s].
+        per_search: steps between two searches for contact.
+        searches: searches in an output interval.
+        intervals: output intervals in the run.
+    """
+
+    dt: float
+    per_search: int
+    searches: int
+    intervals: int
+
+    @property
+    def count(self) -> int:
+        """Steps of the whole run."""
+        return self.per_search * self.searches * self.intervals
+
+
+def mesh(scene: Scene) -> dict[str, Mesh]:
+    """The mesh of every body, checked.
+
+    Raises:
+        RequestError: an element is inverted, or a recipe or file cannot be turned into a mesh.
+    """
+    from warp_mca.geometry.quality import check
+
+    meshes = {}
+    made: dict[int, Mesh] = {}
+    for body in scene.bodies:
+        key = id(body.geometry)
+        if key not in made:
+            made[key] = body.geometry if isinstance(body.geometry, Mesh) else body.geometry.build()
+            check(made[key], body.name)
+        meshes[body.name] = made[key]
+    return meshes
+
+
+def divide(scene: Scene, model: Model, duration: float) -> Steps:
+    """Choose the time step so that whole steps fill each output interval, and how often to search for contact.
+
+    Raises:
+        RequestError: motion in one step would be lost in the rounding of positions.
+    """
+    impact = scene.impact
+    intervals = max(1, round(duration / impact.output_interval))
+    interval = duration / intervals
+    stable = impact.time_step_scale * model.stable.dt
+    speed = float(np.linalg.norm(model.V, axis=1).max())
+    spacing = float(np.spacing(np.abs(model.X).max()))
+    if 0.0 < speed * stable < 4.0 * spacing:
+        raise bad_value(
+            "Body.position",
+            float(np.abs(model.X).max()),
+            f"this far from the origin, positions are rounded to {spacing:.2g} m and a step's motion of "
+            f"{speed * stable:.2g} m is lost; move the scene closer to the origin",
+        )
+    margins = [item.margin for item in model.passes if item.plane is None]
+    searches = math.ceil(SPEED_RESERVE * speed * interval / (0.5 * min(margins))) if margins else 1
+    searches = max(1, searches)
+    per_search = math.ceil(interval / searches / stable)
+    return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
+
+
+@dataclass
+class _Clock:
+    """Wall-clock seconds by stage."""
+
+    wall: dict[str, float] = field(default_factory=lambda: dict.fromkeys(("rigid", "mesh", "compile", "fe", "output"), 0.0))
+    last: float = field(default_factory=time.perf_counter)
+
+    def lap(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.wall[stage] += now - self.last
+        self.last = now
+
+
+def run(
+    scene: Scene,
+    *,
+    device: str = "cpu",
+    precision: str = "mixed",
+    duration: float | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    meshes: Mapping[str, Mesh] | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
+
+    Args:
+        scene: what to run.
+        device: "cpu" or a CUDA device as "cuda:0".
+        precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
+        duration: of the impact phase [s]; the scene's own if None.
+        out: folder for summary.json, history.csv and forces.png; nothing is written if None.
+        force: replace results that `out` holds already.
+        meshes: finished meshes by body, to save making them again.
+        progress: called with a stage and the share of it that is done.
+
+    Returns:
+        The result, with histories as float64 arrays.
+
+    Raises:
+        RequestError: the request cannot be carried out; nothing was written.
+        GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
+    """
+    from warp_mca.solver import Solver, check_device
+
+    tell = progress or (lambda stage, done: None)
+    span = scene.impact.duration if duration is None else duration
+    if not (math.isfinite(span) and span > 0.0):
+        raise bad_value("duration", span, "give a finite time above 0 s")
+    check_device(device)
+    if out is not None:
+        check_output(out, force=force)
+    clock = _Clock()
+    tell("mesh", 0.0)
+    meshes = mesh(scene) if meshes is None else meshes
+    clock.lap("mesh")
+    tell("rigid", 0.0)
+    start = hand_off(scene, meshes, nodal_masses(scene, meshes))
+    clock.lap("rigid")
+    model = build_model(scene, meshes, start.positions, start.velocities)
+    steps = divide(scene, model, span)
+    clock.lap("mesh")
+    tell("compile", 0.0)
+    solver = Solver(model, device=device, precision=precision, dt=steps.dt)
+    solver.compile()
+    clock.lap("compile")
+    ledger = Ledger(model, steps.dt, steps.dt * steps.per_search * steps.searches, scene.impact.energy_tolerance)
+    solver.start()
+    for interval in range(steps.intervals):
+        solver.search()
+        solver.record_and_step(steps.per_search)
+        for _ in range(steps.searches - 1):
+            solver.search()
+            solver.step(steps.per_search)
+        if ledger.full(interval + 1):
+            ledger.read(solver)
+            tell("impact", (interval + 1) / steps.intervals)
+    solver.search()
+    solver.record_and_step(1)
+    ledger.read(solver)
+    clock.lap("fe")
+    tell("impact", 1.0)
+    facts = _facts(scene, model, start, steps, ledger, solver, clock)
+    history = ledger.history()
+    result = Result(summarise(history, facts), history, None, tuple(_warnings(scene, start, ledger)))
+    if out is not None:
+        result = save(result, out, force=force)
+    return result
+
+
+def _facts(scene: Scene, model: Model, start: HandOff, steps: Steps, ledger: Ledger, solver, clock: _Clock) -> RunFacts:
+    more = {
+        "energy_drift_rigid": start.energy_drift,
+        "handoff_mismatch": {
+            "momentum": start.momentum_mismatch,
+            "angular_momentum": start.angular_momentum_mismatch,
+            "kinetic_energy": start.energy_mismatch,
+        },
+        "max_penetration": solver.max_penetration(),
+        "max_strain": ledger.max_strain,
+        "stable_dt": model.stable.dt,
+        "joint_impulse": solver.joint_impulses(),
+    }
+    return RunFacts(
+        scene=scene.name,
+        n_elements=model.element_count,
+        n_nodes=model.node_count,
+        dt=steps.dt,
+        n_steps=steps.count,
+        simulated_time=steps.dt * steps.count,
+        wall=clock.wall,
+        device=solver.device_name(),
+        precision=solver.precision,
+        element="hex8",
+        energy_error=ledger.energy_error,
+        energy=ledger.energy(),
+        max_plastic_strain=solver.max_plastic_strain(),
+        parameters=scene.parameters,
+        t_contact=start.t_contact if scene.rigid else None,
+        v_n=start.v_n,
+        v_t=start.v_t,
+        theta=tuple(float(x) for x in start.theta),
+        theta_dot=tuple(float(x) for x in start.theta_dot),
+        more=more,
+    )
+
+
+def _warnings(scene: Scene, start: HandOff, ledger: Ledger) -> list[str]:
+    found = []
+    if ledger.max_strain > COROTATIONAL_STRAIN:
+        found.append(
+            f"strain reached {ledger.max_strain:.2f}; the co-rotational element takes strains as small, "
+            f"expect stresses off by about as much where it exceeds {COROTATIONAL_STRAIN}"
+        )
+    if scene.rigid and scene.rigid.inertia == "slender":
+        found.append(
+            f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic energy "
+            f"by {start.energy_mismatch:.1%} at hand-off; rigid_inertia=mesh keeps both"
+        )
+    return found
+
+

@@ -1,0 +1,337 @@
+"""Owns one time step: device arrays and the ordered stages that advance them.
+
+| stage | kernel | runs |
+|---|---|---|
+| 1 element forces | `hex8_force` | every step, once for plastic and once for elastic elements |
+| 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
+| 3 record at t(n) | `hex8_energy`, sums | first step of each output interval |
+| 4 gather and integrate | `integrate` | every step |
+| 5 re-joint | `rejoin` | every step, in scenes with joints |
+| 6 prescribed motion | `prescribe` | every step, in scenes with driven axes |
+| 7 record of motion | `sum_nodes`, `record_points` | first step of each output interval |
+
+Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
+between two searches raise a flag, which stops the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.errors import bad_value
+from warp_mca.kernels import constraint, contact, hex8, ledger, node, search
+from warp_mca.kernels.scalars import scalars
+from warp_mca.model import Block, Model
+from warp_mca.surfaces import LIST_LENGTH, ContactPass
+
+SUM_WIDTH = 256  # threads that share a sum, in a fixed order
+ROWS = 32  # records kept on the device before the host reads them
+# Columns of a record, then eight for each contact pass (`contact.sum_springs`).
+KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, DRIVE_WORK, PASS = range(8)
+PASS_COLUMNS = 8
+
+
+def check_device(name: str) -> str:
+    """The name of a device that this machine has.
+
+    Raises:
+        RequestError: there is no such device.
+    """
+    wp.init()
+    known = [str(device) for device in wp.get_devices()]
+    if name not in known:
+        raise bad_value("device", name, f"this machine has {', '.join(known)}")
+    return name
+
+
+class ContactStage:
+    """Device side of one contact pass."""
+
+    def __init__(self, item: ContactPass, model: Model, column: int) -> None:
+        self.item = item
+        self.column = column
+        count = len(item.slave)
+        self.slave = wp.array(item.slave, dtype=wp.int32)
+        self.stiffness = wp.array(item.stiffness, dtype=wp.float64)
+        self.spring = contact.Spring()
+        for name in ("tangential", "force", "impulse"):
+            setattr(self.spring, name, wp.zeros(count, dtype=wp.vec3d))
+        for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth"):
+            setattr(self.spring, name, wp.zeros(count, dtype=wp.float64))
+        self.spring.face = wp.full(count, -1, dtype=wp.int32)
+        self.spring.weight = wp.zeros(count, dtype=wp.vec4d)
+        friction = item.mu > 0.0
+        if item.plane is not None:
+            self.kernel = contact.plane_kernel(friction)
+            return
+        self.kernel = contact.surface_kernel(friction)
+        faces = len(item.face)
+        self.face = wp.array(item.face, dtype=wp.int32)
+        self.master = wp.array(item.master, dtype=wp.int32)
+        self.face_offset = wp.array(item.face_offset, dtype=wp.int32)
+        self.face_of_node = wp.array(item.face_of_node, dtype=wp.int32)
+        self.count = wp.zeros(count, dtype=wp.int32)
+        self.candidate = wp.zeros((count, LIST_LENGTH), dtype=wp.int32)
+        self.face_count = wp.zeros(faces, dtype=wp.int32)
+        self.face_slave = wp.zeros((faces, LIST_LENGTH), dtype=wp.int32)
+        self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
+        self.lower = wp.zeros(faces, dtype=wp.vec3f)
+        self.upper = wp.zeros(faces, dtype=wp.vec3f)
+        self.origin = wp.vec3d(*model.X[item.master].mean(axis=0))
+        self.bvh: Any = None
+
+    def search(self, X: wp.array, u: wp.array, flag: wp.array) -> None:
+        """Broad phase: list what each slave may touch until the next search."""
+        if self.item.plane is not None:
+            return
+        margin = self.item.margin
+        outputs = [self.lower, self.upper, self.face_count]
+        wp.launch(search.face_bounds, len(self.item.face), inputs=[X, u, self.face, self.origin, margin], outputs=outputs)
+        if self.bvh is None:
+            self.bvh = wp.Bvh(self.lower, self.upper)
+        else:
+            self.bvh.refit()
+        wp.launch(
+            search.find_candidates,
+            len(self.item.slave),
+            inputs=[self.bvh.id, X, u, self.slave, self.origin],
+            outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
+        )
+        wp.launch(search.sort_lists, len(self.item.face), inputs=[self.face_count], outputs=[self.face_slave])
+        wp.launch(search.mark_masters, len(self.item.master), inputs=[u, self.master], outputs=[self.u_search])
+
+    def touch(self, X: wp.array, u: wp.array, v: wp.array, dt: float, force: wp.array, flag: wp.array) -> None:
+        """Contact forces of this pass, added to `force`."""
+        item = self.item
+        if item.plane is not None:
+            normal = np.asarray(item.plane.normal, dtype=float)
+            frame = [wp.vec3d(*item.plane.point), wp.vec3d(*(normal / np.linalg.norm(normal))), wp.vec3d(*item.plane.velocity)]
+            inputs = [X, u, v, self.slave, self.stiffness, *frame, item.mu, dt, self.spring]
+            wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force])
+            return
+        inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
+        inputs += [item.mu, item.margin, dt, self.spring]
+        wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force, flag])
+        inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
+        inputs += [self.face_count, self.face_slave, item.margin, self.spring]
+        wp.launch(contact.react, len(item.master), inputs=inputs, outputs=[force, flag])
+
+
+class ElementStage:
+    """Device side of one block of elements; an elastic block allocates no history."""
+
+    def __init__(self, block: Block, precision: str) -> None:
+        real = scalars(precision).real
+        self.block = block
+        self.conn = wp.array(block.conn, dtype=wp.int32)
+        self.material = wp.array(block.material, dtype=wp.int32)
+        count = block.conn.shape[1] if block.plastic else 0
+        self.yielded = wp.zeros(count, dtype=wp.int32)
+        self.history = wp.zeros((8 * hex8.j2.HISTORY_SIZE, count), dtype=real)
+        self.force_kernel = hex8.force_kernel(precision, block.plastic)
+        self.energy_kernel = hex8.energy_kernel(precision, block.plastic)
+
+
+class Solver:
+    """Advances a model on one device.
+
+    Attributes:
+        u: displacements since hand-off [m], shape (node_count,), vec3d.
+        v: velocities at the last half step [m/s], shape (node_count,), vec3d.
+        dt: time step [s].
+    """
+
+    def __init__(self, model: Model, *, device: str, precision: str, dt: float) -> None:
+        if precision not in ("mixed", "float64"):
+            raise bad_value("precision", precision, "choose mixed or float64")
+        self.model, self.device, self.precision, self.dt = model, check_device(device), precision, dt
+        with wp.ScopedDevice(self.device):
+            self._allocate()
+        self.graphs: dict[str, Any] = {}
+
+    def _allocate(self) -> None:
+        model = self.model
+        t = scalars(self.precision)
+        self.X = wp.array(model.X, dtype=wp.vec3d)
+        self.u = wp.zeros(model.node_count, dtype=wp.vec3d)
+        self.v = wp.array(model.V, dtype=wp.vec3d)
+        self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
+        self.mass = wp.array(model.mass, dtype=wp.float64)
+        self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
+        self.law = wp.array(model.law, dtype=t.real)
+        self.force = wp.zeros(8 * model.element_count, dtype=t.vec3)
+        self.offset = wp.array(model.gather_offset, dtype=wp.int32)
+        self.slot = wp.array(model.gather_slot, dtype=wp.int32)
+        self.fixed_axes = wp.array(model.fixed_axes if model.fixed_axes.any() else model.fixed_axes[:0], dtype=wp.int32)
+        self.elements = [ElementStage(block, self.precision) for block in model.blocks]
+        self.contacts = [ContactStage(p, model, PASS + PASS_COLUMNS * k) for k, p in enumerate(model.passes)]
+        self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
+        self.flag = wp.zeros(3, dtype=wp.int32)
+        self._allocate_constraints()
+        self.energy = wp.zeros((4, model.element_count), dtype=t.real)
+        self.row = wp.zeros(1, dtype=wp.int32)
+        columns = PASS + PASS_COLUMNS * len(self.contacts)
+        self.partial = wp.zeros((ROWS, columns, SUM_WIDTH), dtype=wp.float64)
+        self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
+        self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
+        self.integrate_kernel = node.integrate_kernel(self.precision, bool(self.contacts), bool(model.fixed_axes.any()))
+        self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
+
+    def _allocate_constraints(self) -> None:
+        model = self.model
+        self.joint_first = wp.array(model.joint_first, dtype=wp.int32)
+        self.joint_second = wp.array(model.joint_second, dtype=wp.int32)
+        self.joint_impulse = wp.zeros(len(model.joint_first), dtype=wp.vec3d)
+        self.driven = [
+            wp.array(value, dtype=wp.int32)
+            for value in (model.prescribed_node, model.prescribed_axis, model.prescribed_table, model.table_offset)
+        ]
+        self.driven += [wp.array(value, dtype=wp.float64) for value in (model.table_time, model.table_value)]
+        self.drive_work = wp.zeros(len(model.prescribed_node), dtype=wp.float64)
+        self.step_count = wp.zeros(1, dtype=wp.int32)
+
+    def _forces(self) -> None:
+        for stage in self.elements:
+            inputs = [self.X, stage.conn, stage.material, self.law, self.u, stage.block.slot]
+            outputs = [stage.yielded, stage.history, self.force]
+            wp.launch(stage.force_kernel, stage.block.conn.shape[1], inputs=inputs, outputs=outputs, block_dim=64)
+        for stage in self.contacts:
+            stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
+
+    def _integrate(self, kick: float, drift: float) -> None:
+        inputs = [self.inverse_mass, self.offset, self.slot, self.fixed_axes, self.force]
+        inputs += [wp.vec3d(*self.model.gravity), kick, drift]
+        outputs = [self.contact_force, self.u, self.v]
+        wp.launch(self.integrate_kernel, self.model.node_count, inputs=inputs, outputs=outputs, block_dim=128)
+
+    def _constrain(self) -> None:
+        if len(self.joint_first):
+            inputs = [self.mass, self.joint_first, self.joint_second]
+            outputs = [self.u, self.v, self.joint_impulse]
+            wp.launch(constraint.rejoin, len(self.joint_first), inputs=inputs, outputs=outputs)
+        if len(self.drive_work):
+            inputs = [self.mass, *self.driven, self.step_count, self.dt]
+            outputs = [self.u, self.v, self.drive_work]
+            wp.launch(constraint.prescribe, len(self.drive_work), inputs=inputs, outputs=outputs)
+            wp.launch(constraint.advance_clock, 1, outputs=[self.step_count])
+
+    def _step(self) -> None:
+        self._forces()
+        self._integrate(self.dt, self.dt)
+        self._constrain()
+
+    def _sum(self, kernel: Any, *inputs: Any) -> None:
+        wp.launch(kernel, SUM_WIDTH, inputs=list(inputs), outputs=[self.partial])
+
+    def _record_step(self) -> None:
+        """One step that also writes a record of the state at its start."""
+        self._forces()
+        for stage in self.elements:
+            inputs = [self.X, stage.conn, stage.material, self.law, stage.yielded, stage.history, self.u]
+            inputs += [stage.block.first]
+            wp.launch(stage.energy_kernel, stage.block.conn.shape[1], inputs=inputs, outputs=[self.energy], block_dim=64)
+        self._sum(self.sum_elements_kernel, self.energy, self.row, SUM_WIDTH)
+        for stage in self.contacts:
+            self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
+        wp.copy(self.v_before, self.v)
+        if len(self.drive_work):  # before the step adds what belongs to the time after the record
+            self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH)
+        self._integrate(self.dt, self.dt)
+        self._constrain()
+        gravity = wp.vec3d(*self.model.gravity)
+        self._sum(ledger.sum_nodes, self.mass, gravity, self.u, self.v_before, self.v, self.dt, self.row, SUM_WIDTH)
+        inputs = [self.point_node, self.v_before, self.v, self.row]
+        wp.launch(ledger.record_points, len(self.point_node), inputs=inputs, outputs=[self.point_velocity])
+        wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
+
+    def _launch(self, name: str, body: Callable[[], None]) -> None:
+        """Replay the graph `name`, captured from `body` at its first use."""
+        with wp.ScopedDevice(self.device):
+            if name not in self.graphs:
+                with wp.ScopedCapture() as capture:
+                    body()
+                self.graphs[name] = capture.graph
+            wp.capture_launch(self.graphs[name])
+
+    def compile(self) -> None:
+        """Load every kernel that a step needs, so that capture finds them ready."""
+        with wp.ScopedDevice(self.device):
+            for kernel in self._kernels():
+                wp.load_module(kernel.module, device=self.device)
+        self.search()
+
+    def _kernels(self) -> list[Any]:
+        kernels = [constraint.rejoin, ledger.sum_nodes, contact.react, search.face_bounds]
+        kernels += [self.integrate_kernel, self.sum_elements_kernel]
+        kernels += [kernel for stage in self.elements for kernel in (stage.force_kernel, stage.energy_kernel)]
+        return kernels + [stage.kernel for stage in self.contacts]
+
+    def search(self) -> None:
+        """Broad phase of every contact."""
+        with wp.ScopedDevice(self.device):
+            for stage in self.contacts:
+                stage.search(self.X, self.u, self.flag)
+
+    def start(self) -> None:
+        """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
+
+        Bodies are free of stress then, and none presses on another.
+        """
+        with wp.ScopedDevice(self.device):
+            self._integrate(-0.5 * self.dt, 0.0)
+
+    def record_and_step(self, count: int) -> None:
+        """Record the state, then advance `count` steps."""
+
+        def interval() -> None:
+            self._record_step()
+            for _ in range(count - 1):
+                self._step()
+
+        self._launch(f"record {count}", interval)
+
+    def step(self, count: int) -> None:
+        """Advance `count` steps."""
+
+        def steps() -> None:
+            for _ in range(count):
+                self._step()
+
+        self._launch(f"step {count}", steps)
+
+    def records(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """Records since the last call, oldest first, then the flags; waits for the device.
+
+        Returns:
+            Partial sums, shape (ROWS, columns, SUM_WIDTH), float64; point velocities [m/s], shape
+            (ROWS, point_count, 3), float64; flags, shape (3,), int32; how many of the rows are new.
+        """
+        row = int(self.row.numpy()[0])
+        written = row if row else ROWS
+        with wp.ScopedDevice(self.device):
+            self.row.zero_()
+        return self.partial.numpy(), self.point_velocity.numpy(), self.flag.numpy(), written
+
+    def max_plastic_strain(self) -> float:
+        """Greatest equivalent plastic strain of any integration point [-]."""
+        size = hex8.j2.HISTORY_SIZE
+        values = [stage.history.numpy()[size - 1 :: size] for stage in self.elements if stage.block.plastic]
+        return max((float(value.max()) for value in values), default=0.0)
+
+    def max_penetration(self) -> float:
+        """Greatest depth that a slave node reached below its master [m]."""
+        return max((float(stage.spring.depth.numpy().max()) for stage in self.contacts), default=0.0)
+
+    def joint_impulses(self) -> dict[str, list[float]]:
+        """Impulse that each joint gave to its first body [N s], by name."""
+        impulse = self.joint_impulse.numpy()
+        return {h.name: impulse[h.start : h.end].sum(axis=0).tolist() for h in self.model.hinges}
+
+    def device_name(self) -> str:
+        """The device, with what it is."""
+        device = wp.get_device(self.device)
+        return f"{self.device} ({device.name})"

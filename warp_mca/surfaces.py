@@ -1,0 +1,154 @@
+"""Owns the host side of contact: surfaces, penalty stiffness and what the springs add to the stable step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.scene import Contact, RigidPlane, Surface
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+SEARCH_MARGIN = 0.25  # of the smallest face: how far a slave looks for faces beyond those that it touches
+LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face; a full list stops the run
+
+
+@dataclass(frozen=True)
+class Faces:
+    """A surface in the model's numbering.
+
+    Attributes:
+        node: corners of each face, counter-clockwise from outside, shape (face_count, 4), int32.
+        element: that each face bounds, shape (face_count,), int32.
+        area: [m^2], shape (face_count,), float64.
+        stiffness: K A^2 / V of each face [N/m], shape (face_count,), float64.
+    """
+
+    node: Index
+    element: Index
+    area: Array
+    stiffness: Array
+
+    @property
+    def nodes(self) -> Index:
+        """The surface's nodes, sorted, shape (node_count,), int32."""
+        return np.unique(self.node).astype(np.int32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactPass:
+    """Slave nodes against a plane or against faces.
+
+    Attributes:
+        slave: node indices, shape (slave_count,), int32.
+        stiffness: penalty stiffness of each [N/m], shape (slave_count,), float64.
+        mu: coefficient of friction [-].
+        sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact.
+        contact: which of the scene's contacts this belongs to.
+        plane: the rigid plane, or None.
+        face: master faces, shape (face_count, 4), int32.
+        master: their nodes, shape (master_count,), int32.
+        face_offset, face_of_node: faces around each master node, compressed rows, int32.
+        margin: that the search looks ahead [m].
+    """
+
+    slave: Index
+    stiffness: Array
+    mu: float
+    sign: float
+    contact: int
+    plane: RigidPlane | None = None
+    face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32))
+    master: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
+    face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    margin: float = 0.0
+
+
+def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
+    """Areas [m^2], shape (face_count,), and area-weighted normals [m^2], shape (face_count, 3), of bilinear faces."""
+    a, b, c, d = (X[face[:, k]] for k in range(4))
+    normal = 0.5 * np.cross(c - a, d - b)
+    return np.linalg.norm(normal, axis=1), normal
+
+
+def make_faces(X: Array, face: Index, element: Index, K: Array, volume: Array) -> Faces:
+    """Faces with the penalty stiffness K A^2 / V of Hallquist (LS-DYNA theory manual, contact, Eq. 26.6).
+
+    Args:
+        X: positions [m], shape (node_count, 3). face: shape (face_count, 4). element: of each face.
+        K: bulk modulus [Pa] and volume: [m^3] of every element, shape (element_count,).
+    """
+    area, _ = face_geometry(X, face)
+    return Faces(face, element, area, K[element] * area**2 / volume[element])
+
+
+def _node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
+    """Mean over the faces around each node of a value given on faces."""
+    total = np.zeros(nodes[-1] + 1)
+    count = np.zeros(nodes[-1] + 1)
+    for corner in range(4):
+        np.add.at(total, faces.node[:, corner], value)
+        np.add.at(count, faces.node[:, corner], 1.0)
+    return total[nodes] / count[nodes]
+
+
+def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sign: float) -> ContactPass:
+    nodes, masters = slave.nodes, master.nodes
+    softest = float(master.stiffness.min())
+    corner = master.node.ravel()
+    order = np.argsort(corner, kind="stable")
+    return ContactPass(
+        slave=nodes,
+        stiffness=contact.penalty * np.minimum(_node_mean(nodes, slave, slave.stiffness), softest),
+        mu=contact.mu,
+        sign=sign,
+        contact=index,
+        face=master.node,
+        master=masters,
+        face_offset=np.searchsorted(corner[order], np.append(masters, masters[-1] + 1)).astype(np.int32),
+        face_of_node=(order // 4).astype(np.int32),
+        margin=SEARCH_MARGIN * float(np.sqrt(master.area.min())),
+    )
+
+
+def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | None) -> list[ContactPass]:
+    """One pass, or two when the contact is two-way: then each carries half the stiffness.
+
+    The stiffness of a pair is the smaller of the slave node's own and the master's softest face: it stays constant
+    while a node slides from face to face, so that the springs neither lose nor make energy.
+    """
+    if master is None:
+        assert isinstance(contact.master, RigidPlane)
+        nodes = slave.nodes
+        stiffness = contact.penalty * _node_mean(nodes, slave, slave.stiffness)
+        return [
+            ContactPass(slave=nodes, stiffness=stiffness, mu=contact.mu, sign=1.0, contact=index, plane=contact.master)
+        ]
+    passes = [_surface_pass(contact, index, slave, master, 1.0)]
+    if contact.two_way:
+        passes.append(_surface_pass(contact, index, master, slave, -1.0))
+    return passes
+
+
+def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, mass: Array) -> tuple[Index, Array]:
+    """What a pass can add to the largest eigenvalue at its nodes [1/s^2]: row sums of M^-1 K of its springs.
+
+    A slave's row sums to k (1 + sum N) / m = 2 k / m, or k / m against a plane; a master node's to as much, times the
+    number of slave nodes that share its area.
+    """
+    if master is None:
+        return item.slave, item.stiffness / mass[item.slave]
+    k = float(item.stiffness.max())
+    slave_area = 4.0 * np.median(_node_mean(item.slave, slave, slave.area / 4.0))
+    shared = np.maximum(1.0, 4.0 * _node_mean(item.master, master, master.area / 4.0) / slave_area)
+    nodes = np.concatenate([item.slave, item.master])
+    return nodes, np.concatenate([2.0 * item.stiffness / mass[item.slave], 2.0 * k * shared / mass[item.master]])
+
+
+def is_plane(surface: Surface | RigidPlane) -> bool:
+    """Whether the master is analytic."""
+    return isinstance(surface, RigidPlane)
