@@ -11,7 +11,10 @@ def shape(xi: wp.float64, eta: wp.float64) -> wp.vec4d:
     one = wp.float64(1.0)
     q = wp.float64(0.25)
     return wp.vec4d(
-        q * (one - xi) * (one - eta), q * (one + xi) * (one - eta), q * (one + xi) * (one + eta), q * (one - xi) * (one + eta)
+        q * (one - xi) * (one - eta),
+        q * (one + xi) * (one - eta),
+        q * (one + xi) * (one + eta),
+        q * (one - xi) * (one + eta),
     )
 
 

@@ -25,7 +25,9 @@ def build(
     mu: Annotated[float, Param("coefficient of friction", low=0.0, high=10.0)] = 0.0,
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 1.0,
     duration: Annotated[float, Param("simulated time", unit="s", low=0.0, exclusive=True)] = 1.2e-4,
-    output_interval: Annotated[float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)] = 1e-6,
+    output_interval: Annotated[
+        float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)
+    ] = 1e-6,
     section: Annotated[int, Param("cells along each side of the core, even", low=2)] = 4,
     ring: Annotated[int, Param("cells from the core to the surface", low=1)] = 2,
     axial: Annotated[int, Param("cells along the rod", low=1)] = 80,
@@ -35,9 +37,7 @@ def build(
     wall = mca.RigidPlane(point=(length, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
     return mca.Scene(
         name="single_rod",
-        bodies=(
-            mca.Body(name="rod", geometry=rod, material=mca.Elastic(E=E, nu=nu, rho=rho), velocity=(v, 0.0, 0.0)),
-        ),
+        bodies=(mca.Body(name="rod", geometry=rod, material=mca.Elastic(E=E, nu=nu, rho=rho), velocity=(v, 0.0, 0.0)),),
         contacts=(mca.Contact(slave=mca.Surface(body="rod", nodes="end"), master=wall, mu=mu, penalty=penalty),),
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval),
         tip=mca.Point(body="rod", at=(0.5 * length, 0.0, 0.0)),
@@ -54,5 +54,7 @@ def check(result: mca.Result) -> list[str]:
     if abs(plateau / force - 1.0) > 0.02:
         found.append(f"mean force {plateau:.4g} N differs from A rho c v = {force:.4g} N by over 2 %")
     if abs(result.summary["contact_duration"] / (2.0 * p["length"] / c) - 1.0) > 0.1:
-        found.append(f"contact lasted {result.summary['contact_duration']:.4g} s, not 2 L / c = {2 * p['length'] / c:.4g} s")
+        found.append(
+            f"contact lasted {result.summary['contact_duration']:.4g} s, not 2 L / c = {2 * p['length'] / c:.4g} s"
+        )
     return found

@@ -15,12 +15,30 @@ from warp_mca import Param
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
     "standard": {
-        "section": 10, "ring": 5, "axial_OA": 30, "axial_AB": 36, "focus_size": 0.35e-3, "focus_layers": 7,
-        "plate_core_x": 18, "plate_core_z": 10, "plate_core_depth": 6, "plate_layers": 12, "plate_extension": 16,
+        "section": 12,
+        "ring": 4,
+        "axial_OA": 41,
+        "axial_AB": 38,
+        "focus_size": 0.33e-3,
+        "focus_layers": 7,
+        "plate_core_x": 18,
+        "plate_core_z": 10,
+        "plate_core_depth": 5,
+        "plate_layers": 12,
+        "plate_extension": 20,
     },
     "paper": {
-        "section": 18, "ring": 7, "axial_OA": 55, "axial_AB": 62, "focus_size": 0.2e-3, "focus_layers": 12,
-        "plate_core_x": 28, "plate_core_z": 18, "plate_core_depth": 10, "plate_layers": 18, "plate_extension": 24,
+        "section": 20,
+        "ring": 6,
+        "axial_OA": 61,
+        "axial_AB": 58,
+        "focus_size": 0.2e-3,
+        "focus_layers": 10,
+        "plate_core_x": 28,
+        "plate_core_z": 20,
+        "plate_core_depth": 8,
+        "plate_layers": 15,
+        "plate_extension": 28,
     },
 }
 
@@ -30,7 +48,10 @@ def _approach_angle(length: float, radius: float, H: float, gravity: float, thet
     from warp_mca.chain import Chain, slender_link
     from warp_mca.rigid import swing
 
-    links = (slender_link("OA", (length, 0.0), mass=1.0, hinge_out=(length, 0.0)), slender_link("AB", (length, 0.0), mass=1.0))
+    links = (
+        slender_link("OA", (length, 0.0), mass=1.0, hinge_out=(length, 0.0)),
+        slender_link("AB", (length, 0.0), mass=1.0),
+    )
     chain = Chain(links=links, origin=(0.0, 0.0), gravity=(0.0, -gravity))
     centre = length - radius
 
@@ -46,8 +67,12 @@ def build(
     v_plate: Annotated[float, Param("initial velocity of the plate along x", unit="m/s", low=-50.0, high=50.0)] = 0.0,
     H: Annotated[float, Param("height of hinge O above the plate", unit="m", low=0.0, exclusive=True)] = 0.37,
     gravity: Annotated[float, Param("acceleration of gravity", unit="m/s^2", low=0.0, exclusive=True)] = 9.8,
-    theta_OA: Annotated[float, Param("initial angle of OA from the downward vertical", unit="deg", low=-180.0, high=180.0)] = 90.0,
-    theta_AB: Annotated[float, Param("initial angle of AB from the downward vertical", unit="deg", low=-180.0, high=180.0)] = 90.0,
+    theta_OA: Annotated[
+        float, Param("initial angle of OA from the downward vertical", unit="deg", low=-180.0, high=180.0)
+    ] = 90.0,
+    theta_AB: Annotated[
+        float, Param("initial angle of AB from the downward vertical", unit="deg", low=-180.0, high=180.0)
+    ] = 90.0,
     length: Annotated[float, Param("length of each rod", unit="m", low=0.0, exclusive=True)] = 0.21,
     radius: Annotated[float, Param("radius of rods and tip", unit="m", low=0.0, exclusive=True)] = 0.013,
     plate_length: Annotated[float, Param("length of the plate, along x", unit="m", low=0.0, exclusive=True)] = 1.2,
@@ -55,8 +80,12 @@ def build(
     plate_height: Annotated[float, Param("thickness of the plate", unit="m", low=0.0, exclusive=True)] = 0.05,
     rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 2700.0,
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.27,
-    E_tip: Annotated[float, Param("Young's modulus of the hemispherical tip", unit="Pa", low=0.0, exclusive=True)] = 70e9,
-    E_body: Annotated[float, Param("Young's modulus of the rods' cylinders", unit="Pa", low=0.0, exclusive=True)] = 70e9,
+    E_tip: Annotated[
+        float, Param("Young's modulus of the hemispherical tip", unit="Pa", low=0.0, exclusive=True)
+    ] = 70e9,
+    E_body: Annotated[
+        float, Param("Young's modulus of the rods' cylinders", unit="Pa", low=0.0, exclusive=True)
+    ] = 70e9,
     E_plate: Annotated[float, Param("Young's modulus of the plate", unit="Pa", low=0.0, exclusive=True)] = 70e9,
     E_t_tip: Annotated[float, Param("tangent modulus of the tip", unit="Pa", low=0.0)] = 27e9,
     E_t_body: Annotated[float, Param("tangent modulus of the rods' cylinders", unit="Pa", low=0.0)] = 27e9,
@@ -65,24 +94,30 @@ def build(
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
-    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "axis",
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 1.0,
+    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "ends",
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
     duration: Annotated[float, Param("simulated time after contact", unit="s", low=0.0, exclusive=True)] = 0.6e-3,
-    output_interval: Annotated[float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)] = 1e-6,
+    output_interval: Annotated[
+        float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)
+    ] = 1e-6,
     time_step_scale: Annotated[float, Param("share of the stable time step", low=0.0, high=1.0)] = 0.9,
     section: Annotated[int, Param("cells along each side of a rod's core, even", low=2)] = 6,
     ring: Annotated[int, Param("cells from a rod's core to its surface", low=1)] = 3,
-    axial_OA: Annotated[int, Param("cells along OA", low=1)] = 12,
-    axial_AB: Annotated[int, Param("cells along the cylinder of AB", low=1)] = 18,
-    axial_ratio: Annotated[float, Param("length of AB's cells at the hinge over those at the tip", low=0.0, exclusive=True)] = 2.0,
-    focus_size: Annotated[float, Param("cell size at the contact, on the tip and on the plate", unit="m", low=0.0, exclusive=True)] = 0.6e-3,
+    axial_OA: Annotated[int, Param("cells along OA", low=1)] = 16,
+    axial_AB: Annotated[int, Param("cells along the cylinder of AB", low=1)] = 15,
+    axial_ratio: Annotated[
+        float, Param("length of AB's cells at the hinge over those at the tip", low=0.0, exclusive=True)
+    ] = 2.0,
+    focus_size: Annotated[
+        float, Param("cell size at the contact, on the tip and on the plate", unit="m", low=0.0, exclusive=True)
+    ] = 0.6e-3,
     focus_layers: Annotated[int, Param("cells from the fine patch of the tip to its coarse mesh", low=1)] = 4,
     plate_core_x: Annotated[int, Param("fine cells of the plate along x, even", low=2)] = 10,
     plate_core_z: Annotated[int, Param("fine cells of the plate along z, even", low=2)] = 6,
     plate_core_depth: Annotated[int, Param("fine cells of the plate downwards", low=1)] = 3,
     plate_layers: Annotated[int, Param("cells from the plate's fine core to its local box", low=1)] = 8,
-    plate_extension: Annotated[int, Param("cells along x from the local box to each end", low=1)] = 10,
+    plate_extension: Annotated[int, Param("cells along x from the local box to each end", low=1)] = 14,
 ) -> mca.Scene:
     """The scene of Table 1, Fig. 1 of the paper, with any of its values changed."""
     theta = (math.radians(theta_OA), math.radians(theta_AB))
@@ -148,9 +183,7 @@ def build(
             target=top,
             inertia=rigid_inertia,  # pyright: ignore[reportArgumentType]
         ),
-        impact=mca.ImpactPhase(
-            duration=duration, output_interval=output_interval, time_step_scale=time_step_scale
-        ),
+        impact=mca.ImpactPhase(duration=duration, output_interval=output_interval, time_step_scale=time_step_scale),
         tip=mca.Point(body="AB", at=tip_centre),
         target=mca.Point(body="plate", at=(0.0, 0.0, 0.0)),
     )

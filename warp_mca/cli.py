@@ -6,6 +6,7 @@ Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -141,6 +142,7 @@ def _run(args: argparse.Namespace) -> None:
         raise bad_value("--viewer", args.viewer, "this version has no live viewer yet; use --viewer none")
     request = _request(args)
     out = args.out or Path(request.label)
+    _start_warp()
     with progress_bar() as progress:
         result = mca.run(
             request.scene,
@@ -157,6 +159,22 @@ def _run(args: argparse.Namespace) -> None:
     if request.source and request.source.check and as_designed:
         for message in request.source.check(result):
             print(f"check: {message}")
+
+
+def _start_warp() -> None:
+    """Initialise Warp; its native code warns on stderr when there is no GPU, which is no news to who asks for cpu."""
+    import warp
+
+    sys.stderr.flush()
+    stderr, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        warp.config.log_level = warp.LOG_WARNING
+        warp.init()
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(null)
 
 
 def _build(args: argparse.Namespace) -> None:

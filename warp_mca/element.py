@@ -28,7 +28,7 @@ _VALUE, _SLOPE = _shape_tables()
 
 
 def jacobians(x: Array) -> Array:
-    """Jacobian matrices dx/dxi at the Gauss points, shape (element_count, 8, 3, 3), of corners x (element_count, 8, 3)."""
+    """Jacobians dx/dxi at the Gauss points, shape (element_count, 8, 3, 3), of corners x, shape (element_count, 8, 3)."""
     return np.einsum("eai,gak->egik", x, _SLOPE, optimize=True)
 
 

@@ -290,19 +290,25 @@ def _joints(parts: _Assembly) -> tuple[Index, Index, tuple[Hinge, ...]]:
         axis = np.asarray(joint.axis)
         a, along = _axis_nodes(parts.meshes[joint.body], np.asarray(joint.at), axis, ends)
         if len(a) < 2:
-            raise bad_value(f"Revolute {joint.name}.at", joint.at, f"{len(a)} nodes of {joint.body} lie on this axis; two are needed")
+            raise bad_value(
+                f"Revolute {joint.name}.at",
+                joint.at,
+                f"{len(a)} nodes of {joint.body} lie on this axis; two are needed",
+            )
         a = a + parts.node_start[joint.body]
         b = np.full(len(a), GROUND, dtype=np.int32)
         if joint.other is not None:
             b, other_along = _axis_nodes(parts.meshes[joint.other], np.asarray(joint.other_at), axis, ends)
             b = b + parts.node_start[joint.other]
-            if len(a) == len(b):
-                apart = float(np.linalg.norm(parts.X[a] - parts.X[b], axis=1).max())
-            else:
-                apart = float("inf")
+            alike = len(a) == len(b)
+            apart = float(np.linalg.norm(parts.X[a] - parts.X[b], axis=1).max()) if alike else np.inf
             if apart > 1e-6 * max(np.ptp(along), np.ptp(other_along)):
                 what = f"{len(a)} nodes of {joint.body} and {len(b)} of {joint.other}, up to {apart:.3g} m apart"
-                raise bad_value(f"Revolute {joint.name}.nodes", joint.nodes, f"they do not coincide ({what}); mesh both alike at the axis")
+                raise bad_value(
+                    f"Revolute {joint.name}.nodes",
+                    joint.nodes,
+                    f"they do not coincide ({what}); mesh both alike at the axis",
+                )
             parts.X[b] = parts.X[a]
         start = sum(len(item) for item in first)
         hinges.append(Hinge(name=joint.name, start=start, end=start + len(a)))

@@ -6,9 +6,11 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,13 +40,13 @@ class Result:
     """A finished run.
 
     Attributes:
-        summary: the figures of `summary.json`, see docs/outputs.md.
+        summary: the figures of `summary.json`, see `summarise`.
         history: one array for each column of `history.csv`, each shape (row_count,), float64.
         path: folder that it was saved in or loaded from, or None.
         warnings: what the run noticed without stopping, one sentence each.
     """
 
-    summary: dict[str, object]
+    summary: dict[str, Any]
     history: dict[str, Array]
     path: Path | None = None
     warnings: tuple[str, ...] = ()
@@ -115,7 +117,7 @@ class RunFacts:
     more: Mapping[str, object] = field(default_factory=dict)
 
 
-def summarise(history: Mapping[str, Array], facts: RunFacts) -> dict[str, object]:
+def summarise(history: Mapping[str, Array], facts: RunFacts) -> dict[str, Any]:
     """The contents of `summary.json`: `facts`, and what is read off the history.
 
     Args:
@@ -176,7 +178,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         force: replace results that are there already.
 
     Returns:
-        The result with its `path` set.
+        The result with its `path` set, and with the time that writing took in wall.output.
 
     Raises:
         RequestError: as in `check_output`.
@@ -187,16 +189,18 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     # Written beside the folder first: a run that fails half-way leaves nothing behind.
     staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=_nearest(path)))
     try:
-        summary = {**result.summary, "warnings": list(result.warnings)}
-        (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
+        begun = time.perf_counter()
         _write_history(staging / "history.csv", result.history)
         save_forces(staging / "forces.png", result)
+        result = _with_output_time(result, path, time.perf_counter() - begun)
+        summary = {**result.summary, "warnings": list(result.warnings)}
+        (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
         path.mkdir(parents=True, exist_ok=True)
         for name in FILES:
             (staging / name).replace(path / name)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-    return Result(result.summary, result.history, path, result.warnings)
+    return result
 
 
 def load(directory: str | os.PathLike[str]) -> Result:
@@ -217,6 +221,15 @@ def load(directory: str | os.PathLike[str]) -> Result:
     except (OSError, ValueError, AttributeError) as error:
         raise bad_value("results", str(path), "its files are damaged; run again") from error
     return Result(summary, dict(zip(names, rows.T.copy(), strict=True)), path, warnings)
+
+
+def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
+    """The result as saved in `path`, with the time that writing it took added to wall.output."""
+    summary = dict(result.summary)
+    wall = summary.get("wall")
+    if isinstance(wall, Mapping):
+        summary["wall"] = {**wall, "output": wall.get("output", 0.0) + seconds}
+    return Result(summary, result.history, path, result.warnings)
 
 
 def _nearest(path: Path) -> Path:

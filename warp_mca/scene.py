@@ -163,7 +163,9 @@ class RigidPlane:
         _finite("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
         if math.hypot(*self.normal) == 0.0:
             raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
-        if abs(sum(v * n for v, n in zip(self.velocity, self.normal, strict=True))) > 1e-12 * math.hypot(*self.velocity):
+        if abs(sum(v * n for v, n in zip(self.velocity, self.normal, strict=True))) > 1e-12 * math.hypot(
+            *self.velocity
+        ):
             raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
 
 
@@ -343,7 +345,9 @@ class ImpactPhase:
         _positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
         _positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
         if self.output_interval > self.duration:
-            raise bad_value("ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}")
+            raise bad_value(
+                "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
+            )
         if not 0.0 < self.time_step_scale <= 1.0:
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
 

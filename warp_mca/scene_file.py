@@ -173,6 +173,8 @@ def _encoded(value: object, arrays: list[NDArray]) -> object:
         return {str(key): _encoded(item, arrays) for key, item in value.items()}
     if isinstance(value, tuple | list):
         return [_encoded(item, arrays) for item in value]
+    if isinstance(value, Path):
+        return str(value)
     return value.item() if isinstance(value, np.generic) else value
 
 

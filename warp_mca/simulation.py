@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import GuardError, bad_value
+from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.handoff import HandOff, hand_off
 from warp_mca.ledger import Ledger
@@ -98,7 +98,9 @@ def divide(scene: Scene, model: Model, duration: float) -> Steps:
 class _Clock:
     """Wall-clock seconds by stage."""
 
-    wall: dict[str, float] = field(default_factory=lambda: dict.fromkeys(("rigid", "mesh", "compile", "fe", "output"), 0.0))
+    wall: dict[str, float] = field(
+        default_factory=lambda: dict.fromkeys(("rigid", "mesh", "compile", "fe", "output"), 0.0)
+    )
     last: float = field(default_factory=time.perf_counter)
 
     def lap(self, stage: str) -> None:
@@ -234,5 +236,3 @@ def _warnings(scene: Scene, start: HandOff, ledger: Ledger) -> list[str]:
             f"by {start.energy_mismatch:.1%} at hand-off; rigid_inertia=mesh keeps both"
         )
     return found
-
-

@@ -90,7 +90,9 @@ class ContactStage:
             return
         margin = self.item.margin
         outputs = [self.lower, self.upper, self.face_count]
-        wp.launch(search.face_bounds, len(self.item.face), inputs=[X, u, self.face, self.origin, margin], outputs=outputs)
+        wp.launch(
+            search.face_bounds, len(self.item.face), inputs=[X, u, self.face, self.origin, margin], outputs=outputs
+        )
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper)
         else:
@@ -109,7 +111,11 @@ class ContactStage:
         item = self.item
         if item.plane is not None:
             normal = np.asarray(item.plane.normal, dtype=float)
-            frame = [wp.vec3d(*item.plane.point), wp.vec3d(*(normal / np.linalg.norm(normal))), wp.vec3d(*item.plane.velocity)]
+            frame = [
+                wp.vec3d(*item.plane.point),
+                wp.vec3d(*(normal / np.linalg.norm(normal))),
+                wp.vec3d(*item.plane.velocity),
+            ]
             inputs = [X, u, v, self.slave, self.stiffness, *frame, item.mu, dt, self.spring]
             wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force])
             return
@@ -233,7 +239,9 @@ class Solver:
         for stage in self.elements:
             inputs = [self.X, stage.conn, stage.material, self.law, stage.yielded, stage.history, self.u]
             inputs += [stage.block.first]
-            wp.launch(stage.energy_kernel, stage.block.conn.shape[1], inputs=inputs, outputs=[self.energy], block_dim=64)
+            wp.launch(
+                stage.energy_kernel, stage.block.conn.shape[1], inputs=inputs, outputs=[self.energy], block_dim=64
+            )
         self._sum(self.sum_elements_kernel, self.energy, self.row, SUM_WIDTH)
         for stage in self.contacts:
             self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
@@ -314,7 +322,9 @@ class Solver:
         written = row if row else ROWS
         with wp.ScopedDevice(self.device):
             self.row.zero_()
-        return self.partial.numpy(), self.point_velocity.numpy(), self.flag.numpy(), written
+        arrays = (self.partial, self.point_velocity, self.flag)  # copied: on the CPU numpy() shows live memory
+        partial, velocity, flag = (np.array(array.numpy()) for array in arrays)
+        return partial, velocity, flag, written
 
     def max_plastic_strain(self) -> float:
         """Greatest equivalent plastic strain of any integration point [-]."""

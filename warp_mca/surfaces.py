@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.scene import Contact, RigidPlane, Surface
+from warp_mca.scene import Contact, RigidPlane
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -97,13 +97,14 @@ def _node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
 
 
 def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sign: float) -> ContactPass:
+    penalty = 0.5 * contact.penalty if contact.two_way else contact.penalty
     nodes, masters = slave.nodes, master.nodes
     softest = float(master.stiffness.min())
     corner = master.node.ravel()
     order = np.argsort(corner, kind="stable")
     return ContactPass(
         slave=nodes,
-        stiffness=contact.penalty * np.minimum(_node_mean(nodes, slave, slave.stiffness), softest),
+        stiffness=penalty * np.minimum(_node_mean(nodes, slave, slave.stiffness), softest),
         mu=contact.mu,
         sign=sign,
         contact=index,
@@ -147,8 +148,3 @@ def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, m
     shared = np.maximum(1.0, 4.0 * _node_mean(item.master, master, master.area / 4.0) / slave_area)
     nodes = np.concatenate([item.slave, item.master])
     return nodes, np.concatenate([2.0 * item.stiffness / mass[item.slave], 2.0 * k * shared / mass[item.master]])
-
-
-def is_plane(surface: Surface | RigidPlane) -> bool:
-    """Whether the master is analytic."""
-    return isinstance(surface, RigidPlane)

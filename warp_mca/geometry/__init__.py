@@ -4,7 +4,7 @@ from warp_mca.geometry.box import Box
 from warp_mca.geometry.mesh import HEX_FACES, Mesh
 from warp_mca.geometry.mesh_file import MeshFile
 from warp_mca.geometry.plate import Plate
-from warp_mca.geometry.rod import Rod
 from warp_mca.geometry.recipe import Recipe
+from warp_mca.geometry.rod import Rod
 
 __all__ = ["HEX_FACES", "Box", "Mesh", "MeshFile", "Plate", "Recipe", "Rod"]

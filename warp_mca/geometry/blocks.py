@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warp_mca.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
@@ -22,9 +24,9 @@ _one_at_a_time = threading.Lock()  # gmsh keeps one global state
 def growth(length: float, count: int, before: float) -> float:
     """Factor q by which `count` cells must grow, one from the next, to fill `length` after a cell of size `before`.
 
-    Solves sum(before * q**i, i = 1..count) = length, so q < 1 means that the cells shrink.
+    Solves sum(before * q**i, i = 1..count) = length; where the cells would have to shrink, q is 1.
     """
-    low, high = 1e-3, 1e3
+    q, low, high = 1.0, 1.0, 1e3
     for _ in range(100):
         q = (low * high) ** 0.5
         low, high = (q, high) if before * sum(q**i for i in range(1, count + 1)) < length else (low, q)
@@ -44,13 +46,13 @@ class Blocks:
         self._growth: dict[tuple[int, int], float] = {}
         self._count: dict[tuple[int, int], int] = {}
         self._spheres: dict[frozenset[int], int] = {}
-        self._blocks: list[tuple[tuple[int, ...], str]] = []
+        self._blocks: list[tuple[tuple[int, ...], int, str]] = []
         self._faces: dict[str, list[frozenset[int]]] = {}
 
-    def point(self, position: Sequence[float]) -> int:
+    def point(self, position: ArrayLike) -> int:
         """Handle of a new point at `position` [m], shape (3,)."""
-        x, y, z = (float(value) for value in position)
-        self._points.append((x, y, z))
+        x, y, z = np.asarray(position, dtype=np.float64)
+        self._points.append((float(x), float(y), float(z)))
         return len(self._points) - 1
 
     def position(self, point: int) -> np.ndarray:
@@ -89,8 +91,10 @@ class Blocks:
             for i, j in edges:
                 a, b = corners[i], corners[j]
                 if self._count.setdefault((min(a, b), max(a, b)), count) != count:
-                    raise RequestError(f"blocks that share the edge {a}-{b} divide it differently: give equal divisions")
-        self._blocks.append((tuple(corners), cells))
+                    raise RequestError(
+                        f"blocks that share the edge {a}-{b} divide it differently: give equal divisions"
+                    )
+        self._blocks.append((tuple(corners), math.prod(divisions), cells))
 
     def mesh(self) -> Mesh:
         """Meshes all blocks.
@@ -104,7 +108,9 @@ class Blocks:
                 gmsh.model.geo.synchronize()
                 gmsh.model.mesh.generate(3)
                 return self._read(gmsh.model.mesh, surfaces, volumes)
-            except Exception as error:  # gmsh raises nothing more specific
+            except Exception as error:
+                if type(error) is not Exception:  # gmsh raises nothing more specific than this
+                    raise
                 raise RequestError(f"gmsh could not mesh the blocks ({error}): change the recipe's values") from error
 
     def _draw(self, geo: ModuleType) -> tuple[dict[frozenset[int], int], list[int]]:
@@ -137,7 +143,7 @@ class Blocks:
             return surfaces[key]
 
         volumes = []
-        for corners, _ in self._blocks:
+        for corners, *_ in self._blocks:
             shell = geo.addSurfaceLoop([surface([corners[i] for i in face]) for face in _FACES])
             volumes.append(geo.addVolume([shell]))
             geo.mesh.setTransfiniteVolume(volumes[-1], [points[corner] for corner in corners])
@@ -146,13 +152,15 @@ class Blocks:
     def _read(self, meshed: ModuleType, surfaces: dict[frozenset[int], int], volumes: list[int]) -> Mesh:
         """Collects hexahedra and sets; nodes that no hexahedron uses (arc centres) are left out."""
         blocks = [meshed.getElementsByType(5, tag)[1].reshape(-1, 8) for tag in volumes]
+        if [len(block) for block in blocks] != [count for _, count, _ in self._blocks]:
+            raise RequestError("gmsh left a block without its hexahedra: change the recipe's values")
         tags, hexahedra = np.unique(np.concatenate(blocks), return_inverse=True)
         all_tags, coordinates, _ = meshed.getNodes()
         rank = np.argsort(all_tags)
         points = coordinates.reshape(-1, 3)[rank][np.searchsorted(all_tags[rank], tags)]
 
         owner = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
-        of_block = np.array([cells for _, cells in self._blocks])
+        of_block = np.array([cells for *_, cells in self._blocks])
         cell_sets = {name: np.flatnonzero(of_block[owner] == name).astype(np.int32) for name in dict.fromkeys(of_block)}
         node_sets = {}
         for name, faces in self._faces.items():

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 
+_ROUNDING = 1e-7  # share of the mesh's extent within which places count as equal: gmsh divides arcs to about 1e-9
 _MIRRORED = [0, 3, 2, 1, 4, 7, 6, 5]  # keeps the Jacobian of a reflected hexahedron positive
 
 
-def mirror(mesh: Mesh, axis: int, rename: Mapping[str, str] | None = None) -> Mesh:
+def mirror(mesh: Mesh, axis: int) -> Mesh:
     """The mesh and its reflection, joined at the plane where coordinate `axis` is 0.
 
     Args:
-        mesh: lies on one side of the plane; what touches it within rounding is put exactly on it.
+        mesh: lies on one side of the plane; what touches it within gmsh's rounding is put exactly on it.
         axis: 0, 1 or 2.
-        rename: node sets whose reflection goes by another name instead of joining the set.
     """
     points = snapped(mesh.points, axis, 0.0)
     image = np.arange(len(points), dtype=np.int32)
@@ -27,10 +26,7 @@ def mirror(mesh: Mesh, axis: int, rename: Mapping[str, str] | None = None) -> Me
     reflected = points[off].copy()
     reflected[:, axis] *= -1.0
 
-    node_sets = {name: nodes for name, nodes in mesh.node_sets.items()}
-    for name, nodes in mesh.node_sets.items():
-        other = (rename or {}).get(name, name)
-        node_sets[other] = np.unique(np.append(node_sets.get(other, nodes[:0]), image[nodes]))
+    node_sets = {name: np.unique(np.append(nodes, image[nodes])) for name, nodes in mesh.node_sets.items()}
     cell_sets = {name: np.append(cells, cells + len(mesh.hexahedra)) for name, cells in mesh.cell_sets.items()}
     return Mesh(
         np.concatenate([points, reflected]),
@@ -41,24 +37,24 @@ def mirror(mesh: Mesh, axis: int, rename: Mapping[str, str] | None = None) -> Me
 
 
 def snapped(points: np.ndarray, axis: int, value: float) -> np.ndarray:
-    """Copy of `points` (count, 3) whose coordinates `axis` within rounding of `value` [m] equal it exactly."""
+    """Copy of `points` (count, 3) whose coordinates `axis` within gmsh's rounding of `value` [m] equal it exactly."""
     points = points.copy()
-    tolerance = 1e-10 * np.ptp(points, axis=0).max()
+    tolerance = _ROUNDING * np.ptp(points, axis=0).max()
     points[np.abs(points[:, axis] - value) < tolerance, axis] = value
     return points
 
 
-def pinned(points: np.ndarray, place: Sequence[float]) -> np.ndarray:
-    """Copy of `points` (count, 3) whose node within rounding of `place` [m] lies exactly there.
+def pinned(points: np.ndarray, place: ArrayLike) -> np.ndarray:
+    """Copy of `points` (count, 3) whose node within gmsh's rounding of `place` [m] lies exactly there.
 
     Raises:
         RequestError: no node lies there.
     """
     points = points.copy()
-    distance = np.linalg.norm(points - np.asarray(place), axis=1)
+    distance = np.linalg.norm(points - np.asarray(place, dtype=np.float64), axis=1)
     nearest = int(distance.argmin())
-    if distance[nearest] > 1e-9 * np.ptp(points, axis=0).max():
-        raise bad_value("place", tuple(place), "no node of the mesh lies there; use even divisions")
+    if distance[nearest] > _ROUNDING * np.ptp(points, axis=0).max():
+        raise bad_value("place", np.asarray(place).tolist(), "no node of the mesh lies there; use even divisions")
     points[nearest] = place
     return points
 

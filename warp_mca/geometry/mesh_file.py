@@ -87,7 +87,7 @@ def _sets(read: meshio.Mesh) -> tuple[dict[str, NDArray[np.int32]], dict[str, ND
     cells: dict[str, list[NDArray]] = {}
     for name, by_block in _groups(read).items():
         first = 0
-        for block, members in zip(read.cells, by_block, strict=True):
+        for block, members in zip(read.cells, by_block, strict=False):
             is_volume = block.type == "hexahedron"
             if members is not None and len(members):
                 members = np.asarray(members, dtype=np.int64)
@@ -101,7 +101,9 @@ def _sets(read: meshio.Mesh) -> tuple[dict[str, NDArray[np.int32]], dict[str, ND
 
 def _groups(read: meshio.Mesh) -> dict[str, list]:
     """Members of each named group, block by block: meshio's cell sets and gmsh's physical groups."""
-    groups = {name: by_block for name, by_block in read.cell_sets.items() if not name.startswith("gmsh:")}
+    groups: dict[str, list] = {
+        name: by_block for name, by_block in read.cell_sets.items() if not name.startswith("gmsh:")
+    }
     physical = read.cell_data.get("gmsh:physical", [])
     names = {(int(number), int(dim)): name for name, (number, dim) in read.field_data.items()} if physical else {}
     for index, (block, numbers) in enumerate(zip(read.cells, physical, strict=False)):

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import RequestError
-from warp_mca.geometry.edit import compact as compact
 from warp_mca.geometry.mesh import Mesh
 
 # The three neighbours of each corner, ordered so that the edges towards them are right-handed.

@@ -7,48 +7,43 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
 from warp_mca.geometry import _validate
-from warp_mca.geometry.blocks import Blocks, growth
+from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import mirror, pinned, snapped
+from warp_mca.geometry.hemisphere import DEPTH_LIMIT, FOCUS_LIMIT, PATCH_LIMIT, Hemisphere
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.rings import SIDES, Ring, bands, bowed_face, join
 
-# Block corners, as shares of the radius or angles [rad]. Found by search for the best worst corner.
-S = dict(
- CORE_RADIUS = 0.58,  # from the axis to a corner of the section's core
- CORE_BULGE = math.radians(10.0),  # by which the core's edges leave the chord
- RN=0.7, RF=0.7, PN=1.28, PF=-0.3, LEAN=0.1, START=1.0, FB=0.1, DEPTH=1.0,
- CAP_BULGE = math.radians(10.0),
- CAP_ANGLE = math.radians(45.0),  # half the angle that the cap spans in the plane z = 0
- CAP_SIDE = math.radians(45.0),  # half the angle that it spans across
- MAX_TILT = math.radians(28.0),  # of the cap's middle towards the focus
-)
-# Sides of a section's core between its corners: towards +y, +z and -y.
-_SIDES = ((1, 2), (2, 3), (3, 0))
+_CORE_RADIUS = 0.64  # from the axis to the corners of the section's core [radius]
+_CORE_BULGE = 0.24  # of the core's edges [rad]
+_FOCUS_SIZE = 0.28  # default edge of the fine cells, times the cells along the section's core [radius]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rod:
     """A rod along +x from a hinge at the origin, whose axis is z, to its tip at x = length; symmetric about z = 0.
 
-    The section is a square core, seen from the axis, inside four ring blocks. A hemispherical tip continues them in a
-    half cube and its sides; a fine patch lies around the focus, a point of the sphere in the plane z = 0.
+    The section is a four-sided core inside a ring; the z axis is a line of its nodes, the same in all rods of equal
+    radius, section and ring. A hemispherical tip has a fine patch of section x section x ring cells around the focus,
+    a node on the sphere in the plane z = 0.
 
-    Node sets: start (x = 0), side (cylinder), end (flat tip) or tip (hemisphere with its equator) and contact (the
-    part of the sphere around the focus). Cell sets: body, and tip for the hemisphere.
+    Node sets: start (x = 0), side (cylinder), end (flat tip), or tip (hemisphere with its equator) and contact (the
+    part of the sphere, about 38 degrees to each side, that faces the focus). Cell sets: body, and tip (hemisphere).
 
     Attributes:
         radius: [m].
         length: from the hinge axis to the end of the tip [m].
         tip: shape of the free end.
-        section: number of cells along each side of the core, even.
-        ring: number of cells from the core to the surface, also the depth of the fine patch in cells.
+        section: number of cells along each side of the section's core, even.
+        ring: number of cells from the core to the surface, and down into the fine patch.
         axial: number of cells along the cylinder.
-        axial_ratio: length of the cells at the hinge over those at the tip.
-        tip_layers: number of cells along the half cube in the tip; None: half of `section`.
-        focus_angle: from the rod's axis to the focus, positive towards +y [rad], within 60 degrees.
-        focus_size: edge of the cells at the focus [m]; None: a tenth of the radius divided by ... .
+        axial_ratio: length of the cells at the hinge over that of the cells at the tip.
+        tip_layers: number of cells from the equator to the cap of the tip; None: half of `section`.
+        focus_angle: from the rod's axis to the focus, positive towards +y [rad], at most 60 degrees either way.
+        focus_size: edge of the cells at the focus [m]; None: 0.28 radius / section, or what fits.
         focus_layers: number of cells from the fine patch to the coarse mesh around it.
     """
 
@@ -57,7 +52,7 @@ class Rod:
     tip: Literal["flat", "hemisphere"] = "hemisphere"
     section: int = 6
     ring: int = 3
-    axial: int = 18
+    axial: int = 16
     axial_ratio: float = 1.0
     tip_layers: int | None = None
     focus_angle: float = 0.0
@@ -69,142 +64,97 @@ class Rod:
         _validate.even_counts("Rod", section=self.section)
         _validate.counts("Rod", ring=self.ring, axial=self.axial, focus_layers=self.focus_layers)
         _validate.finite("Rod", focus_angle=self.focus_angle)
+        if self.tip not in ("flat", "hemisphere"):
+            raise bad_value("Rod.tip", self.tip, "choose flat or hemisphere")
+        if self.tip_layers is not None:
+            _validate.counts("Rod", tip_layers=self.tip_layers)
+        if self.tip == "hemisphere":
+            self._check_hemisphere()
+
+    def _check_hemisphere(self) -> None:
+        if self.length <= self.radius:
+            raise bad_value("Rod.length", self.length, f"a hemispherical tip needs more than radius = {self.radius:g}")
+        if abs(self.focus_angle) > FOCUS_LIMIT * (1.0 + 1e-12):
+            raise bad_value("Rod.focus_angle", self.focus_angle, f"must lie within {FOCUS_LIMIT:.4f} rad either way")
+        _validate.lengths("Rod", focus_size=self._focus_size)
+        if self._focus_size > self._largest_focus_size:
+            remedy = f"the fine patch is too large; give at most {self._largest_focus_size:.3g}"
+            raise bad_value("Rod.focus_size", self._focus_size, remedy)
+
+    @property
+    def _largest_focus_size(self) -> float:
+        return self.radius * min(2.0 * PATCH_LIMIT / self.section, DEPTH_LIMIT / self.ring)
+
+    @property
+    def _focus_size(self) -> float:
+        if self.focus_size is not None:
+            return self.focus_size
+        return min(_FOCUS_SIZE * self.radius / self.section, self._largest_focus_size)
+
+    @property
+    def _cylinder(self) -> float:
+        """Length of the cylinder [m]."""
+        return self.length - self.radius if self.tip == "hemisphere" else self.length
 
     def build(self) -> Mesh:
-        half = self._half()
-        mesh = mirror(half, 2)
+        """The mesh: one half by gmsh, mirrored; the nodes that others rely on are put exactly in their places."""
+        mesh = mirror(self._half(), 2)
         points = mesh.points
         if self.tip == "hemisphere":
-            centre = np.array([self.length - self.radius, 0.0, 0.0])
-            nodes = mesh.node_sets["tip"]
-            arm = points[nodes] - centre
-            points[nodes] = centre + arm * (self.radius / np.linalg.norm(arm, axis=1, keepdims=True))
-            points = pinned(points, centre)
-            c = np.array([math.cos(self.focus_angle), math.sin(self.focus_angle), 0.0])
-            points = pinned(points, centre + self.radius * c)
-        for axis, value in ((0, 0.0), (0, self.length), (0, self.length - self.radius), (1, 0.0), (2, 0.0)):
-            points = snapped(points, axis, value)
+            points = self._rounded(points, mesh.nodes("tip"))
+        for axis, place in ((0, 0.0), (0, self._cylinder), (0, self.length), (1, 0.0)):
+            points = snapped(points, axis, place)
         return Mesh(points, mesh.hexahedra, mesh.node_sets, mesh.cell_sets)
 
+    def _rounded(self, points: NDArray[np.float64], tip: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Points with the tip's nodes on the sphere, and one node each at its centre and at the focus."""
+        centre = np.array([self._cylinder, 0.0, 0.0])
+        if self.focus_angle < 0.0:
+            points = points * [1.0, -1.0, -1.0] + 0.0  # half a turn about the axis; adding 0 turns -0 into 0
+        arms = points[tip] - centre
+        points[tip] = centre + arms * (self.radius / np.linalg.norm(arms, axis=1, keepdims=True))
+        outwards = np.array([math.cos(self.focus_angle), math.sin(self.focus_angle), 0.0])
+        return pinned(pinned(points, centre), centre + self.radius * outwards)
+
     def _half(self) -> Mesh:
+        """The half with z >= 0, its focus turned to y >= 0."""
         blocks = Blocks()
-        cyl = self.length - (self.radius if self.tip == "hemisphere" else 0.0)
-        start = self._section(blocks, 0.0)
-        end = self._section(blocks, cyl)
-        self._layer(blocks, start, end, self.axial, "body", axial=True)
-        blocks.name_face("start", start[0])
-        for a, b in _SIDES:
-            blocks.name_face("start", [start[0][a], start[0][b], start[1][b], start[1][a]])
-            blocks.name_face("side", [start[1][a], start[1][b], end[1][b], end[1][a]])
-            if self.tip == "flat":
-                blocks.name_face("end", [end[0][a], end[0][b], end[1][b], end[1][a]])
+        start, _ = self._section(blocks, 0.0)
+        end, centre = self._section(blocks, self._cylinder)
+        join(blocks, start, end, (self.section, self.ring, self.axial), "body")
+        factor = self.axial_ratio ** (-1.0 / max(self.axial - 1, 1))
+        for a, b in zip(start.core + start.rim, end.core + end.rim, strict=True):
+            blocks.grow(a, b, factor)
+
+        sets = {"start": [start.core, *start.faces()], "side": bands(start.rim, end.rim)}
         if self.tip == "flat":
-            blocks.name_face("end", end[0])
-        else:
-            self._tip(blocks, end)
+            sets["end"] = [end.core, *end.faces()]
+        for name, faces in sets.items():
+            for face in faces:
+                blocks.name_face(name, face)
+        if self.tip == "hemisphere":
+            Hemisphere(
+                centre=blocks.position(centre),
+                radius=self.radius,
+                focus=abs(self.focus_angle),
+                size=self._focus_size,
+                section=self.section,
+                ring=self.ring,
+                tip_layers=self.tip_layers or self.section // 2,
+                focus_layers=self.focus_layers,
+            ).add(blocks, end, centre)
         return blocks.mesh()
 
-    def _layer(self, blocks, low, high, count, cells, axial=False):
-        n, m = self.section, self.ring
-        blocks.block(low[0] + high[0], (n, n // 2, count), cells)
-        for a, b in _SIDES:
-            corners = [low[0][a], low[0][b], low[1][b], low[1][a], high[0][a], high[0][b], high[1][b], high[1][a]]
-            blocks.block(corners, (n if a == 2 else n // 2, m, count), cells)
-        if axial and count > 1:
-            f = self.axial_ratio ** (-1.0 / (count - 1))
-            for k in (0, 1):
-                for a, b in zip(low[k], high[k]):
-                    blocks.grow(a, b, f)
-
-    def _section(self, blocks, x):
-        o = np.array([x, 0.0, 0.0])
-        centre = blocks.point(o)
+    def _section(self, blocks: Blocks, x: float) -> tuple[Ring, int]:
+        """The ring of the section at `x`, and its centre."""
+        origin = np.array([x, 0.0, 0.0])
+        centre = blocks.point(origin)
         d = math.sqrt(0.5)
         near, far = np.array([0.0, d, d]), np.array([0.0, -d, d])
-        core = _quad(blocks, o, S["CORE_RADIUS"] * self.radius * near, S["CORE_RADIUS"] * self.radius * far, S["CORE_BULGE"])
-        rim = [blocks.point(o + self.radius * v) for v in (np.array([0, -1.0, 0]), np.array([0, 1.0, 0]), near, far)]
-        for a, b in _SIDES:
+        inner = _CORE_RADIUS * self.radius
+        core = bowed_face(blocks, origin, inner * near, inner * far, _CORE_BULGE)
+        outer = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]), near, far
+        rim = [blocks.point(origin + self.radius * place) for place in outer]
+        for a, b in SIDES:
             blocks.arc(rim[a], rim[b], centre)
-        return core, rim, centre
-
-    def _tip(self, blocks, equator):
-        R = self.radius
-        o = np.array([self.length - R, 0.0, 0.0])
-        centre = equator[2]
-        n, m, g = self.section, self.ring, self.focus_layers
-        sg = -1.0 if self.focus_angle < 0 else 1.0
-        pn, pf = S["PN"], S["PF"]
-        if sg < 0: pn, pf = -pf, -pn
-        tilt, alpha = 0.5 * (pn + pf), 0.5 * (pn - pf)
-        rim_dirs = _patch(tilt, math.tan(alpha), math.tan(S["CAP_SIDE"]))
-        rn, rf = S["RN"], S["RF"]
-        if sg < 0: rn, rf = rf, rn
-        core = _quad(blocks, o, rn * R * rim_dirs[2], rf * R * rim_dirs[3], S["CAP_BULGE"], bow=True)
-        rim = [blocks.point(o + R * v) for v in rim_dirs]
-        cap = (core, rim)
-        self._layer(blocks, equator, cap, self.tip_layers or n // 2, "tip")
-        for i in range(4):
-            blocks.arc(equator[1][i], rim[i], centre)
-
-        size = self.focus_size
-        t = math.tan(size * n / 2 / R)
-        dirs = _patch(self.focus_angle, t, t)
-        outer = [blocks.point(o + R * v) for v in dirs]
-        c = np.array([math.cos(self.focus_angle), math.sin(self.focus_angle), 0.0])
-        sd = np.array([-c[1], c[0], 0.0])
-        fl = -math.tan(S["LEAN"]) * size * m
-        flat = [R * v - S["DEPTH"] * size * m * c + fl * (a * sd + b * np.array([0, 0, 1.0])) for v, (a, b) in zip(dirs, ((-1, 0), (1, 0), (1, 1), (-1, 1)))]
-        heart = o + (R - 0.5 * S["DEPTH"] * size * m) * c
-        inner = _quad(blocks, heart, flat[2] + o - heart, flat[3] + o - heart, S["FB"], bow=True)
-        blocks.block(inner + outer, (n, n // 2, m), "tip")
-        blocks.block(inner + core, (n, n // 2, g), "tip")
-        for a, b in _SIDES:
-            corners = [inner[a], inner[b], outer[b], outer[a], core[a], core[b], rim[b], rim[a]]
-            blocks.block(corners, (n if a == 2 else n // 2, m, g), "tip")
-        for quad in (outer, rim):
-            for a, b in (*_SIDES, (0, 1)):
-                blocks.arc(quad[a], quad[b], centre)
-        for i in range(4):
-            blocks.arc(outer[i], rim[i], centre)
-            for lo, hi, base in ((inner[i], core[i], 2), (outer[i], rim[i], 1)):
-                L = float(np.linalg.norm(blocks.position(hi) - blocks.position(lo)))
-                blocks.grow(lo, hi, growth(L, g, S["START"] * size * math.sqrt(base + (i >= 2))))
-        faces = [outer] + [[outer[a], outer[b], rim[b], rim[a]] for a, b in _SIDES]
-        for f in faces:
-            blocks.name_face("contact", f)
-        faces += [[equator[1][a], equator[1][b], rim[b], rim[a]] for a, b in _SIDES]
-        for f in faces:
-            blocks.name_face("tip", f)
-            blocks.on_sphere(f, centre)
-
-
-def _patch(angle: float, along: float, across: float) -> list[np.ndarray]:
-    """far middle, near middle, near corner, far corner"""
-    t = np.array([math.cos(angle), math.sin(angle), 0.0])
-    s = np.array([-math.sin(angle), math.cos(angle), 0.0])
-    z = np.array([0.0, 0.0, 1.0])
-    out = []
-    for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1)):
-        v = t + a * along * s + b * across * z
-        out.append(v / np.linalg.norm(v))
-    return out
-
-
-def _quad(blocks, o, near, far, bulge, bow=False):
-    """Half of a four-sided face, cut at z=0: [far middle, near middle, near corner, far corner], bowed edges."""
-    mids, centres = [], []
-    for corner in (far, near):
-        middle = corner * [1, 1, 0]
-        e = middle / np.linalg.norm(middle)
-        mids.append(middle + e * corner[2] * math.tan(bulge / 2))
-        centres.append(middle - e * corner[2] / math.tan(bulge))
-    handles = [blocks.point(o + v) for v in (*mids, near, far)]
-    blocks.arc(handles[0], handles[3], blocks.point(o + centres[0]))
-    blocks.arc(handles[1], handles[2], blocks.point(o + centres[1]))
-    for a, b, x, y in ((2, 3, near, far), *(((0, 1, *mids),) if bow else ())):
-        mid = 0.5 * (x + y)
-        along = (x - y) / np.linalg.norm(x - y)
-        e = mid - along * (mid @ along)
-        e /= np.linalg.norm(e)
-        blocks.arc(handles[a], handles[b], blocks.point(o + mid - e * 0.5 * np.linalg.norm(x - y) / math.tan(bulge)))
-    return handles
+        return Ring(core, rim), centre

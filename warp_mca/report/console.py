@@ -92,7 +92,7 @@ def print_summary(result: Result, files: Sequence[str]) -> None:
         table.add_row(label, text)
     out.print(table)
     for warning in result.warnings:
-        out.print(f"warning: {warning}")
+        out.print(f"warning: {warning}", soft_wrap=True)
     for file in files:
         out.print(f"wrote {file}", soft_wrap=True)
 

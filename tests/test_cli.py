@@ -1,0 +1,253 @@
+"""Tests the command line: what it prints, its exit status, and that a refused request leaves nothing behind."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca import cli
+from warp_mca.results import FILES, HISTORY_COLUMNS, load
+
+SCENE = '''"""A block lands on a rigid floor."""
+from typing import Annotated
+import warp_mca as mca
+
+PRESETS = {"tiny": {}, "fine": {"cells": 4}}
+
+def build(
+    *,
+    v: Annotated[float, mca.Param("speed", unit="m/s")] = 1.0,
+    cells: Annotated[int, mca.Param("cells along each edge", low=1)] = 2,
+    E: Annotated[float, mca.Param("Young's modulus", unit="Pa")] = 1e9,
+    nu: Annotated[float, mca.Param("Poisson's ratio")] = 0.3,
+    E_t: Annotated[float, mca.Param("tangent modulus", unit="Pa")] = 1e8,
+    thickness: Annotated[float, mca.Param("of the block", unit="m")] = 0.01,
+    fault: Annotated[str, mca.Param("what is wrong", choices=("none", "joint", "inverted"))] = "none",
+):
+    material = mca.J2Bilinear(E=E, nu=nu, rho=1e3, sigma_y=1e8, E_t=E_t)
+    geometry = mca.Box(size=(0.01, thickness, 0.01), divisions=(cells,) * 3)
+    if fault == "inverted":
+        good = geometry.build()
+        geometry = mca.Mesh(good.points * [-1.0, 1.0, 1.0], good.hexahedra, good.node_sets, good.cell_sets)
+    bodies = [mca.Body(name="block", geometry=geometry, material=material, velocity=(0.0, -v, 0.0))]
+    joints = ()
+    if fault == "joint":
+        bodies.append(mca.Body(name="other", geometry=geometry, material=material, position=(1.0, 0.0, 0.0)))
+        joints = (mca.Revolute(name="A", body="block", at=(0.0, 0.0, 0.0), other="other"),)
+    return mca.Scene(
+        name="landing", bodies=tuple(bodies), joints=joints,
+        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane()),),
+        impact=mca.ImpactPhase(duration=4e-5, energy_tolerance=0.05),
+    )
+'''
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test starts in an empty folder that holds one scene file."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "landing.py").write_text(SCENE)
+    return tmp_path
+
+
+def contents(folder: Path) -> list[str]:
+    """Names in the folder, without the scene file and Python's caches."""
+    return sorted(path.name for path in folder.iterdir() if path.name not in ("landing.py", "__pycache__"))
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 2) -> str:
+    """The one line on stderr of a command that must fail with `status`."""
+    assert cli.main(argv) == status
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1 and captured.err.endswith("\n"), captured.err
+    assert captured.err.startswith("warp-mca")
+    return captured.err
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["two_lnk"], ["'two_lnk'", "two_link"]),
+        (["nowhere.py"], ["'nowhere.py'", "no such file"]),
+        (["nowhere.mca"], ["'nowhere.mca'", "no such file"]),
+        (["two_link", "--preset", "fast"], ["preset = 'fast'", "quick"]),
+        (["two_link", "--set", "muu=1"], ["'muu'", "did you mean mu?"]),
+        (["two_link", "--set", "mu=-1"], ["mu = -1", "0 to 10"]),
+        (["two_link", "--set", "mu=nan"], ["mu = 'nan'", "finite"]),
+        (["two_link", "--set", "mu"], ["'mu'", "KEY=VALUE"]),
+        (["two_link", "--set", "plate_height=-0.05"], ["plate_height = -0.05", "above 0"]),
+        (["two_link", "--set", "E_body=-7e10"], ["E_body = -7", "above 0"]),
+        (["two_link", "--set", "E_t_plate=7e10"], ["E_t = 7", "tangent modulus"]),
+        (["two_link", "--set", "nu=0.5"], ["nu = 0.5", "-1 and 0.5"]),
+        (["two_link", "--set", "H=5"], ["5", "reach"]),
+        (["two_link", "--device", "cuda:99"], ["device = 'cuda:99'", "cpu"]),
+        (["two_link", "--precision", "float32"], ["float32", "mixed"]),
+        (["two_link", "--duration", "soon"], ["'soon'"]),
+        (["two_link", "--duration", "nan"], ["duration = nan"]),
+        (["two_link", "--duration=-1"], ["duration = -1"]),
+        (["two_link", "--viewer", "rerun"], ["'rerun'", "none"]),
+        (["two_link", "--colour"], ["--colour"]),
+        ([], ["SCENE"]),
+        (["landing.py", "--set", "E=-1"], ["E = -1", "above 0"]),
+        (["landing.py", "--set", "nu=0.5"], ["nu = 0.5", "(-1, 0.5)"]),
+        (["landing.py", "--set", "E_t=1e9"], ["E_t = 1", "tangent modulus"]),
+        (["landing.py", "--set", "thickness=-1"], ["size = -1", "above 0"]),
+        (["landing.py", "--set", "fault=joint"], ["Revolute A"]),
+        (["landing.py", "--set", "fault=inverted"], ["block", "inverted"]),
+    ],
+)
+def test_bad_request_to_run(here: Path, capsys: pytest.CaptureFixture[str], settings: list[str], words: list[str]):
+    line = refused(capsys, "run", *settings)
+    assert all(word in line for word in words), line
+    assert contents(here) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["landing.py", "-o", "model.npz"], ["'model.npz'", ".mca"]),
+        (["landing.py", "-o", "nowhere/model.mca"], ["nowhere", "folder"]),
+        (["landing.py"], ["-o"]),
+        (["model.mca", "-o", "other.mca"], ["'model.mca'", "built model"]),
+        (["landing.py", "-o", "model.mca", "--set", "fault=joint"], ["Revolute A"]),
+        (["landing.py", "-o", "model.mca", "--set", "fault=inverted"], ["inverted"]),
+    ],
+)
+def test_bad_request_to_build(here: Path, capsys: pytest.CaptureFixture[str], settings: list[str], words: list[str]):
+    line = refused(capsys, "build", *settings)
+    assert all(word in line for word in words), line
+    assert contents(here) == []
+
+
+def test_unknown_command(capsys: pytest.CaptureFixture[str]):
+    assert "'walk'" in refused(capsys, "walk")
+
+
+def test_without_arguments_it_says_what_it_is(capsys: pytest.CaptureFixture[str]):
+    assert cli.main([]) == 0
+    assert "warp-mca run two_link" in capsys.readouterr().out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"warp-mca {mca.__version__}\n"
+
+
+def test_scenes_lists_presets_and_every_parameter(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(["scenes"]) == 0
+    out = capsys.readouterr().out
+    for name in mca.registry.scene_names():
+        source = mca.registry.load_source(name)
+        assert all(word in out for word in (name, *source.presets, *source.parameters))
+    assert "0 to 10" in out and "kg/m^3" in out
+
+
+def test_scenes_lists_a_file_too(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(["scenes", "landing.py"]) == 0
+    assert "A block lands on a rigid floor." in capsys.readouterr().out
+
+
+def test_a_run_writes_its_results_and_a_second_one_needs_force(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(["run", "landing.py", "--duration", "2e-5"]) == 0
+    out = capsys.readouterr().out
+    assert contents(here) == ["landing-tiny"]
+    assert contents(here / "landing-tiny") == sorted(FILES)
+    assert "F_n peaks" in out and str(Path("landing-tiny", "history.csv")) in out
+    result = load("landing-tiny")
+    assert tuple(result.history) == HISTORY_COLUMNS
+    assert result.summary["simulated_time"] == pytest.approx(2e-5)
+    assert result.summary["parameters"]["cells"] == 2
+    before = (here / "landing-tiny" / "history.csv").read_bytes()
+    assert "--force" in refused(capsys, "run", "landing.py")
+    assert cli.main(["run", "landing.py", "--duration", "2e-5", "--force"]) == 0
+    assert (here / "landing-tiny" / "history.csv").read_bytes() == before
+
+
+def test_a_built_model_runs_to_the_same_history(here: Path, capsys: pytest.CaptureFixture[str]):
+    setting = ["--set", "v=2"]
+    assert cli.main(["build", "landing.py", "-o", "model.mca", *setting]) == 0
+    out = capsys.readouterr().out
+    assert "min scaled Jacobian" in out and "1.000" in out and "smallest stable step" in out
+    assert cli.main(["run", "model.mca", "--out", "a"]) == 0
+    assert cli.main(["run", "landing.py", "--out", "b", *setting]) == 0
+    assert (here / "a" / "history.csv").read_bytes() == (here / "b" / "history.csv").read_bytes()
+    capsys.readouterr()
+    assert "model file" in refused(capsys, "run", "model.mca", "--preset", "tiny", "--out", "c")
+    assert "built-in" in refused(capsys, "run", "model.mca", "--set", "v=3", "--out", "c")
+
+
+def test_a_built_in_model_takes_new_parameters_unless_they_change_the_mesh(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    assert cli.main(["build", "single_rod", "-o", "rod.mca"]) == 0
+    scenes = []
+    monkeypatch.setattr(mca, "run", lambda scene, **options: scenes.append((scene, options["meshes"])) or finished())
+    assert cli.main(["run", "rod.mca", "--set", "v=3"]) == 0
+    scene, meshes = scenes[0]
+    assert scene.parameters["v"] == 3.0
+    assert scene.bodies[0].velocity[0] == 3.0
+    assert len(meshes["rod"].hexahedra) > 0
+    capsys.readouterr()
+    assert "build the model again" in refused(capsys, "run", "rod.mca", "--set", "radius=0.01")
+
+
+def finished(**figures: object) -> mca.Result:
+    """A run without contact, for tests that are about something else."""
+    from warp_mca.results import RunFacts, summarise
+
+    history = {name: np.zeros(10) for name in HISTORY_COLUMNS} | {"time_s": np.arange(1, 11) * 1e-6}
+    facts = RunFacts(
+        scene="none",
+        n_elements=1,
+        n_nodes=8,
+        dt=1e-7,
+        n_steps=100,
+        simulated_time=1e-5,
+        wall={"fe": 1.0},
+        device="cpu",
+        precision="mixed",
+        element="hex8",
+        energy_error=0.0,
+        energy={},
+        max_plastic_strain=0.0,
+    )
+    return mca.Result({**summarise(history, facts), **figures}, history, None, ("mind the gap",))
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "words"),
+    [
+        (mca.GuardError("the energy balance\nis off by 3 %"), 1, "balance is off by 3 %"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+)
+def test_exit_status_of_a_run_that_stops(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, error: BaseException, status: int, words: str
+):
+    def stop(*args: object, **options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(mca, "run", stop)
+    assert words in refused(capsys, "run", "landing.py", status=status)
+
+
+def test_warnings_are_shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(mca, "run", lambda scene, **options: finished())
+    assert cli.main(["run", "landing.py"]) == 0
+    assert "warning: mind the gap" in capsys.readouterr().out
+
+
+def test_as_a_program_it_writes_one_line_on_stderr_and_no_progress_bar(here: Path):
+    command = [sys.executable, "-m", "warp_mca", "run", "landing.py"]
+    bad = subprocess.run([*command, "--device", "cuda:99"], capture_output=True, text=True)
+    assert (bad.returncode, bad.stdout, bad.stderr.count("\n")) == (2, "", 1), bad.stderr
+    good = subprocess.run(command, capture_output=True, text=True)
+    assert (good.returncode, good.stderr) == (0, "")
+    json.loads((here / "landing-tiny" / "summary.json").read_text())

@@ -1,0 +1,193 @@
+"""Tests scene files: finding them, reading their parameters, checking what the user sets."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from warp_mca.errors import RequestError
+from warp_mca.registry import Param, Parameter, SceneSource, load_source, make_scene, parse_overrides, scene_names
+from warp_mca.scene import Scene
+
+SCENE = '''"""A block falls.
+
+More about it.
+"""
+from __future__ import annotations
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+import warp_mca as mca
+if TYPE_CHECKING:
+    from warp_mca import Scene
+
+@dataclass
+class Local:
+    edge: float
+
+PRESETS = {"small": {}, "large": {"edge": 2.0, "cells": 4}}
+
+def build(
+    *,
+    edge: Annotated[float, mca.Param("edge of the block", unit="m", low=0.0, exclusive=True)] = 1.0,
+    cells: Annotated[int, mca.Param("cells along each edge", low=1)] = 2,
+    kind: Annotated[str, mca.Param("of support", choices=("free", "held"))] = "free",
+    heavy: bool = True,
+) -> Scene:
+    size = (edge, edge, edge)
+    material = mca.Elastic(E=1e9, nu=0.3, rho=1e3)
+    body = mca.Body(name="block", geometry=mca.Box(size=size, divisions=(cells,) * 3), material=material)
+    return mca.Scene(name="block", bodies=(body,), impact=mca.ImpactPhase(duration=1e-4))
+
+def check(result):
+    return []
+'''
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> SceneSource:
+    path = tmp_path / "block.py"
+    path.write_text(SCENE)
+    return load_source(str(path))
+
+
+def test_the_built_in_scenes_are_found():
+    assert {"two_link", "single_rod"} <= set(scene_names())
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_preset_of_every_built_in_scene_builds(name: str):
+    source = load_source(name)
+    assert source.builtin and source.description
+    for preset in source.presets or [None]:
+        scene = source.build(source.resolve(preset))
+        assert set(scene.parameters) == set(source.parameters)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_parameter_of_a_built_in_scene_is_described_and_its_default_allowed(name: str):
+    for parameter in load_source(name).parameters.values():
+        assert parameter.param.description
+        assert parameter.checked(parameter.default) == parameter.default
+
+
+def test_a_scene_file_tells_what_it_offers(source: SceneSource):
+    assert (source.name, source.description, source.builtin) == ("block", "A block falls.", False)
+    assert list(source.parameters) == ["edge", "cells", "kind", "heavy"]
+    assert source.parameters["edge"].param.unit == "m"
+    assert source.parameters["heavy"].kind is bool
+    assert source.default_preset == "small"
+    assert source.check is not None
+
+
+def test_values_come_from_defaults_then_preset_then_overrides(source: SceneSource):
+    assert source.resolve() == {"edge": 1.0, "cells": 2, "kind": "free", "heavy": True}
+    assert source.resolve("large")["cells"] == 4
+    values = source.resolve("large", parse_overrides(["cells=3", "heavy=off", "edge=5e-1"]))
+    assert values == {"edge": 0.5, "cells": 3, "kind": "free", "heavy": False}
+    scene = source.build(values)
+    assert isinstance(scene, Scene)
+    assert scene.parameters == values
+    assert scene.body("block").geometry.divisions == (3, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("edge=0", ["edge = 0.0", "above 0", "[m]"]),
+        ("edge=-1", ["edge = -1.0", "above 0"]),
+        ("edge=wide", ["edge = 'wide'", "finite number"]),
+        ("edge=nan", ["edge = 'nan'", "finite number"]),
+        ("edge=inf", ["edge = 'inf'", "finite number"]),
+        ("cells=0", ["cells = 0", "1 or above"]),
+        ("cells=2.5", ["cells = '2.5'", "whole number"]),
+        ("kind=glued", ["kind = 'glued'", "free or held"]),
+        ("heavy=perhaps", ["heavy = 'perhaps'", "true or false"]),
+        ("cell=3", ["'cell'", "did you mean cells?"]),
+    ],
+)
+def test_a_bad_value_is_refused_by_name_value_and_remedy(source: SceneSource, setting: str, words: list[str]):
+    with pytest.raises(RequestError) as error:
+        source.resolve(None, parse_overrides([setting]))
+    assert all(word in str(error.value) for word in words), str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_an_unknown_preset_is_answered_with_the_known(source: SceneSource):
+    with pytest.raises(RequestError, match=r"'larg'.*small, large \(did you mean large\?\)"):
+        source.resolve("larg")
+
+
+@pytest.mark.parametrize("setting", ["mu", "=3", "mu=", ""])
+def test_a_setting_is_key_equals_value(setting: str):
+    with pytest.raises(RequestError, match="KEY=VALUE"):
+        parse_overrides([setting])
+
+
+def test_the_last_of_two_settings_counts():
+    assert parse_overrides(["mu=1", "mu = 2"]) == {"mu": "2"}
+
+
+@pytest.mark.parametrize(
+    ("param", "allowed", "refused"),
+    [
+        (Param(low=0.0, high=1.0), [0.0, 0.5, 1.0], [-1e-9, 1.1]),
+        (Param(low=0.0, high=1.0, exclusive=True), [0.5], [0.0, 1.0]),
+        (Param(high=2.0), [-1e9, 2.0], [2.1]),
+        (Param(), [-1e300, 0.0], [math.nan]),
+    ],
+)
+def test_limits_belong_to_the_range_unless_exclusive(param: Param, allowed: list[float], refused: list[float]):
+    parameter = Parameter("x", float, 0.5, param)
+    assert [parameter.checked(value) for value in allowed] == allowed
+    for value in refused:
+        with pytest.raises(RequestError):
+            parameter.checked(value)
+
+
+def test_values_from_python_are_checked_like_texts():
+    scene = make_scene("two_link", preset="quick", mu=0.3)
+    assert scene.parameters["mu"] == 0.3
+    with pytest.raises(RequestError, match="mu"):
+        make_scene("two_link", mu=-0.3)
+    with pytest.raises(RequestError, match="mu"):
+        make_scene("two_link", mu=True)
+
+
+def test_moduli_that_contradict_each_other_are_refused():
+    with pytest.raises(RequestError, match="E_t"):
+        make_scene("two_link", E_tip=70e9, E_t_tip=70e9)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("def build(:", "SyntaxError"),
+        ("import nowhere_to_be_found", "ModuleNotFoundError"),
+        ("x = 1", r"must define build\(\)"),
+        ("def build(*, x): ...", "default"),
+        ("def build(*, x: tuple = ()): ...", "float, an int, a str or a bool"),
+        ("def build(): ...\nPRESETS = ['quick']", "PRESETS"),
+    ],
+)
+def test_a_file_that_is_no_scene_file_is_refused(tmp_path: Path, text: str, words: str):
+    path = tmp_path / "bad.py"
+    path.write_text(text)
+    with pytest.raises(RequestError, match=words) as error:
+        load_source(str(path))
+    assert "\n" not in str(error.value)
+
+
+def test_build_must_return_a_scene(tmp_path: Path):
+    path = tmp_path / "odd.py"
+    path.write_text("def build(): return 3")
+    source = load_source(str(path))
+    with pytest.raises(RequestError, match=r"warp_mca\.Scene"):
+        source.build(source.resolve())
+
+
+@pytest.mark.parametrize("name", ["two_lnk", "nowhere.py"])
+def test_a_scene_that_does_not_exist_is_refused(name: str):
+    with pytest.raises(RequestError, match=name):
+        load_source(name)
