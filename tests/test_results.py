@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warp_mca.errors import RequestError
-from warp_mca.history import contact_intervals, force_peaks, interval_edges, intervals, stick_intervals
+from warp_mca.history import contact_intervals, force_peaks, interval_edges, intervals, reverses, stick_intervals
 from warp_mca.results import FILES, HISTORY_COLUMNS, Result, RunFacts, check_output, load, save, summarise
 
 TIME = np.arange(1, 601) * 1e-6
@@ -191,3 +191,11 @@ def test_result_names_its_columns():
     assert result.time is result["time_s"]
     with pytest.raises(KeyError, match="tip_vx"):
         result["tip_v"]
+
+
+def test_reversal_needs_both_signs_beyond_the_last_springs():
+    wave = np.sin(np.linspace(0.0, np.pi, 50))
+    assert not reverses(-1000.0 * wave)
+    assert not reverses(np.append(-1000.0 * wave, 0.04))
+    assert reverses(np.append(-1000.0 * wave, 100.0 * wave))
+    assert not reverses(np.zeros(4))

@@ -28,7 +28,7 @@ _VALUE, _SLOPE = _shape_tables()
 
 
 def jacobians(x: Array) -> Array:
-    """Jacobians dx/dxi at the Gauss points, shape (element_count, 8, 3, 3), of corners x, shape (element_count, 8, 3)."""
+    """Jacobians dx/dxi at the Gauss points, shape (element_count, 8, 3, 3); corners x [m] as in `lumped_masses`."""
     return np.einsum("eai,gak->egik", x, _SLOPE, optimize=True)
 
 
@@ -83,7 +83,7 @@ def largest_eigenvalues(x: Array, K: Array, G: Array, mass: Array) -> Array:
     matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
     stiffness = G[:, None, None] * matrix.reshape(n, 24, 24)
     stiffness += (K / volume)[:, None, None] * mean[:, :, None] * mean[:, None, :]
-    return np.linalg.eigvalsh(stiffness)[:, -1]
+    return np.linalg.eigvalsh(stiffness)[:, -1].astype(np.float64)
 
 
 def _chunks(count: int, size: int) -> list[slice]:

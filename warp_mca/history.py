@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 CONTACT_THRESHOLD = 1e-3  # share of the greatest F_n above which the bodies count as touching
+REVERSAL_THRESHOLD = 1e-2  # share of the greatest |F_t| that both signs must reach
 MERGED_GAP = 5e-6  # separations shorter than this [s] are nodes changing over, not a second contact
 STICK_THRESHOLD = 0.5  # share of the contact that must stick
 SMOOTHING = 2e-6  # standard deviation of the Gaussian through which peaks are looked for [s]
@@ -72,6 +73,18 @@ def stick_intervals(time: Array, F_n: Array, stick_fraction: Array) -> list[Inte
     for start, end in contact_intervals(time, F_n):
         touching |= (time > start) & (time <= end)
     return intervals(time, touching & (stick_fraction >= STICK_THRESHOLD))
+
+
+def reverses(F_t: Array) -> bool:
+    """Whether the tangential force changes sign: both signs reach 1 % of its greatest size.
+
+    Less is what the springs of a few nodes give back in the last microseconds of a contact.
+
+    Args:
+        F_t: tangential force [N], shape (row_count,).
+    """
+    size = REVERSAL_THRESHOLD * float(np.max(np.abs(F_t), initial=0.0))
+    return bool(size > 0.0 and F_t.max() > size and F_t.min() < -size)
 
 
 def force_peaks(time: Array, F_n: Array) -> list[Interval]:

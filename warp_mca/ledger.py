@@ -128,7 +128,8 @@ class Ledger:
             F_n += force @ normal
             F_t += force @ tangent
         pressed, stuck = springs[:, :, 6].sum(axis=1), springs[:, :, 7].sum(axis=1)
-        stick = np.divide(stuck, pressed, out=np.zeros_like(stuck), where=pressed > 0.0)
+        stick: Array = np.zeros(len(table))
+        np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
         velocity = np.array(self.velocities)
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:

@@ -138,6 +138,11 @@ def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
     return [(m, np.flatnonzero(owner == k).astype(np.int32)) for k, (_, m) in enumerate(listed)]
 
 
+def _sum_to_nodes(hexahedra: Index, value: Array, node_count: int) -> Array:
+    """Sum of what each element gives its corners, shape (node_count,), float64."""
+    return np.bincount(hexahedra.ravel(), value.ravel(), minlength=node_count).astype(np.float64)
+
+
 def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
     """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum."""
     masses = {}
@@ -147,7 +152,7 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
         for material, cells in body_materials(body, mesh):
             rho[cells] = material.rho
         element_mass = lumped_masses(mesh.points[mesh.hexahedra], rho)
-        masses[body.name] = np.bincount(mesh.hexahedra.ravel(), element_mass.ravel(), minlength=len(mesh.points))
+        masses[body.name] = _sum_to_nodes(mesh.hexahedra, element_mass, len(mesh.points))
     return masses
 
 
@@ -178,7 +183,7 @@ class _Assembly:
         corners = self.X[self.hexahedra]
         self.element_mass = lumped_masses(corners, rho)
         self.volume = np.linalg.det(jacobians(corners)).sum(axis=1)
-        self.mass = np.bincount(self.hexahedra.ravel(), self.element_mass.ravel(), minlength=len(self.X))
+        self.mass = _sum_to_nodes(self.hexahedra, self.element_mass, len(self.X))
 
     def law(self) -> Array:
         """Rows of K, G, sigma_y, H, beta; an elastic material never yields."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from warp_mca.errors import RequestError, bad_value
-from warp_mca.history import Array, contact_intervals, force_peaks, stick_intervals
+from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -143,6 +143,7 @@ def summarise(history: Mapping[str, Array], facts: RunFacts) -> dict[str, Any]:
         "F_n_max": float(np.max(F_n, initial=0.0)),
         "F_t_min": float(np.min(F_t, initial=0.0)),
         "F_t_max": float(np.max(F_t, initial=0.0)),
+        "F_t_reverses": reverses(F_t),
         "contacts": [list(contact) for contact in contacts],
         "contact_duration": sum(end - start for start, end in contacts),
         "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],

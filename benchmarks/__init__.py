@@ -1,0 +1,1 @@
+"""Runs that the documentation quotes: `python -m benchmarks.results`."""
