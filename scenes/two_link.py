@@ -11,6 +11,7 @@ from typing import Annotated
 
 import warp_mca as mca
 from warp_mca import Param
+from warp_mca.errors import bad_value
 
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
@@ -58,7 +59,10 @@ def _approach_angle(length: float, radius: float, H: float, gravity: float, thet
     def gap(_t: float, angle) -> float:
         return H - length * math.cos(angle[0]) - centre * math.cos(angle[1]) - radius
 
-    return round(float(swing(chain, theta, (0.0, 0.0), gap, t_max=5.0).theta[1]), 3)
+    angle = round(float(swing(chain, theta, (0.0, 0.0), gap, t_max=5.0).theta[1]), 3)
+    if abs(angle) > math.radians(60.0):
+        raise bad_value("H", H, f"AB would strike at {math.degrees(angle):.0f} deg, beyond the tip's fine end; raise H")
+    return angle
 
 
 def build(
@@ -151,7 +155,7 @@ def build(
     )
     rod, tip = aluminium(E_body, E_t_body), aluminium(E_tip, E_t_tip)
     tip_centre = (length - radius, 0.0, 0.0)
-    top = mca.Surface(body="plate", nodes="contact")
+    top = mca.Surface(body="plate", nodes="top")
     return mca.Scene(
         name="two_link",
         bodies=(
@@ -170,9 +174,7 @@ def build(
             mca.Revolute(name="A", body="OA", at=(length, 0.0, 0.0), other="AB", nodes=joint_nodes),  # pyright: ignore[reportArgumentType]
         ),
         contacts=(
-            mca.Contact(
-                slave=mca.Surface(body="AB", nodes="contact"), master=top, mu=mu, penalty=penalty, two_way=two_way
-            ),
+            mca.Contact(slave=mca.Surface(body="AB", nodes="tip"), master=top, mu=mu, penalty=penalty, two_way=two_way),
         ),
         fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
         gravity=(0.0, -gravity, 0.0),

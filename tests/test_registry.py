@@ -191,3 +191,11 @@ def test_build_must_return_a_scene(tmp_path: Path):
 def test_a_scene_that_does_not_exist_is_refused(name: str):
     with pytest.raises(RequestError, match=name):
         load_source(name)
+
+
+def test_error_in_a_users_build_is_one_sentence_with_its_line(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("def build():\n    return 1 / 0\n", encoding="utf-8")
+    source = load_source(str(path))
+    with pytest.raises(RequestError, match=r"broken.*ZeroDivisionError.*broken\.py, line 2"):
+        source.build({})

@@ -12,6 +12,7 @@ import inspect
 import math
 import pkgutil
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -173,9 +174,18 @@ class SceneSource:
         """The scene of these parameter values, which it keeps in `Scene.parameters`.
 
         Raises:
-            RequestError: the values contradict each other, or `build` returned something else than a scene.
+            RequestError: the values contradict each other, or `build` failed or returned something else than a scene.
         """
-        scene = self.builder(**values)
+        try:
+            scene = self.builder(**values)
+        except McaError:
+            raise
+        except Exception as error:  # whatever a user's own code may raise
+            line = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{Path(line.filename).name}, line {line.lineno}"
+            raise bad_value(
+                "scene", self.name, f"build() failed with {type(error).__name__}: {error} ({where})"
+            ) from error
         if not isinstance(scene, Scene):
             raise bad_value(f"{self.name}.build()", type(scene).__name__, "return a warp_mca.Scene")
         return dataclasses.replace(scene, parameters=dict(values))

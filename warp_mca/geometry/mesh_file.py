@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import meshio
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MeshFile:
     """A mesh from a file; nodes that no hexahedron uses are dropped.
 
