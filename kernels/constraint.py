@@ -65,8 +65,13 @@ def prescribe(
     u_out: wp.array(dtype=wp.vec3d),
     v_out: wp.array(dtype=wp.vec3d),
     work_out: wp.array(dtype=wp.float64),
+    work_after_out: wp.array(dtype=wp.float64),
 ):
-    """Set v(n+1/2) from a table at its own time; work_out [J] sums what the prescribed motion puts in."""
+    """Set v(n+1/2) from a table at its own time, and sum the work that this puts in.
+
+    The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
+    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step.
+    """
     k = wp.tid()
     i = node[k]
     c = axis[k]
@@ -77,9 +82,10 @@ def prescribe(
     v[c] = target
     u = u_out[i]
     u[c] = u[c] + dt * (target - free[c])
-    # the reaction acts at t(n), over the mean of the velocities before and after; before: the table half a step back
     before = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t - dt)
-    work_out[k] = work_out[k] + mass[i] * (target - free[c]) * wp.float64(0.5) * (target + before)
+    half_impulse = wp.float64(0.5) * mass[i] * (target - free[c])
+    work_out[k] = work_after_out[k] + half_impulse * before
+    work_after_out[k] = work_out[k] + half_impulse * target
     u_out[i] = u
     v_out[i] = v
 

@@ -71,16 +71,23 @@ def open_function(friction: bool) -> Any:
     """The function that clears the springs of a node that lost its contact."""
 
     @wp.func
-    def open_contact(s: int, k: wp.float64, spring: Spring):
-        if spring.face[s] >= 0:
-            if wp.static(friction):
-                spring.friction[s] = spring.friction[s] + release(spring.tangential[s], k)
-                spring.tangential[s] = wp.vec3d()
-            spring.energy[s] = wp.float64(0.0)
-            spring.force[s] = wp.vec3d()
-            spring.face[s] = -1
+    def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):
+        if wp.static(friction):
+            spring.friction[s] = spring.friction[s] + release(spring.tangential[s], du, k)
+            spring.tangential[s] = wp.vec3d()
+        spring.energy[s] = wp.float64(0.0)
+        spring.force[s] = wp.vec3d()
+        spring.face[s] = -1
 
     return open_contact
+
+
+@wp.func
+def master_velocity(
+    v: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int, weight: wp.vec4d
+) -> wp.vec3d:
+    """Velocity [m/s] of the point of face f at these shape functions."""
+    return interpolate(weight, v[face[f, 0]], v[face[f, 1]], v[face[f, 2]], v[face[f, 3]])
 
 
 @cache
@@ -148,13 +155,14 @@ def surface_kernel(friction: bool) -> Any:
         if best >= 0:
             if best_gap < wp.float64(-0.5) * best_size:
                 flag_out[TOO_DEEP] = 1
-            moving = interpolate(best_weight, v[face[best, 0]], v[face[best, 1]], v[face[best, 2]], v[face[best, 3]])
-            force = press(s, best_gap, best_normal, dt * (v[i] - moving), stiffness[s], mu, spring)
+            du = dt * (v[i] - master_velocity(v, face, best, best_weight))
+            force = press(s, best_gap, best_normal, du, stiffness[s], mu, spring)
             spring.face[s] = best
             spring.weight[s] = best_weight
             contact_force_out[i] = contact_force_out[i] + force
-        else:
-            open_contact(s, stiffness[s], spring)
+        elif spring.face[s] >= 0:
+            du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
+            open_contact(s, du, stiffness[s], spring)
 
     return touch_surface
 
@@ -212,20 +220,28 @@ def plane_kernel(friction: bool) -> Any:
         normal: wp.vec3d,
         velocity: wp.vec3d,
         mu: wp.float64,
+        deepest: wp.float64,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
+        flag_out: wp.array(dtype=wp.int32),
     ):
         s = wp.tid()
         i = slave[s]
         gap = wp.dot(X[i] - point + u[i], normal)
+        before = spring.tangential[s]
+        du = dt * (v[i] - velocity)
+        if gap < -deepest:
+            flag_out[TOO_DEEP] = 1
         if gap < wp.float64(0.0):
-            force = press(s, gap, normal, dt * (v[i] - velocity), stiffness[s], mu, spring)
+            force = press(s, gap, normal, du, stiffness[s], mu, spring)
             spring.face[s] = 0
-            spring.drive[s] = spring.drive[s] + dt * wp.dot(force, velocity)
             contact_force_out[i] = contact_force_out[i] + force
-        else:
-            open_contact(s, stiffness[s], spring)
+        elif spring.face[s] >= 0:
+            open_contact(s, du, stiffness[s], spring)
+        if wp.static(friction):  # work of the plane's own motion, trapezoidal as for slip
+            half = wp.float64(0.5)
+            spring.drive[s] = spring.drive[s] + half * dt * wp.dot(before + spring.tangential[s], velocity)
 
     return touch_plane
 

@@ -35,6 +35,9 @@ def stick_slip(
 
 
 @wp.func
-def release(f_old: wp.vec3d, k: wp.float64) -> wp.float64:
-    """Energy [J] that a tangential spring still held when its contact opened: it is lost, as if by slip."""
-    return wp.float64(0.5) * wp.dot(f_old, f_old) / k
+def release(f_old: wp.vec3d, du: wp.vec3d, k: wp.float64) -> wp.float64:
+    """Energy [J] that goes when a contact opens: what the tangential spring held, less its work over the last du [m].
+
+    It is the dissipation of `stick_slip` for a limit of zero.
+    """
+    return wp.float64(0.5) * wp.dot(f_old, f_old / k - du)

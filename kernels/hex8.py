@@ -339,6 +339,7 @@ def energy_kernel(precision: str, plastic: bool) -> Any:
         energy_out[0, first + e] = elastic + R(0.5) * law[m, 0] * dilation * dilation / volume
         energy_out[1, first + e] = dissipated
         energy_out[2, first + e] = largest
-        energy_out[3, first + e] = smallest
+        # an inverted element's Q is a reflection, which would hide the inversion in its own frame
+        energy_out[3, first + e] = smallest * wp.determinant(Q)
 
     return hex8_energy

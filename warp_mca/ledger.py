@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _FLAGS = (
     "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike",
     "a node outran the contact search; choose a smaller output_interval",
-    "a node sank deeper than half a face into its master; raise penalty, or refine the mesh",
+    "a node sank deeper than half a face into what it touches; raise penalty, or refine the mesh",
 )
 
 
@@ -52,11 +52,11 @@ class Ledger:
             GuardError: a record breaks a guard.
         """
         partial, velocity, flags, written = solver.records()
+        for raised, message in zip(flags, _FLAGS, strict=True):  # first: these explain what the sums would show
+            if raised:
+                raise GuardError(f"stopped before t = {(self.count + written) * self.interval:.4g} s: {message}")
         for row in range(written):
             self._add(partial[row], velocity[row])
-        for raised, message in zip(flags, _FLAGS, strict=True):
-            if raised:
-                raise GuardError(f"stopped before t = {self.count * self.interval:.4g} s: {message}")
 
     def _add(self, partial: Array, velocity: Array) -> None:
         from warp_mca.solver import JACOBIAN, STRAIN

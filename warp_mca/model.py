@@ -232,7 +232,7 @@ def _gather(blocks: tuple[Block, ...], node_count: int) -> tuple[Index, Index]:
 
 
 def _constraints(parts: _Assembly, V: Array) -> dict[str, NDArray]:
-    """Fixed axes as bits; driven axes, fixed ones that move included, as tables, because they do work."""
+    """Axes at rest as bits; driven axes, fixed ones that move included, as tables, because they do work."""
     fixed_axes = np.zeros(len(parts.X), dtype=np.int32)
     node, axis, table = [], [], []
     offset, time, value = [0], [], []
@@ -249,7 +249,7 @@ def _constraints(parts: _Assembly, V: Array) -> dict[str, NDArray]:
         nodes = parts.nodes(item.body, item.nodes)
         for letter in item.axes:
             k = "xyz".index(letter)
-            fixed_axes[nodes] |= 1 << k
+            fixed_axes[nodes[V[nodes, k] == 0.0]] |= 1 << k
             for speed in np.unique(V[nodes, k]):
                 if speed != 0.0:
                     drive(nodes[V[nodes, k] == speed], k, (0.0,), (float(speed),))

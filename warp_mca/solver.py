@@ -116,8 +116,8 @@ class ContactStage:
                 wp.vec3d(*(normal / np.linalg.norm(normal))),
                 wp.vec3d(*item.plane.velocity),
             ]
-            inputs = [X, u, v, self.slave, self.stiffness, *frame, item.mu, dt, self.spring]
-            wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force])
+            inputs = [X, u, v, self.slave, self.stiffness, *frame, item.mu, item.deepest, dt, self.spring]
+            wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force, flag])
             return
         inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
         inputs += [item.mu, item.margin, dt, self.spring]
@@ -198,6 +198,7 @@ class Solver:
         ]
         self.driven += [wp.array(value, dtype=wp.float64) for value in (model.table_time, model.table_value)]
         self.drive_work = wp.zeros(len(model.prescribed_node), dtype=wp.float64)
+        self.drive_work_after = wp.zeros(len(model.prescribed_node), dtype=wp.float64)
         self.step_count = wp.zeros(1, dtype=wp.int32)
 
     def _forces(self) -> None:
@@ -221,7 +222,7 @@ class Solver:
             wp.launch(constraint.rejoin, len(self.joint_first), inputs=inputs, outputs=outputs)
         if len(self.drive_work):
             inputs = [self.mass, *self.driven, self.step_count, self.dt]
-            outputs = [self.u, self.v, self.drive_work]
+            outputs = [self.u, self.v, self.drive_work, self.drive_work_after]
             wp.launch(constraint.prescribe, len(self.drive_work), inputs=inputs, outputs=outputs)
             wp.launch(constraint.advance_clock, 1, outputs=[self.step_count])
 
@@ -246,10 +247,10 @@ class Solver:
         for stage in self.contacts:
             self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
         wp.copy(self.v_before, self.v)
-        if len(self.drive_work):  # before the step adds what belongs to the time after the record
-            self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH)
         self._integrate(self.dt, self.dt)
         self._constrain()
+        if len(self.drive_work):
+            self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH)
         gravity = wp.vec3d(*self.model.gravity)
         self._sum(ledger.sum_nodes, self.mass, gravity, self.u, self.v_before, self.v, self.dt, self.row, SUM_WIDTH)
         inputs = [self.point_node, self.v_before, self.v, self.row]

@@ -53,6 +53,7 @@ class ContactPass:
         master: their nodes, shape (master_count,), int32.
         face_offset, face_of_node: faces around each master node, compressed rows, int32.
         margin: that the search looks ahead [m].
+        deepest: penetration of a plane that stops the run [m]; faces have half their own size.
     """
 
     slave: Index
@@ -66,6 +67,7 @@ class ContactPass:
     face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
     face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32))
     margin: float = 0.0
+    deepest: float = 0.0
 
 
 def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
@@ -126,9 +128,9 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
         assert isinstance(contact.master, RigidPlane)
         nodes = slave.nodes
         stiffness = contact.penalty * _node_mean(nodes, slave, slave.stiffness)
-        return [
-            ContactPass(slave=nodes, stiffness=stiffness, mu=contact.mu, sign=1.0, contact=index, plane=contact.master)
-        ]
+        deepest = 0.5 * float(np.sqrt(slave.area.mean()))
+        common = {"slave": nodes, "stiffness": stiffness, "mu": contact.mu, "contact": index}
+        return [ContactPass(**common, sign=1.0, plane=contact.master, deepest=deepest)]
     passes = [_surface_pass(contact, index, slave, master, 1.0)]
     if contact.two_way:
         passes.append(_surface_pass(contact, index, master, slave, -1.0))
