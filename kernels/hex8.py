@@ -68,7 +68,7 @@ def edge_functions(precision: str) -> tuple[Any, Any]:
 
 @cache
 def frame_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that take an element to its rotated frame: (rotation Q, local displacements)."""
+    """Functions that take an element to its rotated frame: (rotation as W = Q - I, local displacements)."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
     half_edges, _ = edge_functions(precision)
@@ -92,12 +92,11 @@ def frame_functions(precision: str) -> tuple[Any, Any]:
         return polar_rotation(wp.identity(n=3, dtype=R) + inverse * grad)
 
     @wp.func
-    def local_displacement(X: mat83, u: mat83, Q: mat33):
-        Qt = wp.transpose(Q)
-        turn = Qt - wp.identity(n=3, dtype=R)
+    def local_displacement(X: mat83, u: mat83, W: mat33):
+        Wt = wp.transpose(W)
         local = mat83()
         for a in range(8):
-            local[a] = turn * X[a] + Qt * u[a]
+            local[a] = u[a] + Wt * (X[a] + u[a])  # Q^T (X + u) - X, without the digits that would cancel
         return local
 
     return element_rotation, local_displacement
@@ -199,8 +198,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         e = wp.tid()
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        Q = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, Q)
+        W = element_rotation(Xl, ul)
+        ul = local_displacement(Xl, ul, W)
         gx = to_gauss(half_edges(Xl, 0))
         gy = to_gauss(half_edges(Xl, 1))
         gz = to_gauss(half_edges(Xl, 2))
@@ -265,7 +264,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         f = edge_to_node(Fx, Fy, Fz)
         count = conn.shape[1]
         for a in range(8):
-            force_out[slot + a * count + e] = Q * f[a]
+            force_out[slot + a * count + e] = f[a] + W * f[a]
 
     return hex8_force
 
@@ -296,8 +295,8 @@ def energy_kernel(precision: str, plastic: bool) -> Any:
         e = wp.tid()
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        Q = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, Q)
+        W = element_rotation(Xl, ul)
+        ul = local_displacement(Xl, ul, W)
         gx = to_gauss(half_edges(Xl, 0))
         gy = to_gauss(half_edges(Xl, 1))
         gz = to_gauss(half_edges(Xl, 2))
@@ -340,6 +339,6 @@ def energy_kernel(precision: str, plastic: bool) -> Any:
         energy_out[1, first + e] = dissipated
         energy_out[2, first + e] = largest
         # an inverted element's Q is a reflection, which would hide the inversion in its own frame
-        energy_out[3, first + e] = smallest * wp.determinant(Q)
+        energy_out[3, first + e] = smallest * wp.determinant(identity + W)
 
     return hex8_energy

@@ -12,14 +12,16 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def nearest_rotation(precision: str) -> Any:
-    """The function F -> Q with F = Q U, by Higham's iteration Q <- (Q + Q^-T) / 2.
+    """The function F -> W = Q - I with F = Q U.
 
-    It acts on the singular values only and squares their distance from one: a stretch of 10 % falls to 7e-11 in
-    four iterations, below float32's rounding in three. Higham, SIAM J. Sci. Stat. Comput. 7 (1986) 1160.
+    Higham's iteration Q <- (Q + Q^-T) / 2 (SIAM J. Sci. Stat. Comput. 7 (1986) 1160) acts on the singular values only
+    and squares their distance from one. A last step by Newton and Schulz, Q <- Q (I - (Q^T Q - I) / 2), works on W, so
+    that its rounding is as small as W: rods that turned by 0.01 rad would otherwise carry strains of float32's 6e-8,
+    whose forces heat a stiff body. A stretch of 10 % ends at 1e-10 in mixed and below rounding in float64.
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    iterations = 3 if precision == "mixed" else 4
+    iterations = 2 if precision == "mixed" else 3
 
     @wp.func
     def polar_rotation(F: mat33):
@@ -34,6 +36,8 @@ def nearest_rotation(precision: str) -> Any:
             half = R(0.5) / wp.dot(r0, k0)
             cofactor = mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
             Q = R(0.5) * Q + half * cofactor
-        return Q
+        W = Q - wp.identity(n=3, dtype=R)
+        excess = R(0.5) * (W + wp.transpose(W) + wp.transpose(W) * W)
+        return W - excess - W * excess
 
     return polar_rotation

@@ -73,8 +73,8 @@ class Model:
         contact_axes: normal and tangent of each contact [-], shape (contact_count, 2, 3), float64.
         gravity: [m/s^2], shape (3,), float64.
         points: nodes whose velocity is recorded (tip, target), shape (2,), int32; GROUND where there is none.
-        node_start, element_start: first node and element of each body, by name; elements in the model's order are
-            listed in element_of, shape (element_count,), int32, as positions in the concatenated meshes.
+        node_start, element_start: first node and element of each body in the concatenated meshes, by name.
+        element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
     """
 
