@@ -38,7 +38,7 @@ def face_tangents(xi: wp.float64, eta: wp.float64, a: wp.vec3d, b: wp.vec3d, c: 
 def closest_point(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d) -> wp.vec2d:
     """Natural coordinates of the point of the (extended) face nearest to x, by Newton's method.
 
-    Six iterations: it is quadratic, and exact in one on a parallelogram. Iterates stay within [-2, 2].
+    At most six iterations: it is quadratic, and exact in one on a parallelogram. Iterates stay within [-2, 2].
     """
     xi = wp.float64(0.0)
     eta = wp.float64(0.0)
@@ -56,6 +56,11 @@ def closest_point(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3
             h01 = wp.dot(along_xi, along_eta)
             det = h00 * h11 - h01 * h01
         two = wp.float64(2.0)
-        xi = wp.clamp(xi + (h11 * g0 - h01 * g1) / det, -two, two)
-        eta = wp.clamp(eta + (h00 * g1 - h01 * g0) / det, -two, two)
+        xi_new = wp.clamp(xi + (h11 * g0 - h01 * g1) / det, -two, two)
+        eta_new = wp.clamp(eta + (h00 * g1 - h01 * g0) / det, -two, two)
+        moved = wp.abs(xi_new - xi) + wp.abs(eta_new - eta)
+        xi = xi_new
+        eta = eta_new
+        if moved < wp.float64(1e-9):  # the next step would be its square
+            break
     return wp.vec2d(xi, eta)
