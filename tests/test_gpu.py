@@ -1,0 +1,54 @@
+"""What only a CUDA device can show: the same figures as on the CPU, bit for bit from run to run."""
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+
+pytestmark = pytest.mark.gpu
+
+
+def oblique(mu: float = 0.4) -> mca.Scene:
+    """A box that yields flies aslant into a larger one, with friction from both sides, above a held face."""
+    metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)
+    return mca.Scene(
+        name="oblique",
+        bodies=(
+            mca.Body(
+                name="small",
+                geometry=mca.Box(size=(0.02, 0.02, 0.02), divisions=(6, 6, 6), origin=(-0.011, 0.0, -0.012)),
+                material=metal,
+                velocity=(1.0, -3.0, 0.5),
+            ),
+            mca.Body(
+                name="large",
+                geometry=mca.Box(size=(0.06, 0.03, 0.06), divisions=(10, 5, 10), origin=(-0.03, -0.03, -0.03)),
+                material=metal,
+            ),
+        ),
+        contacts=(
+            mca.Contact(
+                slave=mca.Surface(body="small", nodes="ymin"),
+                master=mca.Surface(body="large", nodes="ymax"),
+                mu=mu,
+                two_way=True,
+            ),
+        ),
+        fixed=(mca.Fixed(body="large", nodes="ymin"),),
+        gravity=(0.0, -9.8, 0.0),
+        impact=mca.ImpactPhase(duration=2e-5, output_interval=1e-6),
+        tip=mca.Point(body="small", at=(0.0, 0.01, 0.0)),
+    )
+
+
+@pytest.mark.parametrize(("precision", "tolerance"), [("mixed", 1e-4), ("float64", 1e-9)])
+def test_device_gives_the_figures_of_the_cpu(precision, tolerance):
+    cpu, cuda = (mca.run(oblique(), device=device, precision=precision) for device in ("cpu", "cuda:0"))
+    assert cpu.summary["max_plastic_strain"] > 1e-4
+    for name in ("F_n_N", "F_t_N", "tip_vx", "E_kinetic", "E_plastic", "E_friction"):
+        assert cuda[name] == pytest.approx(cpu[name], abs=tolerance * np.abs(cpu[name]).max())
+
+
+def test_device_repeats_bit_for_bit():
+    one, two = (mca.run(oblique(), device="cuda:0") for _ in range(2))
+    assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one.history)
