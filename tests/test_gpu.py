@@ -41,8 +41,9 @@ def oblique(mu: float = 0.4) -> mca.Scene:
     )
 
 
-@pytest.mark.parametrize(("precision", "tolerance"), [("mixed", 1e-4), ("float64", 1e-9)])
+@pytest.mark.parametrize(("precision", "tolerance"), [("mixed", 1e-4), ("float64", 1e-7)])
 def test_device_gives_the_figures_of_the_cpu(precision, tolerance):
+    """Contacts and yield switch: a change of 1e-15 in the initial velocity moves the forces by 1e-8."""
     cpu, cuda = (mca.run(oblique(), device=device, precision=precision) for device in ("cpu", "cuda:0"))
     assert cpu.summary["max_plastic_strain"] > 1e-4
     for name in ("F_n_N", "F_t_N", "tip_vx", "E_kinetic", "E_plastic", "E_friction"):
