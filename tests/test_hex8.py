@@ -1,16 +1,16 @@
 """The hexahedron against an independent NumPy element, the patch test, rigid rotation and its own energy."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
 import pytest
 import warp as wp
+from scipy.spatial.transform import Rotation
 
 from warp_mca.element import eigenvalue_bounds, gradients, largest_eigenvalues, lumped_masses
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels import hex8
+from warp_mca.kernels.rotation import nearest_rotation
 from warp_mca.kernels.scalars import scalars
 from warp_mca.timestep import stable_step
 
@@ -88,6 +88,48 @@ def test_rigid_motion_leaves_no_force(precision, tolerance):
     force, energy = launch(x, np.arange(8)[None], x @ turn.T - x + [3.0, -1.0, 2.0], precision)
     assert np.abs(force).max() < tolerance * 10.0 * K
     assert energy[0, 0] < (tolerance * 10.0) ** 2 * K
+
+
+@pytest.mark.parametrize(("precision", "digits"), [("mixed", 2e-7), ("float64", 1e-15)])
+@pytest.mark.parametrize("angle", [1e-3, 1.0])
+def test_rotation_is_the_polar_factor_to_rounding_of_its_own_size(angle, precision, digits):
+    """Of gradients with a stretch of up to 10 %."""
+    t = scalars(precision)
+    rotation = nearest_rotation(precision)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def turn(F: wp.array(dtype=t.mat33), W_out: wp.array(dtype=t.mat33)):
+        i = wp.tid()
+        W_out[i] = rotation(F[i])
+
+    rng = np.random.default_rng(11)
+    Q = Rotation.from_rotvec(angle * np.array([0.6, 0.0, 0.8])).as_matrix()
+    frames = Rotation.random(50, rng=rng).as_matrix()
+    stretch = np.einsum("nij,nj,nkj->nik", frames, 1.0 + 0.1 * min(angle, 1.0) * rng.uniform(-1, 1, (50, 3)), frames)
+    out = wp.full(50, np.nan, dtype=t.mat33, device="cpu")
+    wp.launch(turn, 50, inputs=[wp.array(Q @ stretch, dtype=t.mat33, device="cpu")], outputs=[out], device="cpu")
+    assert out.numpy() == pytest.approx(np.broadcast_to(Q - np.eye(3), (50, 3, 3)), abs=6.0 * digits * angle + 4e-16)
+
+
+def test_forces_turn_with_the_element():
+    """Strain it, then turn it: the forces are the turned forces, to round-off."""
+    rng = np.random.default_rng(9)
+    x = CUBE + rng.uniform(-0.1, 0.1, (8, 3))
+    u = rng.normal(0.0, 1e-2, (8, 3))
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    still, energy = launch(x, np.arange(8)[None], u, "float64")
+    turned, same = launch(x, np.arange(8)[None], (x + u) @ turn.T - x, "float64")
+    assert turned == pytest.approx(still @ turn.T, abs=1e-12 * np.abs(still).max())
+    assert same[:, 0] == pytest.approx(energy[:, 0], rel=1e-12)
+
+
+def test_mirrored_element_counts_as_inverted():
+    """Its stretch is one, so that only the reflection tells."""
+    x = CUBE + np.random.default_rng(10).uniform(-0.1, 0.1, (8, 3))
+    for precision in ("mixed", "float64"):
+        _, energy = launch(x, np.arange(8)[None], x * [-2.0, 0.0, 0.0], precision)
+        assert energy[3, 0] == pytest.approx(-1.0, rel=1e-5)
 
 
 def test_patch_of_distorted_hexahedra_carries_constant_strain():

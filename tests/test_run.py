@@ -89,6 +89,24 @@ def test_step_beyond_the_limit_blows_up_and_is_caught(monkeypatch):
         mca.run(scene)
 
 
+def test_free_fall_is_a_parabola_to_the_last_digit(monkeypatch):
+    """Central differences are exact for it, if they start from the velocity of half a step before t = 0."""
+    last = {}
+    monkeypatch.setattr("warp_mca.solver.Solver.max_plastic_strain", lambda self: last.update(u=self.u.numpy()) or 0.0)
+    falling = mca.Scene(**{**vars(bar()), "contacts": (), "gravity": (0.0, -1e4, 0.0)})
+    result = mca.run(falling)
+    t = 1.2e-4 + result.summary["dt"]
+    assert last["u"] == pytest.approx(np.broadcast_to([t, -0.5e4 * t**2, 0.0], (404, 3)), rel=1e-10)
+    assert result.summary["energy_error"] < 1e-12
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_overflow_of_the_elements_precision_stops_the_run():
+    """Stress of 1e39 Pa is beyond float32."""
+    with pytest.raises(mca.GuardError, match="not a number"):
+        mca.run(bar(mca.Elastic(E=1e39, nu=0.0, rho=2700e28)), duration=1e-6)
+
+
 def test_energy_tolerance_stops_the_run():
     with pytest.raises(mca.GuardError, match=r"energy imbalance .* exceeds energy_tolerance = 1e-09"):
         mca.run(bar(energy_tolerance=1e-9))

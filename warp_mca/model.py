@@ -322,9 +322,25 @@ def _joints(parts: _Assembly) -> tuple[Index, Index, tuple[Hinge, ...]]:
     if not first:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), ()
     pairs = np.concatenate(first), np.concatenate(second)
-    if len(np.unique(pairs[0])) < len(pairs[0]):
-        raise RequestError("Scene.joints: a node is tied twice; give each joint an axis of its own")
+    tied = np.concatenate([pairs[0], pairs[1][pairs[1] != GROUND]])
+    if len(np.unique(tied)) < len(tied):
+        raise RequestError("Scene.joints: a node is tied twice; give each joint, of two bodies, an axis of its own")
     return pairs[0].astype(np.int32), pairs[1].astype(np.int32), tuple(hinges)
+
+
+def _check_bindings(held: dict[str, NDArray], first: Index, second: Index) -> None:
+    """Refuse nodes that are bound twice: each stage would undo what the other set.
+
+    Raises:
+        RequestError: an axis is driven twice, or fixed and driven; a hinge's node is fixed or driven.
+    """
+    node, axis = held["prescribed_node"], held["prescribed_axis"]
+    if len(np.unique(3 * node + axis)) < len(node) or ((held["fixed_axes"][node] >> axis) & 1).any():
+        raise RequestError("Scene.prescribed: an axis of a node is bound twice; drive or fix it once")
+    bound = held["fixed_axes"] != 0
+    bound[node] = True
+    if bound[first].any() or bound[second[second != GROUND]].any():
+        raise RequestError("Scene.joints: a node on a hinge is also fixed or driven; bind other nodes of that body")
 
 
 def _contacts(parts: _Assembly) -> tuple[tuple[ContactPass, ...], Array, Array]:
@@ -359,13 +375,15 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
     """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
 
     Raises:
-        RequestError: joints whose nodes do not coincide, unknown sets, cells without material.
+        RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
     parts = _Assembly(scene, meshes, X)
     first, second, hinges = _joints(parts)
     blocks, order = parts.blocks()
     offset, slot = _gather(blocks, len(parts.X))
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
+    held = _constraints(parts, velocity)
+    _check_bindings(held, first, second)
     passes, axes, added = _contacts(parts)
     stable = stable_step(parts.X[parts.hexahedra], parts.K, parts.G, parts.element_mass, added)
     return Model(
@@ -376,7 +394,7 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         law=parts.law(),
         gather_offset=offset,
         gather_slot=slot,
-        **_constraints(parts, velocity),
+        **held,
         joint_first=first,
         joint_second=second,
         hinges=hinges,
