@@ -140,7 +140,7 @@ class Ledger:
         stored = energy["elastic"] + energy["plastic"]
         balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
         return {
-            "time_s": self.interval * np.arange(len(table)),
+            "time_s": self.interval * np.arange(len(table), dtype=np.float64),
             "F_n_N": F_n,
             "F_t_N": F_t,
             "stick_fraction": stick,
