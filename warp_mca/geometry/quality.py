@@ -5,16 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.element import jacobians
 from warp_mca.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 
 # The three neighbours of each corner, ordered so that the edges towards them are right-handed.
 _NEIGHBOURS = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
 _EDGES = np.array([[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3], [1, 2, 3, 0, 5, 6, 7, 4, 4, 5, 6, 7]])
-# Natural coordinates of the corners, shape (8, 3).
-_CORNERS = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float
-)
 
 
 def corner_edges(mesh: Mesh) -> NDArray[np.float64]:
@@ -35,13 +32,7 @@ def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
 
 def gauss_jacobians(mesh: Mesh) -> NDArray[np.float64]:
     """Jacobian determinants at the 2 x 2 x 2 Gauss points [m^3], shape (element_count, 8)."""
-    natural = _CORNERS / np.sqrt(3.0)
-    factors = 1.0 + natural[:, None, :] * _CORNERS[None, :, :]  # (Gauss point, corner, direction)
-    gradients = np.empty((8, 3, 8))
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        gradients[:, i, :] = 0.125 * _CORNERS[:, i] * factors[:, :, j] * factors[:, :, k]
-    jacobians = np.einsum("gic,ecj->egij", gradients, mesh.points[mesh.hexahedra])
-    return np.linalg.det(jacobians)
+    return np.linalg.det(jacobians(mesh.points[mesh.hexahedra]))
 
 
 def volumes(mesh: Mesh) -> NDArray[np.float64]:
