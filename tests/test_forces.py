@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
-from warp_mca.report.forces import plot_forces, save_forces
+from warp_mca.report.forces import compression_phases, plot_forces, save_forces
+from warp_mca.report.style import STICK
 from warp_mca.results import HISTORY_COLUMNS, Result
 
 TIME = np.arange(1, 501) * 1e-6
@@ -36,9 +38,23 @@ def test_forces_are_drawn_over_time_in_a_fitting_unit(peak: float, unit: str, sh
 
 def test_sticking_is_shaded_in_both_panels():
     for axes in plot_forces(result(3000.0)).axes:
-        (shade,) = axes.patches
+        (shade,) = (patch for patch in axes.patches if patch.get_facecolor()[:3] == to_rgb(STICK))
         assert shade.get_x() == pytest.approx(0.1)
         assert shade.get_width() == pytest.approx(0.1)
+
+
+def test_compression_and_restitution_follow_the_tip_s_velocity():
+    run = result(3000.0)
+    run.history["tip_vy"] = -np.cos(2 * np.pi * TIME / 4e-4)  # towards the plate before 0.1 and after 0.3 ms
+    compression, restitution = compression_phases(run)
+    assert compression == [pytest.approx((0.0, 1e-4), abs=2e-6), pytest.approx((3e-4, 4e-4), abs=2e-6)]
+    assert restitution == [pytest.approx((1e-4, 3e-4), abs=2e-6)]
+
+
+def test_without_a_tip_there_are_no_phases():
+    run = result(3000.0)
+    run.history["tip_vy"] = np.full(len(TIME), np.nan)
+    assert compression_phases(run) == ([], [])
 
 
 def test_equal_runs_give_equal_files(tmp_path: Path):

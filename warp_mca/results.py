@@ -32,7 +32,7 @@ HISTORY_COLUMNS = (
     "E_friction",
     "E_total_error",
 )
-FILES = ("summary.json", "history.csv", "forces.png")
+FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
 
 
 def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
-    """Write summary.json, history.csv and forces.png, all or none of them.
+    """Write summary.json, history.csv, forces.png and energies.png, all or none of them.
 
     Args:
         result: of a run.
@@ -184,6 +184,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     Raises:
         RequestError: as in `check_output`.
     """
+    from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
 
     path = check_output(directory, force=force)
@@ -193,6 +194,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         begun = time.perf_counter()
         _write_history(staging / "history.csv", result.history)
         save_forces(staging / "forces.png", result)
+        save_energies(staging / "energies.png", result)
         result = _with_output_time(result, path, time.perf_counter() - begun)
         summary = {**result.summary, "warnings": list(result.warnings)}
         (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")

@@ -127,7 +127,7 @@ def run(
         device: "cpu" or a CUDA device as "cuda:0".
         precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
         duration: of the impact phase [s]; the scene's own if None.
-        out: folder for summary.json, history.csv and forces.png; nothing is written if None.
+        out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
         meshes: finished meshes by body, to save making them again.
         progress: called with a stage and the share of it that is done.

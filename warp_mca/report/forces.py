@@ -1,4 +1,8 @@
-"""Owns forces.png: contact forces over time with the sticking shaded, and the velocities of tip and plate below."""
+"""Owns forces.png: contact forces over time with the phases of contact, and the velocities of tip and plate below.
+
+Phases are shown as in Fig. 12 of the paper: times of sticking are shaded over the full height; a strip at the bottom
+tells compression from restitution.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.history import contact_intervals, stick_intervals
+from warp_mca.history import Interval, contact_intervals, interval_edges, intervals, stick_intervals
+from warp_mca.report.style import BLACK, BLUE, STICK, VERMILION, legend_beside, new_figure, save_png, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,29 +21,42 @@ if TYPE_CHECKING:
 
     from warp_mca.results import Result
 
-# Okabe and Ito's colours, told apart by colour-blind readers; line styles tell them apart in grey print.
-BLUE, VERMILION, BLACK = "#0072B2", "#D55E00", "#222222"
-STICK = "#F0E442"
+COMPRESSION, RESTITUTION = "#5A5A5A", "#BDBDBD"
+STRIP = 0.035  # height of the strip of phases, as a share of the axes
+SMOOTHING = 2e-6  # standard deviation of the Gaussian that takes the tip node's ringing out of its velocity [s]
+
+
+def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
+    """Times of compression and of restitution [s].
+
+    In contact, the bodies are compressed while the tip moves towards the plate, tip_vy < 0; otherwise they restitute.
+    Both lists are empty when the scene has no tip.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    time, velocity = result.time, result["tip_vy"]
+    if len(time) < 2 or not np.isfinite(velocity).all():
+        return [], []
+    touching = np.zeros(len(time), dtype=bool)
+    for start, end in contact_intervals(time, result.F_n):
+        touching |= (time > start) & (time <= end)
+    sigma = SMOOTHING / float(np.median(np.diff(interval_edges(time))))
+    closing = gaussian_filter1d(velocity, sigma, mode="nearest") < 0.0
+    return intervals(time, touching & closing, 0.0), intervals(time, touching & ~closing, 0.0)
 
 
 def plot_forces(result: Result) -> Figure:
     """The figure: F_n and F_t [N or kN] above, tip and plate velocities [m/s] below, over time [ms]."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 5.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(7.0, 5.6)
     forces, velocities = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    _shade_sticking(forces, result, label="sticking")
-    _shade_sticking(velocities, result)
+    _shade_phases(forces, result, labelled=True)
+    _shade_phases(velocities, result)
     _draw_forces(forces, result)
     _draw_velocities(velocities, result)
     figure.align_ylabels()
     for axes in (forces, velocities):
-        axes.grid(color="0.88", linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        tidy(axes)
+        legend_beside(axes)
     velocities.set_xlabel("time after first contact [ms]")
     velocities.set_xlim(0.0, 1e3 * float(result.time[-1]) if len(result.time) else 1.0)
     forces.set_title(_title(result), loc="left", fontsize=10)
@@ -47,15 +65,20 @@ def plot_forces(result: Result) -> Figure:
 
 def save_forces(path: str | os.PathLike[str], result: Result) -> Path:
     """Write the figure to `path` as PNG at 200 dots per inch."""
-    # Without the date and version that matplotlib adds, equal runs give equal files.
-    plot_forces(result).savefig(path, dpi=200, metadata={"Software": None})
-    return Path(path)
+    return save_png(plot_forces(result), path)
 
 
-def _shade_sticking(axes: Axes, result: Result, label: str | None = None) -> None:
-    for start, end in stick_intervals(result.time, result.F_n, result["stick_fraction"]):
-        axes.axvspan(1e3 * start, 1e3 * end, color=STICK, alpha=0.45, linewidth=0, label=label)
-        label = None
+def _shade_phases(axes: Axes, result: Result, labelled: bool = False) -> None:
+    compression, restitution = compression_phases(result)
+    sticking = stick_intervals(result.time, result.F_n, result["stick_fraction"])
+    for spans, label, style in (
+        (sticking, "sticking", dict(color=STICK, alpha=0.45)),
+        (compression, "compression", dict(color=COMPRESSION, ymax=STRIP)),
+        (restitution, "restitution", dict(color=RESTITUTION, ymax=STRIP)),
+    ):
+        for k, (start, end) in enumerate(spans):
+            name = label if labelled and k == 0 else None
+            axes.axvspan(1e3 * start, 1e3 * end, linewidth=0, label=name, **style)  # pyright: ignore[reportArgumentType]
 
 
 def _draw_forces(axes: Axes, result: Result) -> None:
@@ -65,6 +88,7 @@ def _draw_forces(axes: Axes, result: Result) -> None:
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.plot(time, scale * result.F_n, color=BLUE, label=r"$F_n$", linewidth=1.4)
     axes.plot(time, scale * result.F_t, color=VERMILION, linestyle="--", label=r"$F_t$", linewidth=1.4)
+    axes.margins(y=0.08)
     axes.set_ylabel(f"contact force [{unit}]")
 
 
@@ -75,6 +99,7 @@ def _draw_velocities(axes: Axes, result: Result) -> None:
     axes.plot(time, result["plate_vx"], color=BLACK, label=r"plate $v_x$", linewidth=0.7)
     axes.plot(time, result["tip_vx"], color=VERMILION, linestyle="--", label=r"tip $v_x$", linewidth=1.4)
     axes.plot(time, result["tip_vy"], color=BLUE, label=r"tip $v_y$", linewidth=1.4)
+    axes.margins(y=0.08)
     axes.set_ylabel("velocity [m/s]")
 
 

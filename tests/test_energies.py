@@ -1,0 +1,42 @@
+"""The energy figure shows what the history holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warp_mca.report.energies import plot_energies, save_energies
+from warp_mca.report.style import engineering
+from warp_mca.results import HISTORY_COLUMNS, Result
+
+TIME = np.arange(1, 401) * 1e-6
+
+
+def result() -> Result:
+    """2 J of kinetic energy, half of which turns into elastic energy, friction and plastic work in equal parts."""
+    share = np.clip(TIME / TIME[-1], 0.0, 1.0) / 3.0
+    energy = {"E_kinetic": 2.0 - 3.0 * share, "E_internal": 2.0 * share, "E_plastic": share, "E_friction": share}
+    history = {name: np.zeros(len(TIME)) for name in HISTORY_COLUMNS} | {"time_s": TIME} | energy
+    return Result({"scene": "toy"}, history | {"E_total_error": 1e-6 * share})
+
+
+def test_energies_are_drawn_in_a_fitting_unit_and_split_into_elastic_and_plastic():
+    energies, balance = plot_energies(result()).axes
+    assert energies.get_ylabel() == "energy [mJ]"
+    assert balance.get_ylabel() == "error [µJ]"
+    assert balance.get_xlabel() == "time after first contact [ms]"
+    last = {line.get_label(): line.get_ydata()[-1] for line in energies.lines}
+    assert last["elastic"] == pytest.approx(1e3 / 3.0)
+    assert last["plastic work"] == pytest.approx(1e3 / 3.0)
+    assert last["kinetic, change"] == pytest.approx(-1e3, rel=0.01)
+
+
+def test_file_is_a_png(tmp_path):
+    assert save_energies(tmp_path / "energies.png", result()).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("greatest", "expected"), [(2e3, (1e-3, "kN")), (30.0, (1.0, "N")), (2e-3, (1e3, "mN")), (0.0, (1.0, "N"))]
+)
+def test_units_suit_the_greatest_value(greatest, expected):
+    assert engineering(greatest, "N") == expected

@@ -1,0 +1,54 @@
+"""Owns the look of every figure: colours that survive colour-blind eyes and grey print, and how a PNG is written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, told apart by colour-blind readers; line styles tell them apart in grey print.
+BLUE, VERMILION, BLACK = "#0072B2", "#D55E00", "#222222"
+GREEN, SKY, ORANGE, PURPLE = "#009E73", "#56B4E9", "#E69F00", "#CC79A7"
+STICK = "#F0E442"
+DOTS_PER_INCH = 200
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of `width` by `height` [inch] that draws without a display."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def tidy(axes: Axes) -> None:
+    """Light grid behind the lines, open frame."""
+    axes.grid(color="0.88", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def legend_beside(axes: Axes) -> None:
+    """The legend on the right of the axes, where it hides no line."""
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+
+
+def save_png(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write the figure to `path` as PNG at 200 dots per inch."""
+    # Without the date and version that matplotlib adds, equal runs give equal files.
+    figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return Path(path)
+
+
+def engineering(greatest: float, unit: str) -> tuple[float, str]:
+    """Factor and unit that bring `greatest` [unit] to a number of few digits: (1e-3, "kN") for 2000 N."""
+    for limit, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m")):
+        if abs(greatest) >= limit:
+            return 1.0 / limit, prefix + unit
+    return (1e6, "µ" + unit) if greatest else (1.0, unit)
