@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from flying_bars import FlyingBars
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -16,3 +17,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if not warp.is_cuda_available():
         for item in marked:
             item.add_marker(pytest.mark.skip(reason="needs a CUDA device"))
+
+
+@pytest.fixture
+def bars() -> FlyingBars:
+    """A scene for recorders, without a run."""
+    return FlyingBars()

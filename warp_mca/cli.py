@@ -1,4 +1,4 @@
-"""Owns the command line: warp-mca run | build | scenes.
+"""Owns the command line: warp-mca run | build | scenes | view.
 
 Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 130 interrupted.
 """
@@ -106,6 +106,10 @@ def _parser() -> argparse.ArgumentParser:
     scenes = commands.add_parser("scenes", help="list scenes, presets and parameters", allow_abbrev=False)
     scenes.add_argument("scene", nargs="*", metavar="SCENE", help="name or Python file (default: all built-in ones)")
     scenes.set_defaults(command=_scenes)
+
+    view = commands.add_parser("view", help="open a recording in the rerun viewer", allow_abbrev=False)
+    view.add_argument("recording", metavar="DIR_OR_FILE", type=Path, help=".rrd file, or a folder that holds some")
+    view.set_defaults(command=_view)
     return parser
 
 
@@ -196,3 +200,9 @@ def _scenes(args: argparse.Namespace) -> None:
     from warp_mca.report.console import print_scenes
 
     print_scenes([registry.load_source(name) for name in args.scene or registry.scene_names()])
+
+
+def _view(args: argparse.Namespace) -> None:
+    from warp_mca.recorders.rerun_viewer import view
+
+    view(args.recording)

@@ -1,0 +1,160 @@
+"""Tests the pictures of a run other than its forces: what they show, with which units, and that they are PNG."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
+from warp_mca.report.energies import plot_energies, save_energies
+from warp_mca.report.paths import PathStress, plot_paths, plot_waves, save_paths, wave_speeds
+from warp_mca.report.snapshot import Skin, plot_snapshot, save_snapshot
+from warp_mca.report.style import engineering
+from warp_mca.results import HISTORY_COLUMNS, Result
+from warp_mca.scene import Elastic
+
+TIME = np.arange(1, 401) * 1e-6
+ALUMINIUM = Elastic(E=70e9, nu=0.27, rho=2700.0)
+
+
+def assert_png(path: Path) -> None:
+    """A PNG that is neither empty nor too large for a report."""
+    content = path.read_bytes()
+    assert content.startswith(b"\x89PNG")
+    assert 10_000 < len(content) < 500_000
+
+
+def result() -> Result:
+    """2 J of kinetic energy, half of which turns into elastic energy, friction and plastic work in equal parts."""
+    share = np.clip(TIME / TIME[-1], 0.0, 1.0) / 3.0
+    energy = {"E_kinetic": 2.0 - 3.0 * share, "E_internal": 2.0 * share, "E_plastic": share, "E_friction": share}
+    history = {name: np.zeros(len(TIME)) for name in HISTORY_COLUMNS} | {"time_s": TIME} | energy
+    return Result({"scene": "toy"}, history | {"E_total_error": 1e-6 * share})
+
+
+def pulse(speed: float, name: str = "Path 2") -> PathStress:
+    """Stress of 30 MPa that travels along 0.4 m at `speed` [m/s]."""
+    position = np.linspace(0.0, 0.4, 81)
+    return PathStress(name, position, 30e6 * np.exp(-(((position - speed * TIME[:, None]) / 0.02) ** 2)))
+
+
+def cube() -> Skin:
+    """Unit cube of 1 m with 100 MPa on the face towards +z."""
+    points = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
+    quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+    return Skin(points, quads, np.where(points[:, 2] > 0.5, 100e6, 0.0))
+
+
+def test_energies_are_drawn_in_a_fitting_unit_and_split_into_elastic_and_plastic():
+    energies, balance = plot_energies(result()).axes
+    assert energies.get_ylabel() == "energy [mJ]"
+    assert balance.get_ylabel() == "error [µJ]"
+    assert balance.get_xlabel() == "time after first contact [ms]"
+    last = {line.get_label(): line.get_ydata()[-1] for line in energies.lines}
+    assert last["elastic"] == pytest.approx(1e3 / 3.0)
+    assert last["plastic work"] == pytest.approx(1e3 / 3.0)
+    assert last["kinetic, change"] == pytest.approx(-1e3, rel=0.01)
+    assert energies.get_title(loc="left") == "toy: kinetic energy at first contact 1.998 J"
+
+
+def test_paths_are_drawn_at_the_chosen_instants():
+    paths = [pulse(5092.0, f"Path {k}") for k in (1, 2, 3)]
+    figure = plot_paths(TIME, paths, instants=(20e-6, 40e-6))
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["Path 1", "Path 2", "Path 3"]
+    assert figure.axes[-1].get_xlabel() == "position along the path, from the struck end [mm]"
+    assert figure.axes[0].get_ylabel() == "von Mises [MPa]"
+    early, late = figure.axes[1].lines
+    assert [early.get_label(), late.get_label()] == ["20 µs", "40 µs"]
+    assert early.get_xdata()[np.argmax(early.get_ydata())] == pytest.approx(101.8, abs=5.0)
+    assert late.get_xdata()[np.argmax(late.get_ydata())] == pytest.approx(203.7, abs=5.0)
+
+
+def test_wave_speeds_of_aluminium():
+    assert list(wave_speeds(ALUMINIUM).values()) == pytest.approx([5092.0, 5692.0, 3195.0], abs=1.0)
+
+
+def test_lines_of_wave_speeds_have_their_slope():
+    speeds = wave_speeds(ALUMINIUM)
+    diagram = plot_waves(TIME, [pulse(5092.0)], speeds).axes[0]
+    assert diagram.get_xlabel() == "time after first contact [µs]"
+    assert diagram.get_ylabel() == "position [mm]"
+    for line, speed in zip(diagram.lines, speeds.values(), strict=True):
+        (t0, t1), (x0, x1) = line.get_xdata(), line.get_ydata()
+        assert 1e3 * (x1 - x0) / (t1 - t0) == pytest.approx(speed)
+
+
+def test_a_snapshot_shows_the_faces_towards_the_eye_in_their_colours():
+    figure = plot_snapshot({"cube": cube()}, 40e-6, limit=100e6)
+    picture, bar = figure.axes
+    assert bar.get_ylabel() == "von Mises stress [MPa]"
+    assert picture.get_title(loc="left") == "40.0 µs after first contact"
+    (faces,) = picture.collections
+    assert len(faces.get_paths()) == 3
+    brightest = faces.get_facecolors()[:, :3].sum(axis=1).max()
+    assert brightest == pytest.approx(PALETTE[255].sum() / 255.0, rel=0.25)  # less the shade
+
+
+def test_files_are_png_of_sensible_size(tmp_path: Path):
+    assert_png(save_energies(tmp_path / "energies.png", result()))
+    assert_png(save_snapshot(tmp_path / "snapshot.png", {"cube": cube()}, 0.0))
+    for path in save_paths(tmp_path, TIME, [pulse(5092.0)], wave_speeds(ALUMINIUM)):
+        assert_png(path)
+
+
+def test_bodies_at_rest_can_be_drawn(tmp_path: Path):
+    still = Skin(cube().points, cube().quads, np.zeros(8))
+    assert save_snapshot(tmp_path / "still.png", {"cube": still}, 0.0).stat().st_size > 0
+    silent = PathStress("Path 1", np.linspace(0.0, 0.4, 5), np.zeros((len(TIME), 5)))
+    assert all(path.is_file() for path in save_paths(tmp_path, TIME, [silent], wave_speeds(ALUMINIUM)))
+
+
+@pytest.mark.parametrize(
+    ("greatest", "expected"), [(2e3, (1e-3, "kN")), (30.0, (1.0, "N")), (2e-3, (1e3, "mN")), (0.0, (1.0, "N"))]
+)
+def test_units_suit_the_greatest_value(greatest: float, expected: tuple[float, str]):
+    assert engineering(greatest, "N") == expected
+
+
+def test_the_palette_is_viridis():
+    from matplotlib import colormaps
+
+    viridis = 255.0 * colormaps["viridis"](np.arange(256))[:, :3]
+    assert PALETTE.dtype == np.uint8
+    assert np.abs(PALETTE - viridis).max() <= 2.5
+
+
+def test_stress_is_coloured_from_zero_to_the_limit():
+    stress = np.array([0.0, 25e6, 100e6, 500e6, np.nan], dtype=np.float32)
+    assert levels(stress, 100e6).tolist() == [0, 128, 255, 255, 0]
+    assert packed(stress, 100e6)[0] == 0x440154FF
+    assert packed(stress, 0.0).tolist() == [0x440154FF] * 5
+
+
+def test_a_scale_is_fixed_at_the_yield_stress_or_runs(single_body):
+    elastic, plastic = single_body(ALUMINIUM), single_body("plastic")
+    scale = ColourScale(plastic)
+    assert (scale.limit, scale.fixed) == (110e6, True)
+    assert not scale.include(1e9)
+    assert "fixed (yield stress)" in scale.label
+    running = ColourScale(elastic)
+    assert running.include(3e6)
+    assert not running.include(2e6)
+    assert running.limit == 3e6
+    assert "running maximum" in running.label
+    assert ColourScale(elastic, 5e6).limit == 5e6
+
+
+@pytest.fixture
+def single_body():
+    """Makes a scene of one bar of a material."""
+    import warp_mca as mca
+
+    def make(material):
+        if material == "plastic":
+            material = mca.J2Bilinear(E=70e9, nu=0.27, rho=2700.0, sigma_y=110e6, E_t=27e9)
+        bar = mca.Body(name="bar", geometry=mca.Box(size=(0.1, 0.01, 0.01), divisions=(10, 1, 1)), material=material)
+        return mca.Scene(name="bar", bodies=(bar,), impact=mca.ImpactPhase(duration=1e-5))
+
+    return make

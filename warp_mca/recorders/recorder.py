@@ -1,0 +1,213 @@
+"""Owns the interface of recorders: what they are told before a run, one frame of it, and when they want one."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.errors import bad_value
+
+if TYPE_CHECKING:
+    from warp_mca.model import Model
+    from warp_mca.scene import Scene
+
+Float = NDArray[np.float32]
+Index = NDArray[np.int32]
+
+# What a frame can hold. Only what a recorder of the run asks for is computed and copied.
+SURFACE, CONTACT, PATHS, VOLUME = "surface", "contact", "paths", "volume"
+
+
+@dataclass(frozen=True)
+class Cadence:
+    """When frames are taken: `frames` of them over the run, or one every `seconds` [s] of simulated time.
+
+    The state can be read at the end of each output interval; the nearest ends are taken, always with the first and the
+    last one.
+    """
+
+    frames: int | None = None
+    seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.frames is None) == (self.seconds is None):
+            raise bad_value("Cadence", (self.frames, self.seconds), "give either frames or seconds")
+        if self.frames is not None and self.frames < 2:
+            raise bad_value("frames", self.frames, "give at least 2: the first and the last")
+        if self.seconds is not None and not (math.isfinite(self.seconds) and self.seconds > 0.0):
+            raise bad_value("seconds", self.seconds, "give a finite time above 0 s")
+
+    def rows(self, intervals: int, interval: float) -> NDArray[np.bool_]:
+        """Which ends of `intervals` output intervals of `interval` [s] are frames, shape (intervals + 1,), bool."""
+        count = self.frames or max(2, round(intervals * interval / (self.seconds or interval)) + 1)
+        chosen = np.zeros(intervals + 1, dtype=bool)
+        if self.seconds is None:
+            chosen[np.round(np.linspace(0.0, intervals, min(count, intervals + 1))).astype(int)] = True
+        else:
+            at = np.round(np.arange(count) * self.seconds / interval).astype(int)
+            chosen[at[at <= intervals]] = True
+            chosen[-1] = True
+        return chosen
+
+
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """The skin of a body.
+
+    Attributes:
+        nodes: model node of each vertex, shape (vertex_count,), int32.
+        quads: vertices of each face, counter-clockwise from outside, shape (face_count, 4), int32.
+    """
+
+    nodes: Index
+    quads: Index
+
+    @cached_property
+    def triangles(self) -> Index:
+        """The faces, each cut in two, shape (2 face_count, 3), int32."""
+        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]]).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What never changes during a run.
+
+    Attributes:
+        scene: that is run.
+        model: its arrays; `model.X` holds the positions at t = 0.
+        surfaces: skin of each body, by its name.
+        paths: position of the probes along each path [m], shape (probe_count,), float64, by the path's name.
+        dt: time step [s].
+        output_interval: time between rows of the history [s].
+        duration: simulated time of the run [s].
+        warn: takes a sentence about what a recorder could not do; it is shown with the run's other warnings.
+    """
+
+    scene: Scene
+    model: Model
+    surfaces: Mapping[str, SurfaceMesh]
+    paths: Mapping[str, NDArray[np.float64]]
+    dt: float
+    output_interval: float
+    duration: float
+    warn: Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Fields at all nodes of the model.
+
+    Attributes:
+        displacement: since t = 0 [m], shape (node_count, 3), float32.
+        velocity: [m/s], shape (node_count, 3), float32.
+        stress: xx, yy, zz, xy, yz, xz in the world frame [Pa], shape (node_count, 6), float32.
+        von_mises: [Pa], shape (node_count,), float32.
+        plastic_strain: equivalent plastic strain [-], shape (node_count,), float32.
+    """
+
+    displacement: Float
+    velocity: Float
+    stress: Float
+    von_mises: Float
+    plastic_strain: Float
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The state at one time. Arrays are valid during the call only: copy what is to be kept.
+
+    What no recorder of the run needs is empty. Stress at a node is the mean over its elements of the stress at the
+    integration point nearest to it.
+
+    Attributes:
+        index: counts the frames that this recorder was given, from 0.
+        step: steps since t = 0.
+        time: since first contact [s].
+        points: positions of each skin's vertices [m], shape (vertex_count, 3), float32, by body.
+        von_mises: stress there [Pa], shape (vertex_count,), float32, by body.
+        plastic_strain: equivalent plastic strain there [-], shape (vertex_count,), float32, by body.
+        contact_points: positions of slave nodes in contact [m], shape (contact_count, 3), float32.
+        contact_stick: which of them stick, shape (contact_count,), bool.
+        path_stress: von Mises stress along each path [Pa], shape (probe_count,), float32, by path.
+        volume: fields at all nodes, or None.
+    """
+
+    index: int
+    step: int
+    time: float
+    points: Mapping[str, Float]
+    von_mises: Mapping[str, Float]
+    plastic_strain: Mapping[str, Float]
+    contact_points: Float
+    contact_stick: NDArray[np.bool_]
+    path_stress: Mapping[str, Float]
+    volume: Volume | None = None
+
+
+class Recorder(Protocol):
+    """Writes or shows a run while it goes on.
+
+    A recorder that raises is dropped with a warning, and the run goes on without it; what it has written stays.
+
+    Attributes:
+        name: for warnings, such as the file that it writes.
+        needs: what its frames must hold, out of SURFACE, CONTACT, PATHS and VOLUME.
+        cadence: when it wants a frame.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def needs(self) -> frozenset[str]: ...
+    @property
+    def cadence(self) -> Cadence: ...
+
+    def start(self, info: RunInfo) -> None:
+        """Open the file or the viewer.
+
+        Raises:
+            RequestError: it cannot be opened; the run does not begin.
+        """
+        ...
+
+    def frame(self, frame: Frame) -> None:
+        """Take one frame."""
+        ...
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Take further rows of the history, by column."""
+        ...
+
+    def finish(self, ok: bool) -> None:
+        """Close what is open; `ok` tells that the run ended as it should. Called once, also after an error."""
+        ...
+
+
+def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path:
+    """`file` as a path, when a recording can be written there.
+
+    Args:
+        field: how the user named it.
+        file: the path; missing folders above it are made when the run starts.
+        suffixes: that the name may end with.
+
+    Raises:
+        RequestError: the suffix is another one, or the path is a folder or cannot be written to.
+    """
+    path = Path(file)
+    if path.suffix not in suffixes:
+        raise bad_value(field, str(path), f"give the file the suffix {' or '.join(suffixes)}")
+    existing = next(p for p in (path, *path.absolute().parents) if p.exists())
+    if existing.is_dir() == (existing == path):
+        raise bad_value(field, str(path), f"{existing} is {'' if existing.is_dir() else 'not '}a folder; name another")
+    if not os.access(existing, os.W_OK):
+        raise bad_value(field, str(path), f"{existing} cannot be written to; name another file")
+    return path

@@ -1,0 +1,144 @@
+"""Owns what the rerun viewer shows at first: waves, forces, energies and path stress side by side, and a legend."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.recorders.colours import PALETTE, ColourScale, stress_at
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+# Columns of the history by plot: name, title, (column, label, colour); colours are Okabe and Ito's.
+PLOTS = (
+    ("force", "contact force [N]", (("F_n_N", "F_n", 0x56B4E9FF), ("F_t_N", "F_t", 0xD55E00FF))),
+    (
+        "velocity",
+        "velocity [m/s]",
+        (
+            ("tip_vx", "tip v_x", 0xD55E00FF),
+            ("tip_vy", "tip v_y", 0x56B4E9FF),
+            ("plate_vx", "plate v_x", 0xBBBBBBFF),
+        ),
+    ),
+    (
+        "energy",
+        "energy [J]",
+        (
+            ("E_kinetic", "kinetic", 0xBBBBBBFF),
+            ("E_internal", "internal", 0x56B4E9FF),
+            ("E_plastic", "plastic", 0xD55E00FF),
+            ("E_friction", "friction", 0x009E73FF),
+            ("E_contact", "contact", 0xE69F00FF),
+            ("E_total_error", "error", 0xCC79A7FF),
+        ),
+    ),
+)
+STICK, SLIP = 0xF0E442FF, 0xD55E00FF
+PATH_COLOURS = (0xD55E00FF, 0x009E73FF, 0x56B4E9FF, 0xE69F00FF, 0xCC79A7FF)
+BAR = (256, 14)  # of the legend, in its own units
+TICKS = 5
+FRONT, BELOW = np.array([0.12, 0.25, 0.96]), np.array([0.0, -0.85, 0.53])  # directions to the eye
+BACKGROUND = (222, 223, 228)  # light, so that the dark end of the palette stands out
+
+
+def log_styles(stream: rr.RecordingStream) -> None:
+    """Name and colour the curves of the plots, once."""
+    import rerun as rr
+
+    for plot, _, curves in PLOTS:
+        for column, label, colour in curves:
+            stream.log(f"plots/{plot}/{column}", rr.SeriesLines(colors=colour, names=label, widths=1.5), static=True)
+
+
+def log_legend(stream: rr.RecordingStream) -> None:
+    """The colour bar and the two kinds of contact point, which never change."""
+    import rerun as rr
+
+    width, height = BAR
+    bar = np.repeat(PALETTE[np.linspace(0, 255, width).astype(int)][None], height, axis=0)
+    stream.log("legend/bar", rr.Image(bar), static=True)
+    points = rr.Points2D(
+        [(0.0, 42.0), (128.0, 42.0)],
+        colors=[STICK, SLIP],
+        radii=2.5,
+        labels=["contact point that sticks", "that slips"],
+        show_labels=True,
+    )
+    stream.log("legend/contact", points, static=True)
+
+
+def log_ticks(stream: rr.RecordingStream, scale: ColourScale) -> None:
+    """The stresses at the marks of the colour bar [MPa], from now on."""
+    import rerun as rr
+
+    at = np.linspace(0.0, 1.0, TICKS)
+    labels = [f"{1e-6 * stress_at(share, scale.limit):.3g}" for share in at]
+    labels[-1] = f"≥ {labels[-1]} MPa" if scale.fixed else f"{labels[-1]} MPa"
+    places = np.column_stack([at * BAR[0], np.full(TICKS, BAR[1] + 2.0)])
+    stream.log("legend/ticks", rr.Points2D(places, colors=0xFFFFFFFF, radii=1.0, labels=labels, show_labels=True))
+
+
+def blueprint(
+    scale: ColourScale, bounds: NDArray, focus: NDArray | None, struck: Sequence[str], with_paths: bool
+) -> rrb.Blueprint:
+    """The layout.
+
+    Args:
+        scale: named in the legend's title.
+        bounds: smallest and largest coordinates of what the first view should hold [m], shape (2, 3).
+        focus: centre of a close view from below [m], shape (3,), or None for no close view.
+        struck: entities that would hide the contact there, left out.
+        with_paths: whether there is stress along paths.
+    """
+    import rerun.blueprint as rrb
+
+    legend = rrb.Spatial2DView(
+        origin="/legend",
+        name=scale.label,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-24.0, 290.0], y_range=[-6.0, 56.0]),
+        background=(24, 24, 28),
+    )
+    size = float(np.linalg.norm(bounds[1] - bounds[0]))
+    views: list[rrb.View] = [_view("waves", bounds.mean(axis=0), 1.15 * size * FRONT, ["+ /world/**"])]
+    if focus is not None:
+        contents = ["+ /world/**", *(f"- {path}/**" for path in struck)]
+        views.append(_view("contact, from below", focus, 0.1 * size * BELOW, contents))
+    plots: list[rrb.View] = [
+        rrb.TimeSeriesView(origin=f"/plots/{name}", name=title, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop))
+        for name, title, _ in PLOTS
+    ]
+    if with_paths:
+        title = "von Mises stress [MPa] along the paths, over position [mm]"
+        curve = rrb.BarChartView(origin="/paths", name=title, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop))
+        plots.insert(1, curve)
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(legend, rrb.Horizontal(*views, column_shares=[2, 1][: len(views)]), row_shares=[1, 4]),
+            rrb.Vertical(*plots),
+            column_shares=[3, 2],
+        ),
+        rrb.TimePanel(timeline="sim_time", play_state="following", state="collapsed"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+    )
+
+
+def _view(name: str, target: NDArray, offset: NDArray, contents: list[str]) -> rrb.Spatial3DView:
+    """A view of `contents` from `target` + `offset` [m]."""
+    import rerun.blueprint as rrb
+
+    return rrb.Spatial3DView(
+        origin="/world",
+        name=name,
+        contents=contents,
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=target + offset, look_target=target, eye_up=(0.0, 1.0, 0.0)),
+    )

@@ -1,0 +1,252 @@
+"""Owns the rerun recorder: live into a viewer, into an .rrd file, or both.
+
+Each destination has a stream of its own, so that one that fails takes nothing from the other: a frame of 20,000
+vertices takes about 1 ms of the run's thread for each, rerun's own threads do the rest.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+from uuid import uuid4
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.errors import bad_value
+from warp_mca.recorders.colours import ColourScale, packed
+from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, Cadence, check_file
+from warp_mca.scene import RigidPlane
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+    from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.recorders.rerun_viewer import Viewer
+
+FLUSH_EVERY = 4  # frames: what a killed run may lack
+FLUSH_TIMEOUT = 10.0  # of the file at the end [s]
+DISK_RESERVE = 64 << 20  # left free on the disk, also for the results [byte]
+FRAMES = Cadence(frames=100)
+TO_MPA, TO_MM = 1e-6, 1e3
+
+
+class RerunStream:
+    """Streams surfaces coloured by von Mises stress, contact points, histories and stress along paths.
+
+    Topology and normals are logged once; then come positions and colours. Both timelines carry every frame:
+    `sim_time`, which rerun rounds to nanoseconds, and `step`.
+    """
+
+    def __init__(
+        self,
+        file: str | os.PathLike[str] | None = None,
+        *,
+        viewer: bool = False,
+        cadence: Cadence = FRAMES,
+        limit: float | None = None,
+        viewer_options: Sequence[str] = (),
+    ) -> None:
+        """Record to `file` (.rrd), stream to a viewer that is opened, or both.
+
+        Args:
+            file: is made, or replaced.
+            viewer: open rerun's viewer and stream to it.
+            cadence: when frames are taken.
+            limit: stress at the upper end of the colours [Pa], see `ColourScale`.
+            viewer_options: of rerun's own program, such as --headless.
+
+        Raises:
+            RequestError: `file` cannot be written, or there is nowhere to send to.
+        """
+        if file is None and not viewer:
+            raise bad_value("RerunStream.file", file, "name a file, or set viewer=True")
+        self.path = None if file is None else check_file("rrd", file, ".rrd")
+        self.name = str(self.path or "rerun viewer")
+        self.needs = frozenset((SURFACE, CONTACT, PATHS))
+        self.cadence = cadence
+        self.with_viewer, self.viewer_options, self.limit = viewer, tuple(viewer_options), limit
+        self.streams: list[rr.RecordingStream] = []
+        self.viewer: Viewer | None = None
+        self.frame_count = 0
+        self._file_stream: rr.RecordingStream | None = None
+        self._viewer_stream: rr.RecordingStream | None = None
+
+    def start(self, info: RunInfo) -> None:
+        """Open the streams and log what never changes.
+
+        Raises:
+            RequestError: the file cannot be made.
+        """
+        from warp_mca.recorders.rerun_viewer import Viewer, load_rerun
+
+        rr = load_rerun()
+        from warp_mca.recorders.rerun_blueprint import blueprint, log_legend, log_styles
+
+        self.info = info
+        self.scale = ColourScale(info.scene, self.limit)
+        layout = blueprint(self.scale, *_framing(info), with_paths=bool(info.paths))
+        recording = uuid4()
+        if self.path is not None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            stream = self._file_stream = rr.RecordingStream("warp_mca", recording_id=recording)
+            try:
+                stream.set_sinks(rr.FileSink(str(self.path)), default_blueprint=layout)
+            except RuntimeError as error:
+                raise bad_value("rrd", str(self.path), f"it cannot be written ({error}); name another file") from error
+        if self.with_viewer:
+            stream = self._viewer_stream = rr.RecordingStream("warp_mca", recording_id=recording)
+            self.viewer = Viewer(stream, layout, self.viewer_options)
+        self.streams = [stream for stream in (self._file_stream, self._viewer_stream) if stream]
+        for stream in self.streams:
+            log_legend(stream)
+            log_styles(stream)
+            for body, surface in info.surfaces.items():
+                stream.log(entity("world", body), _topology(info, surface.nodes, surface.triangles), static=True)
+        self._warm_up()
+
+    def frame(self, frame: Frame) -> None:
+        """Log one frame."""
+        self._drop_failed()
+        if not self.streams:
+            return
+        greatest = max((float(value.max(initial=0.0)) for value in frame.von_mises.values()), default=0.0)
+        rescaled = self.scale.include(greatest) or self.frame_count == 0
+        colours = {body: packed(value, self.scale.limit) for body, value in frame.von_mises.items()}
+        for stream in self.streams:
+            self._log_frame(stream, frame, colours, rescaled)
+        self.frame_count += 1
+        if self.viewer:
+            self.viewer.sent(sum(points.nbytes for points in frame.points.values()) * 4 // 3)
+        if self._file_stream and self.frame_count % FLUSH_EVERY == 0:
+            self._flush_file(timeout=0.0)
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Log rows of the history as curves."""
+        import rerun as rr
+
+        from warp_mca.recorders.rerun_blueprint import PLOTS
+
+        self._drop_failed()
+        time = np.asarray(rows["time_s"], dtype=np.float64)
+        step = np.round(time / self.info.dt).astype(np.int64)
+        indexes = [rr.TimeColumn("sim_time", duration=time), rr.TimeColumn("step", sequence=step)]
+        for stream in self.streams:
+            for plot, _, curves in PLOTS:
+                for column, _, _ in curves:
+                    if column in rows and np.isfinite(rows[column]).any():
+                        scalars = rr.Scalars.columns(scalars=rows[column])
+                        stream.send_columns(f"plots/{plot}/{column}", indexes=indexes, columns=scalars)
+
+    def finish(self, ok: bool) -> None:
+        """Write and send what is left; a recording that lacks something is a warning."""
+        self._drop_failed()
+        if self._file_stream:
+            self._flush_file(timeout=FLUSH_TIMEOUT)
+        if self._file_stream:
+            self._file_stream.disconnect()  # writes the file's table of contents
+        if self.viewer:
+            self.viewer.finish()
+        self._drop_failed()
+        self.streams = []
+
+    def _log_frame(
+        self, stream: rr.RecordingStream, frame: Frame, colours: Mapping[str, NDArray[np.uint32]], rescaled: bool
+    ) -> None:
+        import rerun as rr
+
+        from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, SLIP, STICK, log_ticks
+
+        stream.set_time("sim_time", duration=float(frame.time))
+        stream.set_time("step", sequence=int(frame.step))
+        for body, points in frame.points.items():
+            mesh = rr.Mesh3D.from_fields(vertex_positions=points, vertex_colors=colours[body])
+            stream.log(entity("world", body), mesh)
+        sticks = np.where(frame.contact_stick, np.uint32(STICK), np.uint32(SLIP))
+        dots = rr.Points3D.from_fields(positions=frame.contact_points, colors=sticks, radii=[-3.0])
+        stream.log("world/contact_points", dots)
+        for k, (name, stress) in enumerate(frame.path_stress.items()):
+            at, width = _bars(self.info.paths[name], k, len(frame.path_stress))
+            colour = PATH_COLOURS[k % len(PATH_COLOURS)]
+            bars = rr.BarChart(TO_MPA * stress, abscissa=at, widths=width, color=colour)
+            stream.log(entity("paths", name), bars)
+        if rescaled:
+            log_ticks(stream, self.scale)
+
+    def _warm_up(self) -> None:
+        """Encode one mesh before the clock runs: rerun's first one takes 0.6 s."""
+        import rerun as rr
+
+        idle = rr.RecordingStream("warp_mca_warm_up")
+        sink = idle.memory_recording()
+        mesh = rr.Mesh3D.from_fields(
+            vertex_positions=np.zeros((3, 3), np.float32), vertex_colors=np.zeros(3, np.uint32)
+        )
+        idle.log("mesh", mesh)
+        sink.drain_as_bytes()
+
+    def _flush_file(self, timeout: float) -> None:
+        """Start writing what was logged, and wait for it at most `timeout` [s]; 0 does not wait."""
+        assert self._file_stream is not None and self.path is not None
+        # Once a write has failed, rerun 0.41 can hang in the next flush: so stop while there is room.
+        if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
+            self._give_up_file(f"less than {DISK_RESERVE >> 20} MiB are free on its disk")
+            return
+        try:
+            self._file_stream.flush(timeout_sec=timeout)
+        except RuntimeError as error:
+            self._give_up_file(str(error))
+
+    def _give_up_file(self, reason: str) -> None:
+        self.info.warn(f"{self.path}: recording stopped after {self.frame_count} frames: {reason}")
+        self.streams = [stream for stream in self.streams if stream is not self._file_stream]
+        self._file_stream = None
+
+    def _drop_failed(self) -> None:
+        """Stop sending to a viewer that was given up, and say so once."""
+        if self.viewer and not self.viewer.open:
+            self.info.warn(str(self.viewer.problem))
+            self.streams = [stream for stream in self.streams if stream is not self._viewer_stream]
+            self.viewer = self._viewer_stream = None
+
+
+def _topology(info: RunInfo, nodes: NDArray[np.int32], triangles: NDArray[np.int32]) -> rr.Mesh3D:
+    """Triangles of a skin, and its normals as it stands at first contact: they hardly turn afterwards."""
+    import rerun as rr
+
+    points = info.model.X[nodes]
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    face = np.cross(b - a, c - a)
+    normals = np.stack(
+        [np.bincount(triangles.ravel(), np.repeat(face[:, k], 3), minlength=len(points)) for k in range(3)], axis=1
+    )
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    return rr.Mesh3D.from_fields(triangle_indices=triangles, vertex_normals=normals.astype(np.float32))
+
+
+def _framing(info: RunInfo) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, list[str]]:
+    """What the first views show: a box [m], shape (2, 3); where contact is expected [m], or None; what is struck.
+
+    The box leaves out bodies that are only struck, such as a plate much larger than what strikes it.
+    """
+    struck = {c.master.body for c in info.scene.contacts if not isinstance(c.master, RigidPlane)}
+    striking = [body for body in info.surfaces if body not in struck] or list(info.surfaces)
+    points = np.concatenate([info.model.X[info.surfaces[body].nodes] for body in striking])
+    focus = info.model.X[info.model.points[0]] if info.model.points[0] >= 0 else None
+    return np.array([points.min(axis=0), points.max(axis=0)]), focus, [entity("world", body) for body in struck]
+
+
+def _bars(position: NDArray[np.floating], index: int, count: int) -> tuple[NDArray, NDArray]:
+    """Centres and widths [mm] of the bars of path `index` of `count`: they share the space between two probes."""
+    position = TO_MM * np.asarray(position)
+    width = np.gradient(position) / count if len(position) > 1 else np.ones(1)
+    return position + (index - 0.5 * (count - 1)) * width, np.abs(width).astype(np.float32)
+
+
+def entity(*parts: str) -> str:
+    """Path of an entity; parts may hold any characters, spaces turn into underscores."""
+    import rerun as rr
+
+    return rr.new_entity_path([part.replace(" ", "_") for part in parts])
