@@ -103,6 +103,29 @@ def frame_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
+def gradient_function(precision: str) -> Any:
+    """The function that gives Jacobian determinant and displacement gradient at Gauss point g = i + 2 j + 4 k."""
+    t = scalars(precision)
+    mat43 = t.mat43
+
+    @wp.func
+    def point_gradient(gx: mat43, gy: mat43, gz: mat43, lx: mat43, ly: mat43, lz: mat43, g: int):
+        i = g & 1
+        j = (g >> 1) & 1
+        k = g >> 2
+        jx = j + 2 * k
+        jy = i + 2 * k
+        jz = i + 2 * j
+        b0 = wp.cross(gy[jy], gz[jz])
+        b1 = wp.cross(gz[jz], gx[jx])
+        b2 = wp.cross(gx[jx], gy[jy])
+        det = wp.dot(gx[jx], b0)
+        return det, (wp.outer(lx[jx], b0) + wp.outer(ly[jy], b1) + wp.outer(lz[jz], b2)) / det
+
+    return point_gradient
+
+
+@cache
 def node_force_function(precision: str) -> Any:
     """The function that turns edge forces, one 4 x 3 matrix for each direction, into the node forces of an element."""
     t = scalars(precision)
@@ -277,6 +300,7 @@ def energy_kernel(precision: str, plastic: bool) -> Any:
     half_edges, to_gauss = edge_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
     load_element = load_function(precision)
+    point_gradient = gradient_function(precision)
     read_plastic_strain, _ = history_functions(precision)
     plastic_energy = j2.plastic_energy(precision)
 
@@ -312,17 +336,7 @@ def energy_kernel(precision: str, plastic: bool) -> Any:
         largest = R(0.0)
         smallest = R(1.0)
         for g in range(8):
-            i = g & 1
-            j = (g >> 1) & 1
-            k = g >> 2
-            jx = j + 2 * k
-            jy = i + 2 * k
-            jz = i + 2 * j
-            b0 = wp.cross(gy[jy], gz[jz])
-            b1 = wp.cross(gz[jz], gx[jx])
-            b2 = wp.cross(gx[jx], gy[jy])
-            det = wp.dot(gx[jx], b0)
-            grad = (wp.outer(lx[jx], b0) + wp.outer(ly[jy], b1) + wp.outer(lz[jz], b2)) / det
+            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             trace = wp.trace(grad)
             volume += det
             dilation += trace * det

@@ -65,6 +65,21 @@ def _approach_angle(length: float, radius: float, H: float, gravity: float, thet
     return angle
 
 
+def _paths(length: float, radius: float) -> tuple[mca.Path, ...]:
+    """Paths 1, 2 and 3 of Fig. 10: upper surface, axis and lower surface of both rods, from the tip to hinge O.
+
+    As in Fig. 11, positions count from the tip's end, and the hinges and the tip are left out.
+    """
+    end, hinge = 1.14 * radius, 1.45 * radius
+
+    def path(name: str, y: float) -> mca.Path:
+        lower = mca.Line(body="AB", start=(length - end, y, 0.0), end=(hinge, y, 0.0), position=end)
+        upper = mca.Line(body="OA", start=(length - hinge, y, 0.0), end=(end, y, 0.0), position=length + hinge)
+        return mca.Path(name=name, lines=(lower, upper), spacing=length / 84.0)
+
+    return path("Path 1", -radius), path("Path 2", 0.0), path("Path 3", radius)
+
+
 def build(
     *,
     mu: Annotated[float, Param("coefficient of friction", low=0.0, high=10.0)] = 0.47,
@@ -177,6 +192,7 @@ def build(
             mca.Contact(slave=mca.Surface(body="AB", nodes="tip"), master=top, mu=mu, penalty=penalty, two_way=two_way),
         ),
         fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
+        paths=_paths(length, radius),
         gravity=(0.0, -gravity, 0.0),
         rigid=mca.RigidPhase(
             theta=theta,

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warp_mca.paths import PathHistory
 from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
 from warp_mca.report.energies import plot_energies, save_energies
-from warp_mca.report.paths import PathStress, plot_paths, plot_waves, save_paths, wave_speeds
+from warp_mca.report.paths import plot_paths, plot_waves, save_path_figures
 from warp_mca.report.snapshot import Skin, plot_snapshot, save_snapshot
 from warp_mca.report.style import engineering
 from warp_mca.results import HISTORY_COLUMNS, Result
@@ -34,10 +35,26 @@ def result() -> Result:
     return Result({"scene": "toy"}, history | {"E_total_error": 1e-6 * share})
 
 
-def pulse(speed: float, name: str = "Path 2") -> PathStress:
+def pulse(speed: float, name: str = "Path 2") -> PathHistory:
     """Stress of 30 MPa that travels along 0.4 m at `speed` [m/s]."""
     position = np.linspace(0.0, 0.4, 81)
-    return PathStress(name, position, 30e6 * np.exp(-(((position - speed * TIME[:, None]) / 0.02) ** 2)))
+    stress = np.zeros((len(TIME), len(position), 6), dtype=np.float32)
+    stress[..., 0] = 30e6 * np.exp(-(((position - speed * TIME[:, None]) / 0.02) ** 2))
+    return PathHistory(name, position, stress)
+
+
+def along(path: PathHistory) -> Result:
+    """The result with stress along a path."""
+    run = result()
+    return Result(run.summary | {"wave_speeds": ALUMINIUM.wave_speeds}, run.history, paths=(path,))
+
+
+def test_jumps_between_the_lines_of_a_path_are_left_white():
+    path = pulse(5092.0)
+    keep = (path.position < 0.19) | (path.position > 0.23)
+    figure = plot_paths(TIME, [PathHistory(path.name, path.position[keep], path.stress[:, keep])], instants=(20e-6,))
+    x, y = figure.axes[0].lines[0].get_data()
+    assert np.array_equal(np.isnan(y), (x > 187.0) & (x < 233.0) & ~np.isin(np.round(x, 3), (190.0, 230.0)))
 
 
 def cube() -> Skin:
@@ -72,11 +89,11 @@ def test_paths_are_drawn_at_the_chosen_instants():
 
 
 def test_wave_speeds_of_aluminium():
-    assert list(wave_speeds(ALUMINIUM).values()) == pytest.approx([5092.0, 5692.0, 3195.0], abs=1.0)
+    assert list(ALUMINIUM.wave_speeds.values()) == pytest.approx([5092.0, 5692.0, 3195.0], abs=1.0)
 
 
 def test_lines_of_wave_speeds_have_their_slope():
-    speeds = wave_speeds(ALUMINIUM)
+    speeds = ALUMINIUM.wave_speeds
     diagram = plot_waves(TIME, [pulse(5092.0)], speeds).axes[0]
     assert diagram.get_xlabel() == "time after first contact [µs]"
     assert diagram.get_ylabel() == "position [mm]"
@@ -99,15 +116,15 @@ def test_a_snapshot_shows_the_faces_towards_the_eye_in_their_colours():
 def test_files_are_png_of_sensible_size(tmp_path: Path):
     assert_png(save_energies(tmp_path / "energies.png", result()))
     assert_png(save_snapshot(tmp_path / "snapshot.png", {"cube": cube()}, 0.0))
-    for path in save_paths(tmp_path, TIME, [pulse(5092.0)], wave_speeds(ALUMINIUM)):
+    for path in save_path_figures(tmp_path, along(pulse(5092.0))):
         assert_png(path)
 
 
 def test_bodies_at_rest_can_be_drawn(tmp_path: Path):
     still = Skin(cube().points, cube().quads, np.zeros(8))
     assert save_snapshot(tmp_path / "still.png", {"cube": still}, 0.0).stat().st_size > 0
-    silent = PathStress("Path 1", np.linspace(0.0, 0.4, 5), np.zeros((len(TIME), 5)))
-    assert all(path.is_file() for path in save_paths(tmp_path, TIME, [silent], wave_speeds(ALUMINIUM)))
+    silent = PathHistory("Path 1", np.linspace(0.0, 0.4, 5), np.zeros((len(TIME), 5, 6), dtype=np.float32))
+    assert all(path.is_file() for path in save_path_figures(tmp_path, along(silent)))
 
 
 @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def _request(args: argparse.Namespace) -> Request:
 
 def _run(args: argparse.Namespace) -> None:
     from warp_mca.report.console import print_summary, progress_bar
-    from warp_mca.results import FILES
+    from warp_mca.results import FILES, PATH_FILES
 
     if args.viewer != "none":
         raise bad_value("--viewer", args.viewer, "this version has no live viewer yet; use --viewer none")
@@ -158,7 +158,8 @@ def _run(args: argparse.Namespace) -> None:
             meshes=request.meshes,
             progress=progress,
         )
-    print_summary(result, [str(out / name) for name in FILES])
+    written = [*FILES, *(PATH_FILES if result.paths else ())]
+    print_summary(result, [str(out / name) for name in written])
     as_designed = not args.settings and args.duration is None
     if request.source and request.source.check and as_designed:
         for message in request.source.check(result):

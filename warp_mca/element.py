@@ -13,18 +13,18 @@ _CORNER = np.array(
 _POINT = _CORNER / np.sqrt(3.0)
 
 
-def _shape_tables() -> tuple[Array, Array]:
-    """Shape functions (8 points, 8 nodes) and their natural derivatives (8 points, 8 nodes, 3) at the Gauss points."""
-    factor = 1.0 + _POINT[:, None, :] * _CORNER[None, :, :]
-    value = factor.prod(axis=2) / 8.0
-    slope = np.empty((8, 8, 3))
+def shape_functions(xi: Array) -> tuple[Array, Array]:
+    """Shape functions [-], shape (..., 8), and their natural derivatives, shape (..., 8, 3), at xi, shape (..., 3)."""
+    factor = 1.0 + xi[..., None, :] * _CORNER
+    value = factor.prod(axis=-1) / 8.0
+    slope = np.empty((*xi.shape[:-1], 8, 3))
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
-        slope[:, :, axis] = _CORNER[None, :, axis] * factor[:, :, others].prod(axis=2) / 8.0
+        slope[..., axis] = _CORNER[:, axis] * factor[..., others].prod(axis=-1) / 8.0
     return value, slope
 
 
-_VALUE, _SLOPE = _shape_tables()
+_VALUE, _SLOPE = shape_functions(_POINT)
 
 
 def jacobians(x: Array) -> Array:

@@ -47,8 +47,8 @@ class Ledger:
 
         return written % ROWS == 0
 
-    def read(self, solver: Solver) -> None:
-        """Fetch the records written since the last call, and hold them against the guards.
+    def read(self, solver: Solver) -> int:
+        """Fetch the records written since the last call, hold them against the guards, and return how many they are.
 
         Raises:
             GuardError: a record breaks a guard.
@@ -59,6 +59,7 @@ class Ledger:
                 raise GuardError(f"stopped before t = {(self.count + written) * self.interval:.4g} s: {message}")
         for row in range(written):
             self._add(partial[row], velocity[row])
+        return written
 
     def _add(self, partial: Array, velocity: Array) -> None:
         from warp_mca.solver import JACOBIAN, STRAIN
@@ -115,12 +116,15 @@ class Ledger:
         initial = self.initial_energy or 0.0
         return {"initial": initial, **last, "error": error - last["external_work"] - initial}
 
-    def history(self) -> dict[str, Array]:
-        """The columns of history.csv, each shape (row_count,), float64. Forces are means over the interval before."""
+    def history(self, first: int = 0) -> dict[str, Array]:
+        """The columns of history.csv from row `first` on, each shape (row_count,), float64.
+
+        Forces are means over the interval before.
+        """
         from warp_mca.solver import PASS, PASS_COLUMNS
 
-        table = np.array(self.columns)
-        energies = [self._energies(row) for row in self.columns]
+        table = np.array(self.columns[first:])
+        energies = [self._energies(row) for row in table]
         energy = {key: np.array([item[key] for item in energies]) for key in energies[0]}
         springs = table[:, PASS:].reshape(len(table), -1, PASS_COLUMNS)
         share = self.dt / self.interval
@@ -133,14 +137,14 @@ class Ledger:
         pressed, stuck = springs[:, :, 6].sum(axis=1), springs[:, :, 7].sum(axis=1)
         stick: Array = np.zeros(len(table))
         np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
-        velocity = np.array(self.velocities)
+        velocity = np.array(self.velocities[first:])
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
             velocity[:, 1] = self.model.passes[0].plane.velocity
         stored = energy["elastic"] + energy["plastic"]
         balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
         return {
-            "time_s": self.interval * np.arange(len(table), dtype=np.float64),
+            "time_s": self.interval * np.arange(first, self.count, dtype=np.float64),
             "F_n_N": F_n,
             "F_t_N": F_t,
             "stick_fraction": stick,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
 import tempfile
 import time
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -16,6 +18,7 @@ import numpy as np
 
 from warp_mca.errors import RequestError, bad_value
 from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
+from warp_mca.paths import PathHistory, load_paths, save_paths
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -33,6 +36,7 @@ HISTORY_COLUMNS = (
     "E_total_error",
 )
 FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
+PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
 
 
 @dataclass(frozen=True)
@@ -44,12 +48,14 @@ class Result:
         history: one array for each column of `history.csv`, each shape (row_count,), float64.
         path: folder that it was saved in or loaded from, or None.
         warnings: what the run noticed without stopping, one sentence each.
+        paths: stress along the scene's paths, with one row for each row of the history.
     """
 
     summary: dict[str, Any]
     history: dict[str, Array]
     path: Path | None = None
     warnings: tuple[str, ...] = ()
+    paths: tuple[PathHistory, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -165,13 +171,13 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
         raise bad_value("out", str(path), f"{existing} is not a folder; name another")
     if not os.access(existing, os.W_OK):
         raise bad_value("out", str(path), f"{existing} cannot be written to; name another folder")
-    if not force and any((path / name).exists() for name in FILES):
+    if not force and any((path / name).exists() for name in FILES + PATH_FILES):
         raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
     return path
 
 
 def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
-    """Write summary.json, history.csv, forces.png and energies.png, all or none of them.
+    """Write summary.json, history.csv and the figures, all or none of them.
 
     Args:
         result: of a run.
@@ -186,6 +192,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     """
     from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
+    from warp_mca.report.paths import save_path_figures
 
     path = check_output(directory, force=force)
     # Written beside the folder first: a run that fails half-way leaves nothing behind.
@@ -195,12 +202,18 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         _write_history(staging / "history.csv", result.history)
         save_forces(staging / "forces.png", result)
         save_energies(staging / "energies.png", result)
+        if result.paths:
+            save_paths(staging / "paths.npz", result.time, result.paths)
+            save_path_figures(staging, result)
         result = _with_output_time(result, path, time.perf_counter() - begun)
         summary = {**result.summary, "warnings": list(result.warnings)}
         (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
         path.mkdir(parents=True, exist_ok=True)
-        for name in FILES:
-            (staging / name).replace(path / name)
+        for name in FILES + PATH_FILES:
+            if (staging / name).exists():
+                (staging / name).replace(path / name)
+            else:  # left by a run of another scene
+                (path / name).unlink(missing_ok=True)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
     return result
@@ -219,11 +232,12 @@ def load(directory: str | os.PathLike[str]) -> Result:
         with (path / "history.csv").open(encoding="utf-8") as file:
             names = file.readline().strip().split(",")
             rows = np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2).reshape(-1, len(names))
+        paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
     except FileNotFoundError as error:
         raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
-    except (OSError, ValueError, AttributeError) as error:
+    except (OSError, ValueError, AttributeError, KeyError, zipfile.BadZipFile) as error:
         raise bad_value("results", str(path), "its files are damaged; run again") from error
-    return Result(summary, dict(zip(names, rows.T.copy(), strict=True)), path, warnings)
+    return Result(summary, dict(zip(names, rows.T.copy(), strict=True)), path, warnings, paths)
 
 
 def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
@@ -232,7 +246,7 @@ def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
     wall = summary.get("wall")
     if isinstance(wall, Mapping):
         summary["wall"] = {**wall, "output": wall.get("output", 0.0) + seconds}
-    return Result(summary, result.history, path, result.warnings)
+    return dataclasses.replace(result, summary=summary, path=path)
 
 
 def _nearest(path: Path) -> Path:

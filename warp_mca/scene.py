@@ -61,6 +61,13 @@ class Elastic:
         """G = E / (2 (1 + nu)) [Pa]."""
         return self.E / (2.0 * (1.0 + self.nu))
 
+    @property
+    def wave_speeds(self) -> dict[str, float]:
+        """Speeds of elastic waves [m/s]: bar sqrt(E / rho), dilatational c_d, shear c_s."""
+        K, G = self.bulk_modulus, self.shear_modulus
+        moduli = {"bar": self.E, "dilatational": K + 4.0 * G / 3.0, "shear": G}
+        return {name: math.sqrt(modulus / self.rho) for name, modulus in moduli.items()}
+
 
 @dataclass(frozen=True, kw_only=True)
 class J2Bilinear(Elastic):
@@ -135,6 +142,52 @@ class Point:
 
     body: str
     at: Vec3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """A straight part of a path.
+
+    Attributes:
+        body: that it runs through.
+        start, end: its ends in the body's frame [m].
+        position: of its start along the path [m].
+    """
+
+    body: str
+    start: Vec3
+    end: Vec3
+    position: float = 0.0
+
+    def __post_init__(self) -> None:
+        _finite(f"Line in {self.body}", start=self.start, end=self.end)
+        if self.start == self.end:
+            raise bad_value(f"Line in {self.body}.end", self.end, "give a point other than the start")
+
+    @property
+    def length(self) -> float:
+        """[m]."""
+        return math.dist(self.start, self.end)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Path:
+    """Probes along lines, at which stress is recorded in every output interval.
+
+    Attributes:
+        name: unique in the scene.
+        lines: its parts.
+        spacing: largest distance between neighbouring probes of a line [m].
+    """
+
+    name: str
+    lines: tuple[Line, ...]
+    spacing: float
+
+    def __post_init__(self) -> None:
+        _positive(f"Path {self.name}", spacing=self.spacing)
+        if not self.lines:
+            raise bad_value(f"Path {self.name}.lines", self.lines, "give at least one line")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -363,6 +416,7 @@ class Scene:
         rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
         joints, contacts, fixed, prescribed: what binds the bodies.
         gravity: [m/s^2].
+        paths: lines along which stress is recorded.
         tip: point whose velocity the history lists as tip_vx, tip_vy.
         target: point whose velocity the history lists as plate_vx.
         parameters: the values that a built-in scene was made from, for the record.
@@ -376,6 +430,7 @@ class Scene:
     contacts: tuple[Contact, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     prescribed: tuple[Prescribed, ...] = ()
+    paths: tuple[Path, ...] = ()
     gravity: Vec3 = (0.0, 0.0, 0.0)
     tip: Point | None = None
     target: Point | None = None
@@ -387,6 +442,9 @@ class Scene:
             raise bad_value("Scene.bodies", (), "give at least one body")
         if len(set(names)) != len(names):
             raise bad_value("Scene.bodies", names, "give each body a name of its own")
+        paths = [path.name for path in self.paths]
+        if len(set(paths)) != len(paths):
+            raise bad_value("Scene.paths", paths, "give each path a name of its own")
         _finite("Scene", gravity=self.gravity)
         for field_name, body in self._named_bodies():
             if body not in names:
@@ -399,6 +457,7 @@ class Scene:
         named += [(f"Revolute {item.name}.other", item.other) for item in self.joints if item.other is not None]
         named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
         named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
+        named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]
         named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
         if self.rigid:
             named.append(("RigidPhase.tip.body", self.rigid.tip.body))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,15 @@ from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.handoff import HandOff, hand_off
 from warp_mca.ledger import Ledger
-from warp_mca.model import Model, build_model, nodal_masses
+from warp_mca.model import Model, body_materials, build_model, nodal_masses
+from warp_mca.paths import locate, path_histories
+from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results import Result, RunFacts, check_output, save, summarise
 from warp_mca.scene import Scene
+
+if TYPE_CHECKING:
+    from warp_mca.recorders.frames import Recording
+    from warp_mca.solver import Solver
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -44,9 +51,19 @@ class Steps:
     intervals: int
 
     @property
+    def per_interval(self) -> int:
+        """Steps of an output interval."""
+        return self.per_search * self.searches
+
+    @property
+    def interval(self) -> float:
+        """Output interval [s]."""
+        return self.dt * self.per_interval
+
+    @property
     def count(self) -> int:
         """Steps of the whole run."""
-        return self.per_search * self.searches * self.intervals
+        return self.per_interval * self.intervals
 
 
 def mesh(scene: Scene) -> dict[str, Mesh]:
@@ -118,6 +135,7 @@ def run(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     meshes: Mapping[str, Mesh] | None = None,
+    recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
 ) -> Result:
     """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
@@ -130,6 +148,7 @@ def run(
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
         meshes: finished meshes by body, to save making them again.
+        recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
 
     Returns:
@@ -139,6 +158,8 @@ def run(
         RequestError: the request cannot be carried out; nothing was written.
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
+    from warp_mca.output import Output
+    from warp_mca.recorders.frames import Recording, skins
     from warp_mca.solver import Solver, check_device
 
     tell = progress or (lambda stage, done: None)
@@ -157,37 +178,79 @@ def run(
     clock.lap("rigid")
     model = build_model(scene, meshes, start.positions, start.velocities)
     steps = divide(scene, model, span)
+    probes = locate(scene, model, meshes)
     clock.lap("mesh")
     tell("compile", 0.0)
     solver = Solver(model, device=device, precision=precision, dt=steps.dt)
+    said: list[str] = []
+    surfaces = skins(model, meshes) if recorders else {}
+    info = RunInfo(scene, model, surfaces, probes.position, steps.dt, steps.interval, span, said.append)
+    if recorders or scene.paths:
+        solver.output = Output(solver, surfaces, probes, frozenset().union(*(r.needs for r in recorders)))
     solver.compile()
     clock.lap("compile")
-    ledger = Ledger(model, steps.dt, steps.dt * steps.per_search * steps.searches, scene.impact.energy_tolerance)
+    ledger = Ledger(model, steps.dt, steps.interval, scene.impact.energy_tolerance)
+    recording = Recording(recorders, info, steps.intervals, steps.per_interval, solver.output)
     solver.start()
-    for interval in range(steps.intervals):
-        solver.search()
-        solver.record_and_step(steps.per_search)
-        for _ in range(steps.searches - 1):
-            solver.search()
-            solver.step(steps.per_search)
-        if ledger.full(interval + 1):
-            ledger.read(solver)
-            tell("impact", (interval + 1) / steps.intervals)
-    solver.search()
-    solver.record_and_step(1)
-    ledger.read(solver)
+    try:
+        paths = _advance(solver, steps, ledger, recording, tell)
+    except BaseException:
+        recording.finish(False)
+        raise
     clock.lap("fe")
+    recording.finish(True)
+    clock.lap("output")
     tell("impact", 1.0)
-    facts = _facts(scene, model, start, steps, ledger, solver, clock)
+    facts = _facts(scene, meshes, model, start, steps, ledger, solver, clock)
     history = ledger.history()
-    result = Result(summarise(history, facts), history, None, tuple(_warnings(scene, start, ledger)))
+    warnings = (*_warnings(scene, start, ledger), *said)
+    result = Result(summarise(history, facts), history, None, warnings, path_histories(probes, paths))
     if out is not None:
         result = save(result, out, force=force)
     return result
 
 
-def _facts(scene: Scene, model: Model, start: HandOff, steps: Steps, ledger: Ledger, solver, clock: _Clock) -> RunFacts:
-    more = {
+def _advance(solver: Solver, steps: Steps, ledger: Ledger, recording: Recording, tell: Progress) -> list[NDArray]:
+    """Run the finite elements: in each output interval search for contact, record, step. Returns the probes' rings."""
+    rings: list[NDArray] = []
+
+    def read(done: float) -> None:
+        first = ledger.count
+        written = ledger.read(solver)
+        if solver.output:
+            rings.append(solver.output.probe_rows(written))
+        recording.history(lambda: ledger.history(first))
+        tell("impact", done)
+
+    for interval in range(steps.intervals):
+        needs = recording.needs(interval)
+        solver.search()
+        solver.record_and_step(steps.per_search, needs)
+        recording.take(interval, needs)
+        for _ in range(steps.searches - 1):
+            solver.search()
+            solver.step(steps.per_search)
+        if ledger.full(interval + 1):
+            read((interval + 1) / steps.intervals)
+    needs = recording.needs(steps.intervals)
+    solver.search()
+    solver.record_and_step(1, needs)
+    recording.take(steps.intervals, needs)
+    read(1.0)
+    return rings
+
+
+def _facts(
+    scene: Scene,
+    meshes: Mapping[str, Mesh],
+    model: Model,
+    start: HandOff,
+    steps: Steps,
+    ledger: Ledger,
+    solver: Solver,
+    clock: _Clock,
+) -> RunFacts:
+    more: dict[str, object] = {
         "energy_drift_rigid": start.energy_drift,
         "handoff_mismatch": {
             "momentum": start.momentum_mismatch,
@@ -199,6 +262,9 @@ def _facts(scene: Scene, model: Model, start: HandOff, steps: Steps, ledger: Led
         "stable_dt": model.stable.dt,
         "joint_impulse": solver.joint_impulses(),
     }
+    if scene.paths:
+        body = scene.body(scene.paths[0].lines[0].body)
+        more["wave_speeds"] = body_materials(body, meshes[body.name])[0][0].wave_speeds
     return RunFacts(
         scene=scene.name,
         n_elements=model.element_count,

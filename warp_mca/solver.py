@@ -5,6 +5,7 @@
 | 1 element forces | `hex8_force` | every step, once for plastic and once for elastic elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
 | 3 record at t(n) | `hex8_energy`, sums | first step of each output interval |
+| 3a paths, frames at t(n) | `hex8_stress`, `nodal_stress`, … | the same, where a scene has paths or a frame is due |
 | 4 gather and integrate | `integrate` | every step |
 | 5 re-joint | `rejoin` | every step, in scenes with joints |
 | 6 prescribed motion | `prescribe` | every step, in scenes with driven axes |
@@ -17,7 +18,7 @@ between two searches raise a flag, which stops the run.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -27,6 +28,9 @@ from warp_mca.kernels import constraint, contact, hex8, ledger, node, search
 from warp_mca.kernels.scalars import scalars
 from warp_mca.model import Block, Model
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
+
+if TYPE_CHECKING:
+    from warp_mca.output import Output
 
 SUM_WIDTH = 256  # threads that share a sum, in a fixed order
 ROWS = 32  # records kept on the device before the host reads them
@@ -149,6 +153,7 @@ class Solver:
         u: displacements since hand-off [m], shape (node_count,), vec3d.
         v: velocities at the last half step [m/s], shape (node_count,), vec3d.
         dt: time step [s].
+        output: what is read off the state for paths and recorders, or None.
     """
 
     def __init__(self, model: Model, *, device: str, precision: str, dt: float) -> None:
@@ -158,6 +163,7 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self._allocate()
         self.graphs: dict[str, Any] = {}
+        self.output: Output | None = None
 
     def _allocate(self) -> None:
         model = self.model
@@ -234,9 +240,11 @@ class Solver:
     def _sum(self, kernel: Any, *inputs: Any) -> None:
         wp.launch(kernel, SUM_WIDTH, inputs=list(inputs), outputs=[self.partial])
 
-    def _record_step(self) -> None:
-        """One step that also writes a record of the state at its start."""
+    def _record_step(self, needs: frozenset[str]) -> None:
+        """One step that also writes a record of the state at its start, and a frame of `needs`."""
         self._forces()
+        if self.output:
+            self.output.before_step(needs)
         for stage in self.elements:
             inputs = [self.X, stage.conn, stage.material, self.law, stage.yielded, stage.history, self.u]
             inputs += [stage.block.first]
@@ -255,6 +263,8 @@ class Solver:
         self._sum(ledger.sum_nodes, self.mass, gravity, self.u, self.v_before, self.v, self.dt, self.row, SUM_WIDTH)
         inputs = [self.point_node, self.v_before, self.v, self.row]
         wp.launch(ledger.record_points, len(self.point_node), inputs=inputs, outputs=[self.point_velocity])
+        if self.output:
+            self.output.after_step(needs)
         wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
 
     def _launch(self, name: str, body: Callable[[], None]) -> None:
@@ -277,6 +287,7 @@ class Solver:
         kernels = [constraint.rejoin, ledger.sum_nodes, contact.react, search.face_bounds]
         kernels += [self.integrate_kernel, self.sum_elements_kernel]
         kernels += [kernel for stage in self.elements for kernel in (stage.force_kernel, stage.energy_kernel)]
+        kernels += self.output.kernels() if self.output else []
         return kernels + [stage.kernel for stage in self.contacts]
 
     def search(self) -> None:
@@ -293,15 +304,15 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self._integrate(-0.5 * self.dt, 0.0)
 
-    def record_and_step(self, count: int) -> None:
-        """Record the state, then advance `count` steps."""
+    def record_and_step(self, count: int, needs: frozenset[str] = frozenset()) -> None:
+        """Record the state, with a frame of `needs`, then advance `count` steps."""
 
         def interval() -> None:
-            self._record_step()
+            self._record_step(needs)
             for _ in range(count - 1):
                 self._step()
 
-        self._launch(f"record {count}", interval)
+        self._launch(f"record {count} {sorted(needs)}", interval)
 
     def step(self, count: int) -> None:
         """Advance `count` steps."""

@@ -28,33 +28,36 @@ SURFACE, CONTACT, PATHS, VOLUME = "surface", "contact", "paths", "volume"
 
 @dataclass(frozen=True)
 class Cadence:
-    """When frames are taken: `frames` of them over the run, or one every `seconds` [s] of simulated time.
+    """When frames are taken: `frames` over the run, one every `seconds` [s] of simulated time, or at `times` [s].
 
-    The state can be read at the end of each output interval; the nearest ends are taken, always with the first and the
-    last one.
+    The state can be read at the end of each output interval: the nearest ends are taken. The first two ways always
+    take the first and the last one.
     """
 
     frames: int | None = None
     seconds: float | None = None
+    times: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if (self.frames is None) == (self.seconds is None):
-            raise bad_value("Cadence", (self.frames, self.seconds), "give either frames or seconds")
+        if [self.frames, self.seconds, self.times].count(None) != 2:
+            raise bad_value("Cadence", (self.frames, self.seconds, self.times), "give one of frames, seconds and times")
         if self.frames is not None and self.frames < 2:
             raise bad_value("frames", self.frames, "give at least 2: the first and the last")
         if self.seconds is not None and not (math.isfinite(self.seconds) and self.seconds > 0.0):
             raise bad_value("seconds", self.seconds, "give a finite time above 0 s")
+        if self.times is not None and not all(math.isfinite(time) and time >= 0.0 for time in self.times):
+            raise bad_value("times", self.times, "give finite times from 0 s on")
 
     def rows(self, intervals: int, interval: float) -> NDArray[np.bool_]:
         """Which ends of `intervals` output intervals of `interval` [s] are frames, shape (intervals + 1,), bool."""
-        count = self.frames or max(2, round(intervals * interval / (self.seconds or interval)) + 1)
-        chosen = np.zeros(intervals + 1, dtype=bool)
-        if self.seconds is None:
-            chosen[np.round(np.linspace(0.0, intervals, min(count, intervals + 1))).astype(int)] = True
+        if self.frames is not None:
+            at = np.linspace(0.0, intervals, min(self.frames, intervals + 1))
+        elif self.seconds is not None:
+            at = np.append(np.arange(0.0, intervals, max(1.0, self.seconds / interval)), intervals)
         else:
-            at = np.round(np.arange(count) * self.seconds / interval).astype(int)
-            chosen[at[at <= intervals]] = True
-            chosen[-1] = True
+            at = np.asarray(self.times) / interval
+        chosen = np.zeros(intervals + 1, dtype=bool)
+        chosen[np.minimum(np.round(at), intervals).astype(int)] = True
         return chosen
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from warp_mca.scene import Elastic
+    from warp_mca.paths import PathHistory
+    from warp_mca.results import Result
 
 Array = NDArray[np.float64]
 
@@ -26,35 +26,12 @@ PASSAGES = 2.5  # of the slowest wave along a path, that waves.png shows
 NEAR = 0.05  # share of a path that does not set the height of paths.png
 DECADES = 3.0  # of stress in waves.png: the first wave is weak
 FIRST = 0.3  # share of the time that they span: while the first wave travels and reflects
+GAP = 2.5  # times the usual distance between probes is a gap between the lines of a path
+WAVES = {"bar": r"$\sqrt{E/\rho}$", "dilatational": r"$c_d$", "shear": r"$c_s$"}
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
 
 
-@dataclass(frozen=True)
-class PathStress:
-    """Von Mises stress along one path.
-
-    Attributes:
-        name: of the path.
-        position: of the probes along the path, from the end that is struck [m], shape (probe_count,), float64.
-        stress: [Pa], shape (time_count, probe_count), float32 or float64.
-    """
-
-    name: str
-    position: Array
-    stress: NDArray[np.floating]
-
-
-def wave_speeds(material: Elastic) -> dict[str, float]:
-    """Speeds of elastic waves [m/s]: of the bar, sqrt(E/rho); of dilatation, c_d; of shear, c_s."""
-    K, G, rho = material.bulk_modulus, material.shear_modulus, material.rho
-    return {
-        r"$\sqrt{E/\rho}$": float(np.sqrt(material.E / rho)),
-        r"$c_d$": float(np.sqrt((K + 4.0 * G / 3.0) / rho)),
-        r"$c_s$": float(np.sqrt(G / rho)),
-    }
-
-
-def plot_paths(time: Array, paths: Sequence[PathStress], instants: Sequence[float] | None = None) -> Figure:
+def plot_paths(time: Array, paths: Sequence[PathHistory], instants: Sequence[float] | None = None) -> Figure:
     """Stress [MPa] over position [mm], one panel for each path, one curve for each instant.
 
     Args:
@@ -70,7 +47,9 @@ def plot_paths(time: Array, paths: Sequence[PathStress], instants: Sequence[floa
     figure = new_figure(7.0, 1.0 + 1.9 * len(paths))
     panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True, sharey=True))
     # Right at the contact stress is many times that of the waves; curves may leave the panel there.
-    beyond = [path.stress[rows][:, path.position >= path.position[0] + NEAR * np.ptp(path.position)] for path in paths]
+    beyond = [
+        path.von_mises[rows][:, path.position >= path.position[0] + NEAR * np.ptp(path.position)] for path in paths
+    ]
     greatest = max(float(np.nanmax(stress, initial=0.0)) for stress in beyond)
     scale, unit = engineering(greatest, "Pa")
     for axes, path in zip(panels, paths, strict=True):
@@ -78,7 +57,8 @@ def plot_paths(time: Array, paths: Sequence[PathStress], instants: Sequence[floa
             colour = colormaps["viridis"](0.9 * k / max(1, len(rows) - 1))
             label = f"{1e6 * time[row]:.0f} µs"
             style = STYLES[k % len(STYLES)]
-            axes.plot(1e3 * path.position, scale * path.stress[row], color=colour, linestyle=style, label=label)
+            position, stress = _with_gaps(path)
+            axes.plot(1e3 * position, scale * stress[row], color=colour, linestyle=style, label=label)
         axes.set_title(path.name, loc="left", fontsize=10)
         axes.set_ylabel(f"von Mises [{unit}]")
         axes.set_xlim(1e3 * path.position[0], 1e3 * path.position[-1])
@@ -89,13 +69,13 @@ def plot_paths(time: Array, paths: Sequence[PathStress], instants: Sequence[floa
     return figure
 
 
-def plot_waves(time: Array, paths: Sequence[PathStress], speeds: Mapping[str, float]) -> Figure:
+def plot_waves(time: Array, paths: Sequence[PathHistory], speeds: Mapping[str, float]) -> Figure:
     """Position [mm] over time [µs] with stress as colour, on a log scale, and wave speeds as lines from the struck end.
 
     Args:
         time: of the samples [s], shape (time_count,).
         paths: at least one.
-        speeds: by label [m/s], see `wave_speeds`.
+        speeds: by label [m/s].
     """
     from matplotlib.colors import LogNorm
 
@@ -103,17 +83,16 @@ def plot_waves(time: Array, paths: Sequence[PathStress], speeds: Mapping[str, fl
     panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True, sharey=True))
     far = max(float(path.position[-1]) for path in paths)
     shown = time <= PASSAGES * far / min(speeds.values()) if speeds else np.ones(len(time), dtype=bool)
-    stress = np.concatenate([np.asarray(path.stress[shown]).ravel() for path in paths])
+    stress = np.concatenate([np.asarray(path.von_mises[shown]).ravel() for path in paths])
     # A few probes near the contact are far above the waves: the top hundredth may share one colour.
     limit = float(np.nanpercentile(stress, 99.0)) if stress.size else 0.0
     scale, unit = engineering(limit, "Pa")
     image, top = None, scale * limit or 1.0
     for axes, path in zip(panels, paths, strict=True):
-        value = scale * np.asarray(path.stress[shown]).T
+        position, stress = _with_gaps(path)
+        value = scale * stress[shown].T
         norm = LogNorm(top / 10.0**DECADES, top, clip=True)
-        image = axes.pcolormesh(
-            1e6 * time[shown], 1e3 * path.position, value, norm=norm, cmap="viridis", rasterized=True
-        )
+        image = axes.pcolormesh(1e6 * time[shown], 1e3 * position, value, norm=norm, cmap="viridis", rasterized=True)
         _draw_speeds(axes, path, speeds)
         axes.set_xlim(0.0, 1e6 * float(time[shown][-1]))
         axes.set_ylim(1e3 * float(path.position[0]), 1e3 * float(path.position[-1]))
@@ -127,7 +106,17 @@ def plot_waves(time: Array, paths: Sequence[PathStress], speeds: Mapping[str, fl
     return figure
 
 
-def _draw_speeds(axes: Axes, path: PathStress, speeds: Mapping[str, float]) -> None:
+def _with_gaps(path: PathHistory) -> tuple[Array, NDArray[np.floating]]:
+    """Positions [m] and stresses [Pa] of a path with no number where it jumps from one line to the next."""
+    distance = np.diff(path.position)
+    usual = float(np.median(distance)) if len(distance) else 0.0
+    ends = np.flatnonzero(distance > GAP * usual) + 1
+    beside = np.stack([path.position[ends - 1] + 0.5 * usual, path.position[ends] - 0.5 * usual], axis=1).ravel()
+    at = np.repeat(ends, 2)
+    return np.insert(path.position, at, beside), np.insert(path.von_mises, at, np.nan, axis=1)
+
+
+def _draw_speeds(axes: Axes, path: PathHistory, speeds: Mapping[str, float]) -> None:
     from matplotlib.patheffects import Normal, Stroke
 
     far = float(path.position[-1])
@@ -139,12 +128,11 @@ def _draw_speeds(axes: Axes, path: PathStress, speeds: Mapping[str, float]) -> N
         line.set_path_effects([Stroke(linewidth=2.4, foreground="black"), Normal()])
 
 
-def save_paths(
-    directory: str | os.PathLike[str], time: Array, paths: Sequence[PathStress], speeds: Mapping[str, float]
-) -> list[Path]:
+def save_path_figures(directory: str | os.PathLike[str], result: Result) -> list[Path]:
     """Write paths.png and waves.png into `directory` as PNG at 200 dots per inch."""
     folder = Path(directory)
+    speeds = {WAVES[key]: float(value) for key, value in result.summary.get("wave_speeds", {}).items()}
     return [
-        save_png(plot_paths(time, paths), folder / "paths.png"),
-        save_png(plot_waves(time, paths, speeds), folder / "waves.png"),
+        save_png(plot_paths(result.time, result.paths), folder / "paths.png"),
+        save_png(plot_waves(result.time, result.paths, speeds), folder / "waves.png"),
     ]

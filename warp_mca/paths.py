@@ -1,0 +1,139 @@
+"""Owns line probes: where they lie in the mesh, and the stress that a run recorded along them (paths.npz)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.element import shape_functions
+from warp_mca.errors import bad_value
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.scene import Path, Scene
+
+if TYPE_CHECKING:
+    from warp_mca.model import Model
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 64  # elements near a probe that are tried: long thin ones have their centres far away
+OUTSIDE = 0.05  # of an element's diagonal that a probe may lie outside: curved surfaces have flat faces
+
+
+@dataclass(frozen=True)
+class Probes:
+    """Where the probes of all paths lie in the model.
+
+    Attributes:
+        position: of each probe along its path [m], shape (probe_count,), float64, by path.
+        corner: nodes of the element around each probe, paths one after the other, shape (probe_count, 8), int32.
+        weight: its shape functions at the probe [-], shape (probe_count, 8), float64.
+    """
+
+    position: Mapping[str, Array]
+    corner: NDArray[np.int32]
+    weight: Array
+
+
+@dataclass(frozen=True)
+class PathHistory:
+    """Stress along one path in every output interval.
+
+    Attributes:
+        name: of the path.
+        position: of the probes along the path [m], shape (probe_count,), float64.
+        stress: xx, yy, zz, xy, yz, xz in the world frame [Pa], shape (row_count, probe_count, 6), float32.
+    """
+
+    name: str
+    position: Array
+    stress: NDArray[np.float32]
+
+    @property
+    def von_mises(self) -> NDArray[np.float32]:
+        """Equivalent stress [Pa], shape (row_count, probe_count), float32."""
+        xx, yy, zz, xy, yz, xz = np.moveaxis(self.stress, -1, 0)
+        direct = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
+        return np.sqrt(direct + 3.0 * (xy**2 + yz**2 + xz**2))
+
+
+def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
+    """Find the elements that the scene's paths run through.
+
+    Raises:
+        RequestError: a probe lies outside its body.
+    """
+    position: dict[str, Array] = {}
+    corner, weight = [np.zeros((0, 8), np.int32)], [np.zeros((0, 8))]
+    for path in scene.paths:
+        along = []
+        for line in path.lines:
+            share = np.linspace(0.0, 1.0, int(np.ceil(line.length / path.spacing - 1e-9)) + 1)
+            at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
+            nodes, weights = _elements_around(at, meshes[line.body], path)
+            along.append(line.position + share * line.length)
+            corner.append((nodes + model.node_start[line.body]).astype(np.int32))
+            weight.append(weights)
+        position[path.name] = np.concatenate(along)
+    return Probes(position, np.concatenate(corner), np.concatenate(weight))
+
+
+def _elements_around(at: Array, mesh: Mesh, path: Path) -> tuple[NDArray[np.int32], Array]:
+    """Corners of the element around each point, shape (point_count, 8), and the shape functions there."""
+    from scipy.spatial import cKDTree
+
+    corners = mesh.points[mesh.hexahedra]
+    _, near = cKDTree(corners.mean(axis=1)).query(at, k=min(CANDIDATES, len(corners)))
+    near = np.asarray(near).reshape(len(at), -1)
+    x = corners[near]  # (point, candidate, corner, axis)
+    xi = np.zeros((*near.shape, 3))
+    for _ in range(8):  # Newton's method on x(xi) = at, kept within the element
+        value, slope = shape_functions(xi)
+        J = np.einsum("pcak,pcai->pcik", slope, x)
+        missing = at[:, None] - np.einsum("pca,pcai->pci", value, x)
+        xi = np.clip(xi + np.linalg.solve(J, missing[..., None])[..., 0], -1.0, 1.0)
+    value, _ = shape_functions(xi)
+    apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", value, x), axis=-1)
+    best = apart.argmin(axis=1)
+    rows = np.arange(len(at))
+    chosen = x[rows, best]
+    allowed = OUTSIDE * np.linalg.norm(np.ptp(chosen, axis=1), axis=1)
+    far = int(np.argmax(apart[rows, best] - allowed))
+    if apart[far, best[far]] > allowed[far]:
+        place = ", ".join(f"{x:.6g}" for x in at[far])
+        raise bad_value(
+            f"Path {path.name}.lines", f"({place})", f"this point lies {apart[far, best[far]]:.3g} m outside the body"
+        )
+    return mesh.hexahedra[near[rows, best]], value[rows, best]
+
+
+def path_histories(probes: Probes, rings: Sequence[NDArray[np.float32]]) -> tuple[PathHistory, ...]:
+    """The paths of a run from what all probes recorded [Pa], each shape (row_count, probe_count, 6)."""
+    if not probes.position:
+        return ()
+    ends = np.cumsum([len(position) for position in probes.position.values()])
+    parts = np.split(np.concatenate(rings), ends[:-1], axis=1)
+    return tuple(PathHistory(name, at, s) for (name, at), s in zip(probes.position.items(), parts, strict=True))
+
+
+def save_paths(file: FilePath, time: Array, paths: Sequence[PathHistory]) -> None:
+    """Write time_s, and for each path NAME/position_m, NAME/stress_Pa and NAME/von_mises_Pa, as an npz archive."""
+    arrays: dict[str, NDArray] = {"time_s": time}
+    for path in paths:
+        arrays[f"{path.name}/position_m"] = path.position
+        arrays[f"{path.name}/stress_Pa"] = path.stress
+        arrays[f"{path.name}/von_mises_Pa"] = path.von_mises
+    with file.open("wb") as stream:
+        np.savez(stream, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def load_paths(file: str | os.PathLike[str]) -> tuple[PathHistory, ...]:
+    """The paths that `save_paths` wrote."""
+    with np.load(file) as arrays:
+        names = [key.removesuffix("/position_m") for key in arrays if key.endswith("/position_m")]
+        return tuple(PathHistory(n, arrays[f"{n}/position_m"], arrays[f"{n}/stress_Pa"]) for n in names)
