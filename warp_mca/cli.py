@@ -11,13 +11,16 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import warp_mca as mca
 from warp_mca import registry
 from warp_mca.errors import McaError, bad_value
 from warp_mca.scene import Scene
 from warp_mca.scene_file import SUFFIX, Origin
+
+if TYPE_CHECKING:
+    from warp_mca.recorders import Recorder
 
 WELCOME = """\
 warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
@@ -95,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--duration", type=float, metavar="SECONDS", help="of the impact phase (default: the scene's)")
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     run.add_argument("--force", action="store_true", help="replace results that the folder holds already")
-    run.add_argument("--viewer", default="none", choices=("rerun", "none"), help="(default: %(default)s)")
+    _add_recorders(run)
     run.set_defaults(command=_run)
 
     build = commands.add_parser("build", help="make the meshes of a scene and store them with it", allow_abbrev=False)
@@ -120,6 +123,42 @@ def _add_scene(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
 
 
+def _add_recorders(parser: argparse.ArgumentParser) -> None:
+    from warp_mca.recorders import FILES
+
+    group = parser.add_argument_group("see the run")
+    group.add_argument(
+        "--viewer", default="none", choices=("rerun", "none"), help="open a viewer and stream to it (default: none)"
+    )
+    for option, kind in FILES.items():
+        group.add_argument(f"--{option}", metavar="FILE", type=Path, help=kind.help)
+    group.add_argument("--frames", type=int, default=100, metavar="N", help="in each of them (default: %(default)s)")
+    group.add_argument(
+        "--snapshot",
+        dest="snapshots",
+        type=float,
+        action="append",
+        default=[],
+        metavar="SECONDS",
+        help="draw the bodies at this time after first contact; may be given several times",
+    )
+
+
+def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
+    """The recorders that the arguments ask for."""
+    from warp_mca.recorders import FILES, Cadence, SnapshotFile
+
+    cadence = Cadence(frames=args.frames)
+    found: list[Recorder] = []
+    if args.viewer == "rerun":
+        found.append(FILES["rrd"].make(args.rrd, viewer=True, cadence=cadence))
+    for option, kind in FILES.items():
+        file = getattr(args, option)
+        if file is not None and not (option == "rrd" and args.viewer == "rerun"):
+            found.append(kind.make(file) if option == "final" else kind.make(file, cadence=cadence))
+    return found + [SnapshotFile(out / f"snapshot-{1e6 * t:g}us.png", time=t) for t in args.snapshots]
+
+
 def _request(args: argparse.Namespace) -> Request:
     """Build the scene that the arguments ask for."""
     from warp_mca import scene_file
@@ -142,10 +181,9 @@ def _run(args: argparse.Namespace) -> None:
     from warp_mca.report.console import print_summary, progress_bar
     from warp_mca.results import FILES, PATH_FILES
 
-    if args.viewer != "none":
-        raise bad_value("--viewer", args.viewer, "this version has no live viewer yet; use --viewer none")
     request = _request(args)
     out = args.out or Path(request.label)
+    recorders = _recorders(args, out)
     _start_warp()
     with progress_bar() as progress:
         result = mca.run(
@@ -156,10 +194,12 @@ def _run(args: argparse.Namespace) -> None:
             out=out,
             force=args.force,
             meshes=request.meshes,
+            recorders=recorders,
             progress=progress,
         )
     written = [*FILES, *(PATH_FILES if result.paths else ())]
-    print_summary(result, [str(out / name) for name in written])
+    recorded = [recorder.name for recorder in recorders if Path(recorder.name).exists()]
+    print_summary(result, [*(str(out / name) for name in written), *recorded])
     as_designed = not args.settings and args.duration is None
     if request.source and request.source.check and as_designed:
         for message in request.source.check(result):

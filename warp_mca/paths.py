@@ -85,10 +85,10 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
 
 def _elements_around(at: Array, mesh: Mesh, path: Path) -> tuple[NDArray[np.int32], Array]:
     """Corners of the element around each point, shape (point_count, 8), and the shape functions there."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     corners = mesh.points[mesh.hexahedra]
-    _, near = cKDTree(corners.mean(axis=1)).query(at, k=min(CANDIDATES, len(corners)))
+    _, near = KDTree(corners.mean(axis=1)).query(at, k=min(CANDIDATES, len(corners)))
     near = np.asarray(near).reshape(len(at), -1)
     x = corners[near]  # (point, candidate, corner, axis)
     xi = np.zeros((*near.shape, 3))

@@ -1,1 +1,53 @@
-"""Recorders: what writes a run's results while it goes on."""
+"""Recorders: what shows or writes a run while it goes on. `from warp_mca.recorders import UsdFile, Cadence`."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, NamedTuple
+
+from warp_mca.recorders.recorder import Cadence, Recorder
+
+if TYPE_CHECKING:
+    from warp_mca.recorders.mesh_file import FinalState
+    from warp_mca.recorders.rerun_stream import RerunStream
+    from warp_mca.recorders.snapshot_file import SnapshotFile
+    from warp_mca.recorders.usd_file import UsdFile
+    from warp_mca.recorders.vtkhdf_file import VtkHdfFile
+
+
+class Kind(NamedTuple):
+    """A recorder that writes a file: its module, its class, and what the command line says of its option."""
+
+    module: str
+    name: str
+    help: str
+
+    def make(self, *args: object, **options: object) -> Recorder:
+        """The recorder; its module, and what that needs, is loaded only now."""
+        return getattr(import_module(self.module), self.name)(*args, **options)
+
+
+# By option of the command line: --rrd FILE, and so on.
+FILES = {
+    "rrd": Kind("warp_mca.recorders.rerun_stream", "RerunStream", "record for the rerun viewer (.rrd)"),
+    "usd": Kind("warp_mca.recorders.usd_file", "UsdFile", "write deformed skins as USD (.usdc, .usda)"),
+    "vtkhdf": Kind("warp_mca.recorders.vtkhdf_file", "VtkHdfFile", "write all fields for ParaView (.vtkhdf)"),
+    "final": Kind("warp_mca.recorders.mesh_file", "FinalState", "write the last state in a format of meshio (.vtu, …)"),
+}
+_MODULES = {kind.name: kind.module for kind in FILES.values()} | {"SnapshotFile": "warp_mca.recorders.snapshot_file"}
+
+__all__ = [
+    "Cadence",
+    "Recorder",
+    "RerunStream",
+    "UsdFile",
+    "VtkHdfFile",
+    "FinalState",
+    "SnapshotFile",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'warp_mca.recorders' has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name]), name)

@@ -142,14 +142,13 @@ class Recording:
                 recorder.finish(False)
 
     def _frame(self, slot: _Slot, needs: frozenset[str], index: int) -> Frame:
-        arrays = {
-            need: {name: a.numpy() for name, a in slot.arrays[need].items()} for need in needs & slot.arrays.keys()
+        arrays: dict[str, dict[str, Any]] = {
+            need: {name: np.asarray(array.numpy()) for name, array in slot.arrays[need].items()}
+            for need in needs & slot.arrays.keys()
         }
-        skin: dict[str, dict[str, Any]] = {
-            name: self._by_body(array) for name, array in arrays.get(SURFACE, {}).items()
-        }
-        nothing: dict[str, Any] = {"points": np.zeros((0, 3), np.float32), "state": np.zeros(0, np.int32)}
-        contact = arrays.get(CONTACT, nothing)
+        skin: dict[str, Any] = {name: self._by_body(array) for name, array in arrays.get(SURFACE, {}).items()}
+        nothing = {"points": np.zeros((0, 3), np.float32), "state": np.zeros(0, np.int32)}
+        contact: dict[str, Any] = arrays.get(CONTACT, nothing)
         closed = contact["state"] != OPEN
         return Frame(
             index=index,

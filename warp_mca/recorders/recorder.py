@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
+from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
@@ -102,6 +103,12 @@ class RunInfo:
     output_interval: float
     duration: float
     warn: Callable[[str], None]
+
+    @property
+    def striking(self) -> list[str]:
+        """Bodies that are not only struck, as a plate is that is much larger than what strikes it."""
+        struck = {c.master.body for c in self.scene.contacts if not isinstance(c.master, RigidPlane)}
+        return [body for body in self.surfaces if body not in struck] or list(self.surfaces)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from warp_mca.errors import bad_value
 from warp_mca.recorders.colours import ColourScale, packed
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, Cadence, check_file
-from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -231,18 +230,20 @@ def _framing(info: RunInfo) -> tuple[NDArray[np.float64], NDArray[np.float64] | 
 
     The box leaves out bodies that are only struck, such as a plate much larger than what strikes it.
     """
-    struck = {c.master.body for c in info.scene.contacts if not isinstance(c.master, RigidPlane)}
-    striking = [body for body in info.surfaces if body not in struck] or list(info.surfaces)
-    points = np.concatenate([info.model.X[info.surfaces[body].nodes] for body in striking])
+    points = np.concatenate([info.model.X[info.surfaces[body].nodes] for body in info.striking])
     focus = info.model.X[info.model.points[0]] if info.model.points[0] >= 0 else None
-    return np.array([points.min(axis=0), points.max(axis=0)]), focus, [entity("world", body) for body in struck]
+    return (
+        np.array([points.min(axis=0), points.max(axis=0)]),
+        focus,
+        [entity("world", body) for body in info.surfaces if body not in info.striking],
+    )
 
 
 def _bars(position: NDArray[np.floating], index: int, count: int) -> tuple[NDArray, NDArray]:
     """Centres and widths [mm] of the bars of path `index` of `count`: they share the space between two probes."""
     position = TO_MM * np.asarray(position)
-    width = np.gradient(position) / count if len(position) > 1 else np.ones(1)
-    return position + (index - 0.5 * (count - 1)) * width, np.abs(width).astype(np.float32)
+    width = np.median(np.abs(np.diff(position))) / count if len(position) > 1 else 1.0
+    return position + (index - 0.5 * (count - 1)) * width, np.full(len(position), width, dtype=np.float32)
 
 
 def entity(*parts: str) -> str:

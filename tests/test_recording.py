@@ -1,0 +1,320 @@
+"""Recorders in real runs: what a frame holds, when it is taken, and that a run is the same with and without them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rrd import rows
+
+import warp_mca as mca
+from warp_mca.errors import GuardError, RequestError
+from warp_mca.model import build_model
+from warp_mca.output import Output
+from warp_mca.paths import locate
+from warp_mca.recorders import Cadence, RerunStream, SnapshotFile
+from warp_mca.recorders.frames import skins
+from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
+from warp_mca.solver import Solver
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+
+
+def bar(material=STEEL, velocity=(2.0, 0.0, 0.0), wall=0.1, **more) -> mca.Scene:
+    """A bar of 0.1 m along x that runs into a rough wall at x = `wall`."""
+    contact = mca.Contact(
+        slave=mca.Surface(body="bar", nodes="xmax"),
+        master=mca.RigidPlane(point=(wall, 0.0, 0.0), normal=(-1.0, 0.0, 0.0)),
+        mu=0.3,
+    )
+    axis = mca.Line(body="bar", start=(0.1, 0.005, 0.005), end=(0.0, 0.005, 0.005))
+    edge = mca.Line(body="bar", start=(0.1, 0.0, 0.0), end=(0.0, 0.0, 0.0))
+    return mca.Scene(
+        name="bar",
+        bodies=(
+            mca.Body(
+                name="bar",
+                geometry=mca.Box(size=(0.1, 0.01, 0.01), divisions=(20, 2, 2)),
+                material=material,
+                velocity=velocity,
+            ),
+        ),
+        contacts=(contact,),
+        paths=(
+            mca.Path(name="axis", lines=(axis,), spacing=0.004),
+            mca.Path(name="edge", lines=(edge,), spacing=0.01),
+        ),
+        **{"impact": mca.ImpactPhase(duration=4e-5, output_interval=1e-6)} | more,
+    )
+
+
+class Memory:
+    """Keeps copies of what it is given."""
+
+    name = "memory"
+
+    def __init__(self, *needs: str, cadence: Cadence | None = None) -> None:
+        self.needs, self.cadence = frozenset(needs), cadence or Cadence(frames=5)
+        self.frames: list[Frame] = []
+        self.rows: list[dict] = []
+        self.ended: bool | None = None
+
+    def start(self, info) -> None:
+        self.info = info
+
+    def frame(self, frame: Frame) -> None:
+        import copy
+
+        self.frames.append(copy.deepcopy(frame))
+
+    def history(self, rows) -> None:
+        self.rows.append(dict(rows))
+
+    def finish(self, ok: bool) -> None:
+        assert self.ended is None
+        self.ended = ok
+
+
+class Failing(Memory):
+    """Fails at its third frame."""
+
+    name = "failing"
+
+    def frame(self, frame: Frame) -> None:
+        super().frame(frame)
+        if frame.index == 2:
+            raise OSError("no space left")
+
+
+@pytest.fixture(scope="module")
+def plain() -> mca.Result:
+    return mca.run(bar())
+
+
+def same(one: mca.Result, other: mca.Result) -> bool:
+    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in one.history)
+
+
+def test_frames_hold_only_what_was_asked_for():
+    surface, volume = Memory(SURFACE), Memory(VOLUME, CONTACT)
+    mca.run(bar(), recorders=[surface, volume])
+    assert len(surface.frames) == len(volume.frames) == 5
+    assert surface.frames[0].volume is None
+    assert not volume.frames[0].points
+    assert surface.frames[-1].points["bar"].dtype == np.float32
+    assert not len(surface.frames[-1].contact_points)
+
+
+def test_recorders_change_no_number_and_see_all_of_the_history(plain: mca.Result):
+    one, other = Memory(SURFACE, CONTACT, PATHS, VOLUME), Memory(SURFACE, cadence=Cadence(seconds=7e-6))
+    result = mca.run(bar(), recorders=[one, other])
+    assert same(plain, result)
+    assert np.array_equal(plain.paths[0].stress, result.paths[0].stress)
+    for name, column in result.history.items():
+        np.testing.assert_array_equal(np.concatenate([rows[name] for rows in one.rows]), column)
+    np.testing.assert_allclose([frame.time for frame in other.frames], [0, 7e-6, 14e-6, 21e-6, 28e-6, 35e-6, 40e-6])
+    assert one.ended is True
+
+
+def test_a_frame_is_the_state_at_its_time(plain: mca.Result):
+    """The surface is the model moved by the volume's displacement; contact and path stress are those of the results."""
+    memory = Memory(SURFACE, CONTACT, PATHS, VOLUME)
+    result = mca.run(bar(), recorders=[memory])
+    model, nodes = memory.info.model, memory.info.surfaces["bar"].nodes
+    for frame in memory.frames:
+        row = round(frame.time / 1e-6)
+        assert frame.step * memory.info.dt == pytest.approx(frame.time, rel=1e-12)
+        volume = frame.volume
+        assert volume is not None
+        moved = (model.X + volume.displacement)[nodes]
+        np.testing.assert_allclose(frame.points["bar"], moved, atol=1e-8)
+        np.testing.assert_array_equal(frame.von_mises["bar"], volume.von_mises[nodes])
+        np.testing.assert_array_equal(frame.path_stress["axis"], result.paths[0].von_mises[row])
+        kinetic = 0.5 * (model.mass * (volume.velocity.astype(float) ** 2).sum(axis=1)).sum()
+        # the ledger has v(n-1/2) . v(n+1/2), which differs for what rings from step to step
+        assert kinetic == pytest.approx(result["E_kinetic"][row], abs=5e-3 * result["E_kinetic"][0])
+    pressing = memory.frames[2]
+    assert result.F_n[19:22].min() > 0.0
+    assert len(pressing.contact_points) == 9
+    np.testing.assert_allclose(pressing.contact_points[:, 0], 0.1, atol=1e-5)
+    assert not len(memory.frames[0].contact_points)
+
+
+def test_the_wave_behind_the_front_carries_the_stress_of_bar_theory():
+    """sigma = rho c v between the wall and the front, up to the transverse inertia that makes it ring."""
+    result = mca.run(bar(wall=0.1), duration=1.6e-5)
+    axis = result.paths[0]
+    c = STEEL.wave_speeds["bar"]
+    behind = axis.position < 0.5 * c * result.time[-1]
+    along = axis.stress[-1, behind, 0].mean()
+    assert along == pytest.approx(-STEEL.rho * c * 2.0, rel=0.03)
+    assert np.abs(axis.stress[-1, axis.position > 1.2 * c * result.time[-1]]).max() < 0.01 * abs(along)
+
+
+def test_free_flight_moves_the_skin_exactly(tmp_path):
+    file = tmp_path / "flight.rrd"
+    memory = Memory(SURFACE)
+    mca.run(bar(velocity=(2.0, 1.0, -0.5), wall=1.0), recorders=[memory, RerunStream(file, cadence=Cadence(frames=5))])
+    model, nodes = memory.info.model, memory.info.surfaces["bar"].nodes
+    last = (model.X + 4e-5 * model.V)[nodes]
+    np.testing.assert_allclose(memory.frames[-1].points["bar"], last, atol=1e-8)
+    positions = sorted((step, value) for _, step, value in rows(file, "/world/bar", "Mesh3D:vertex_positions"))
+    assert len(positions) == 5
+    np.testing.assert_array_equal(positions[-1][1], memory.frames[-1].points["bar"])
+
+
+def test_a_recording_of_a_run_holds_topology_frames_forces_and_paths(tmp_path):
+    file = tmp_path / "bar.rrd"
+    result = mca.run(bar(), recorders=[RerunStream(file, cadence=Cadence(frames=9))])
+    ((static, _, _),) = rows(file, "/world/bar", "Mesh3D:triangle_indices")
+    assert static
+    assert len(list(rows(file, "/world/bar", "Mesh3D:vertex_positions"))) == 9
+    force = sorted((step, value[0]) for _, step, value in rows(file, "/plots/force/F_n_N", "Scalars:scalars"))
+    assert [value for _, value in force] == result.F_n.tolist()
+    curves = sorted((step, value) for _, step, value in rows(file, "/paths/axis", "BarChart:values"))
+    np.testing.assert_allclose(curves[-1][1][0]["buffer"], 1e-6 * result.paths[0].von_mises[-1], rtol=1e-6)
+
+
+def test_a_recorder_that_fails_is_a_warning_and_the_run_goes_on(plain: mca.Result):
+    failing, memory = Failing(SURFACE), Memory(VOLUME)
+    result = mca.run(bar(), recorders=[failing, memory])
+    assert same(plain, result)
+    assert len(failing.frames) == 3
+    assert failing.ended is False
+    assert len(memory.frames) == 5
+    assert memory.ended is True
+    assert "failing: recording stopped at frame 3: no space left" in result.warnings
+
+
+def test_a_recorder_that_cannot_start_stops_the_run_before_it_begins(tmp_path):
+    class Unwilling(Memory):
+        def start(self, info) -> None:
+            raise RequestError("no room")
+
+    first = Memory(SURFACE)
+    with pytest.raises(RequestError, match="no room"):
+        mca.run(bar(), recorders=[first, Unwilling(SURFACE)], out=tmp_path / "out")
+    assert first.ended is False
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_breaks_a_guard_closes_its_recorders():
+    memory = Memory(SURFACE)
+    with pytest.raises(GuardError):
+        impact = mca.ImpactPhase(duration=1e-4, output_interval=1e-6, energy_tolerance=1e-9)
+        mca.run(bar(impact=impact), recorders=[memory])
+    assert memory.ended is False
+
+
+def test_a_snapshot_is_drawn_at_its_time(tmp_path):
+    mca.run(bar(), recorders=[SnapshotFile(tmp_path / "new" / "a.png", time=2e-5)])
+    assert (tmp_path / "new" / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("cadence", "expected"),
+    [
+        (Cadence(frames=2), [0, 10]),
+        (Cadence(frames=4), [0, 3, 7, 10]),
+        (Cadence(frames=99), list(range(11))),
+        (Cadence(seconds=4e-6), [0, 4, 8, 10]),
+        (Cadence(seconds=1e-9), list(range(11))),
+        (Cadence(seconds=1.0), [0, 10]),
+        (Cadence(times=(3.2e-6, 99.0)), [3, 10]),
+    ],
+)
+def test_frames_fall_on_the_ends_of_output_intervals(cadence: Cadence, expected: list[int]):
+    assert np.flatnonzero(cadence.rows(10, 1e-6)).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    "given", [{}, {"frames": 3, "seconds": 1.0}, {"frames": 1}, {"seconds": 0.0}, {"times": (-1.0,)}]
+)
+def test_bad_cadences_are_refused(given: dict):
+    with pytest.raises(RequestError):
+        Cadence(**given)
+
+
+def solver_with_output(material, precision: str = "float64") -> tuple[Solver, Output]:
+    """A bar with an uneven mesh, and its output stage."""
+    scene = bar(material)
+    mesh = mca.mesh(scene)["bar"]
+    rng = np.random.default_rng(4)
+    inner = np.setdiff1d(np.arange(len(mesh.points)), np.unique(mesh.boundary[0]))
+    mesh.points[inner] += rng.uniform(-1e-3, 1e-3, (len(inner), 3))
+    meshes = {"bar": mesh}
+    model = build_model(scene, meshes, {"bar": mesh.points}, {"bar": np.zeros_like(mesh.points)})
+    solver = Solver(model, device="cpu", precision=precision, dt=1e-9)
+    probes = locate(scene, model, meshes)
+    np.testing.assert_allclose(
+        np.einsum("pa,pai->pi", probes.weight, model.X[probes.corner])[:26],
+        np.linspace((0.1, 0.005, 0.005), (0.0, 0.005, 0.005), 26),
+        atol=1e-12,
+    )
+    solver.output = Output(solver, skins(model, meshes), probes, frozenset((SURFACE, VOLUME)))
+    return solver, solver.output
+
+
+@pytest.mark.parametrize("precision", ["mixed", "float64"])
+def test_a_uniform_strain_gives_a_uniform_stress_that_turns_with_the_body(precision: str):
+    from scipy.spatial.transform import Rotation
+
+    solver, output = solver_with_output(STEEL, precision)
+    strain = 1e-3 * np.array([[2.0, 0.3, 0.1], [0.3, -1.0, 0.4], [0.1, 0.4, 0.5]])
+    turn = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
+    X = solver.model.X
+    solver.u.assign(X @ (turn @ (np.eye(3) + strain)).T - X)
+    output.before_step(frozenset((SURFACE, VOLUME)))
+    K, G = STEEL.bulk_modulus, STEEL.shear_modulus
+    deviator = strain - np.trace(strain) / 3.0 * np.eye(3)
+    sigma = turn @ (2.0 * G * deviator + K * np.trace(strain) * np.eye(3)) @ turn.T
+    expected = sigma[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    tolerance = 1e-4 * np.abs(sigma).max()  # strain squared, and float32
+    np.testing.assert_allclose(output.arrays[VOLUME]["stress"].numpy(), np.tile(expected, (len(X), 1)), atol=tolerance)
+    np.testing.assert_allclose(output.probe_rows(1)[0], np.tile(expected, (37, 1)), atol=tolerance)
+    von_mises = 2.0 * G * np.sqrt(1.5 * (deviator**2).sum())
+    np.testing.assert_allclose(output.arrays[SURFACE]["von_mises"].numpy(), von_mises, rtol=1e-4)
+
+
+def test_plastic_strain_at_nodes():
+    """Uniaxial strain beyond yield: p = (2 G e_eq' - sigma_y) / (3 G + H) from the radial return by hand."""
+    metal = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=200e6, E_t=10e9)
+    solver, output = solver_with_output(metal)
+    X = solver.model.X
+    solver.u.assign(X * [5e-3, 0.0, 0.0])
+    solver._forces()
+    output.before_step(frozenset((SURFACE, VOLUME)))
+    G, H = metal.shear_modulus, metal.hardening_modulus
+    p = (2.0 * G * 5e-3 - 200e6) / (3.0 * G + H)
+    np.testing.assert_allclose(output.arrays[SURFACE]["plastic_strain"].numpy(), p, rtol=1e-4)
+    np.testing.assert_allclose(output.arrays[VOLUME]["von_mises"].numpy(), 2.0 * G * 5e-3 - 3.0 * G * p, rtol=1e-4)
+
+
+def test_a_scene_without_paths_pays_nothing_for_them(monkeypatch: pytest.MonkeyPatch):
+    import dataclasses
+
+    from warp_mca import output
+
+    monkeypatch.setattr(output.Output, "__init__", None)
+    mca.run(dataclasses.replace(bar(), paths=()), duration=2e-6)
+
+
+def test_a_path_that_leaves_its_body_is_refused():
+    line = mca.Line(body="bar", start=(0.0, 0.005, 0.005), end=(0.2, 0.005, 0.005))
+    scene = mca.Scene(
+        name="bar", bodies=bar().bodies, impact=bar().impact, paths=(mca.Path(name="P", lines=(line,), spacing=0.01),)
+    )
+    with pytest.raises(RequestError, match=r"Path P\.lines.*outside the body"):
+        mca.run(scene)
+
+
+def test_results_with_paths_are_saved_and_loaded(tmp_path, plain: mca.Result):
+    from warp_mca.results import save
+
+    save(plain, tmp_path / "run")
+    again = mca.load(tmp_path / "run")
+    assert [path.name for path in again.paths] == ["axis", "edge"]
+    np.testing.assert_array_equal(again.paths[1].stress, plain.paths[1].stress)
+    np.testing.assert_array_equal(again.paths[1].position, plain.paths[1].position)
+    with np.load(tmp_path / "run" / "paths.npz") as arrays:
+        np.testing.assert_array_equal(arrays["time_s"], plain.time)
+        np.testing.assert_array_equal(arrays["axis/von_mises_Pa"], plain.paths[0].von_mises)

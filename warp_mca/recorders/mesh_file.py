@@ -1,0 +1,184 @@
+"""Owns `FinalState`: the deformed mesh at the end of a run, with its fields, in any format that meshio writes."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.errors import McaError, RequestError, bad_value
+from warp_mca.recorders.recorder import VOLUME, Cadence, check_file
+
+if TYPE_CHECKING:
+    import meshio
+
+    from warp_mca.model import Model
+    from warp_mca.recorders.recorder import Frame, RunInfo
+
+USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"
+DISK_RESERVE = 64 << 20  # left free on the disk, for the results [byte]
+# Formats whose readers take six components as xx, yy, zz, xy, yz, xz; XDMF's take yy as the fourth, gmsh takes none.
+SIX_COMPONENTS = ("vtu", "vtk")
+COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+
+
+class FinalState:
+    """Writes the last frame: displaced points, hexahedra, the fields at nodes, body and material of each element.
+
+    The file appears once the run has ended as it should, and then whole; what was there before stays until then.
+    """
+
+    def __init__(self, file: str | os.PathLike[str]) -> None:
+        """Write to `file`, in the format that its suffix stands for; one element is written and read for a trial.
+
+        Raises:
+            RequestError: `file` cannot be written, or its format holds no 8-node hexahedra.
+        """
+        meshio = _load_meshio()
+        suffix = Path(file).suffix
+        if suffix not in meshio.extension_to_filetypes:
+            raise bad_value("final", str(file), f"meshio knows no format with this suffix; {USUAL}")
+        self.path = check_file("final", file, suffix)
+        self.name = str(self.path)
+        self.needs = frozenset((VOLUME,))
+        self.cadence = Cadence(frames=2)
+        self.left_out = _left_out(self.path)
+        self._fields: dict[str, NDArray] | None = None
+
+    def start(self, info: RunInfo) -> None:
+        """Make missing folders, and say which fields the format has no place for.
+
+        Raises:
+            RequestError: the folder cannot be made.
+        """
+        self.model, self._fields = info.model, None
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise bad_value("final", str(self.path), f"its folder cannot be made ({error.strerror})") from error
+        if self.left_out:
+            info.warn(f"{self.path}: this format has no place for {', '.join(self.left_out)}; {USUAL} to keep them")
+
+    def frame(self, frame: Frame) -> None:
+        """Keep it in place of the one before."""
+        assert frame.volume is not None
+        self._fields = {name: np.array(field) for name, field in vars(frame.volume).items()}
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Holds nothing that such a file could take."""
+
+    def finish(self, ok: bool) -> None:
+        """Write the file; after a run that failed there is no final state, and none is written.
+
+        Raises:
+            McaError: it cannot be written.
+        """
+        fields, self._fields = self._fields, None
+        if ok and fields is not None:
+            nodes, body, material = cells(self.model)
+            points = self.model.X + fields["displacement"]
+            _save(self.path, _mesh(self.path, points, nodes, fields, {"body": body, "material": material}))
+
+
+def cells(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
+    """Nodes of each element, shape (element_count, 8); index of its body in the scene; its row in `Model.law`.
+
+    Elements come in the order of the concatenated meshes, which is not the model's.
+    """
+    nodes = np.empty((model.element_count, 8), dtype=np.int64)
+    material = np.empty(model.element_count, dtype=np.int32)
+    nodes[model.element_of] = np.concatenate([block.conn.T for block in model.blocks])
+    material[model.element_of] = np.concatenate([block.material for block in model.blocks])
+    start = list(model.element_start.values())
+    body = np.searchsorted(start, np.arange(model.element_count), side="right") - 1
+    return nodes, body.astype(np.int32), material
+
+
+def _load_meshio():
+    try:
+        import meshio
+    except ImportError as error:
+        raise RequestError(f"meshio cannot be imported ({error}): install it with pip install meshio") from error
+    return meshio
+
+
+def _format(path: Path) -> str:
+    """meshio's name of the format; .msh stands for gmsh's, and not for the other one that meshio has."""
+    known = _load_meshio().extension_to_filetypes[path.suffix]
+    return "gmsh" if "gmsh" in known else known[0]
+
+
+def _mesh(
+    path: Path, points: NDArray, nodes: NDArray, fields: Mapping[str, NDArray], cell_fields: Mapping[str, NDArray]
+) -> meshio.Mesh:
+    """What is written to `path`: where formats disagree on six components, stress becomes six scalars."""
+    at_points = dict(fields)
+    if _format(path) not in SIX_COMPONENTS:
+        stress = at_points.pop("stress")
+        at_points |= {f"stress_{name}": np.ascontiguousarray(stress[:, k]) for k, name in enumerate(COMPONENTS)}
+    at_cells = {name: [field] for name, field in cell_fields.items()}
+    return _load_meshio().Mesh(points, [("hexahedron", nodes)], point_data=at_points, cell_data=at_cells)
+
+
+def _write(path: Path, mesh: meshio.Mesh) -> None:
+    """Let meshio write, without what it prints."""
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        _load_meshio().write(path, mesh, file_format=_format(path))
+
+
+def _left_out(path: Path) -> list[str]:
+    """Names of the fields that a format drops, found by writing one element and reading it again.
+
+    Raises:
+        RequestError: the element does not come back.
+    """
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+    widths = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
+    fields = {name: np.zeros((8, *width), np.float32) for name, width in widths.items()}
+    nodes, index = np.arange(8)[None], np.zeros(1, dtype=np.int32)
+    mesh = _mesh(path, points, nodes, fields, {"body": index, "material": index})
+    why = "they do not come back"
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / path.name
+        try:
+            _write(trial, mesh)
+            with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+                read = _load_meshio().read(trial)
+            sound = [block.type for block in read.cells] == ["hexahedron"] and np.array_equal(read.cells[0].data, nodes)
+        except (Exception, SystemExit) as error:  # what its writers and readers raise, or do, differs
+            sound, why = False, " ".join(str(error).split())
+    if not sound:
+        raise bad_value("final", str(path), f"meshio cannot write 8-node hexahedra in this format ({why}); {USUAL}")
+    wanted = [(name, read.point_data) for name in mesh.point_data] + [(name, read.cell_data) for name in mesh.cell_data]
+    return [name for name, kept in wanted if not any(key.startswith(name) for key in kept)]
+
+
+def _save(path: Path, mesh: meshio.Mesh) -> None:
+    """Write beside `path` first and then rename, so that the file there is whole at any time.
+
+    Raises:
+        McaError: meshio or the disk fails.
+    """
+    folder = None
+    try:
+        arrays = [mesh.points, mesh.cells[0].data, *mesh.point_data.values()]
+        if shutil.disk_usage(path.parent).free < DISK_RESERVE + sum(array.nbytes for array in arrays):
+            raise OSError("too little is free on its disk")
+        folder = Path(tempfile.mkdtemp(prefix=f".{path.stem}-", dir=path.parent))
+        _write(folder / path.name, mesh)
+        # Some formats take two files, of which the one that was asked for names the other.
+        for part in sorted(folder.iterdir(), key=lambda part: part.name == path.name):
+            part.replace(path.with_name(part.name))
+    except (Exception, SystemExit) as error:
+        raise McaError(f"the final state could not be written: {' '.join(str(error).split())}") from error
+    finally:
+        if folder:
+            shutil.rmtree(folder, ignore_errors=True)

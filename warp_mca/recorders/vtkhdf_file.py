@@ -1,0 +1,210 @@
+"""Owns the ParaView recorder: nodal fields of the whole mesh over time in one VTKHDF file.
+
+https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/vtkhdf_specifications.html
+
+HDF5 promises nothing about a file whose writer is killed, or whose disk is full, while it grows. So this one never
+grows: all frames that the run will have get their place before it begins, in a file that stays sparse until they come.
+A frame then is plain data written to where it belongs, and after that the number of steps, in place.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.errors import RequestError, bad_value
+from warp_mca.recorders.mesh_file import cells
+from warp_mca.recorders.recorder import VOLUME, Cadence, check_file
+
+if TYPE_CHECKING:
+    import h5py
+
+    from warp_mca.model import Model
+    from warp_mca.recorders.recorder import Frame, RunInfo
+
+DISK_RESERVE = 64 << 20  # left free on the disk, for the results [byte]
+FRAMES = Cadence(frames=100)
+VTK_HEXAHEDRON = 12
+FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
+
+
+class VtkHdfFile:
+    """Writes displacement, velocity, stress, von Mises stress and plastic strain at all nodes, as float32.
+
+    Points stay where they were at t = 0, in float64: float32 positions would lose displacements below 3e-8 m, and
+    ParaView's Warp By Vector moves them by any multiple of `displacement`. Storing them in every frame as well would
+    take a fifth more.
+
+    The file appears with its first frame. From then on it can be opened at any time, also while the run goes on.
+    """
+
+    def __init__(self, file: str | os.PathLike[str], *, cadence: Cadence = FRAMES) -> None:
+        """Record to `file` (.vtkhdf or .hdf), which is made, or replaced; `cadence` says when frames are taken.
+
+        Raises:
+            RequestError: `file` cannot be written.
+        """
+        self.path = check_file("vtkhdf", file, ".vtkhdf", ".hdf")
+        self.name = str(self.path)
+        self.needs = frozenset((VOLUME,))
+        self.cadence = cadence
+        self.frame_count = 0
+        self._unborn = self.path.with_name(f".{self.path.name}.part")
+        self._file: h5py.File | None = None
+
+    def start(self, info: RunInfo) -> None:
+        """Write the mesh, and give every frame its place.
+
+        Raises:
+            RequestError: the file cannot be made.
+        """
+        try:
+            import h5py
+        except ImportError as error:
+            raise RequestError(f"h5py cannot be imported ({error}): install it with pip install h5py") from error
+
+        intervals = round(info.duration / info.output_interval)
+        count = int(self.cadence.rows(intervals, info.output_interval).sum())
+        self.node_count, self.frame_count = info.model.node_count, 0
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            # The earliest version has no marks that lock out readers of a file whose writer was killed; neither may a
+            # lock, so that ParaView can look on.
+            self._file = h5py.File(self._unborn, "w", libver="earliest", locking=False)
+            root = self._file.create_group("VTKHDF")
+            _make_steps(root, count, self.node_count)
+            _write_mesh(root, info.model)
+            self._file.flush()
+            size, free = self._unborn.stat().st_size, shutil.disk_usage(self.path.parent).free
+        except (OSError, RuntimeError) as error:
+            self._abandon()
+            raise bad_value("vtkhdf", str(self.path), f"it cannot be written ({_reason(error)})") from error
+        if size + DISK_RESERVE > free:
+            info.warn(
+                f"{self.path}: {count} frames take {size / 1e9:.2g} GB, but its disk has {free / 1e9:.2g} GB free"
+            )
+
+    def frame(self, frame: Frame) -> None:
+        """Write one frame.
+
+        Raises:
+            OSError: it cannot be written; the file stays as it was after the frame before.
+        """
+        assert self._file is not None
+        try:
+            self._write(self._file["VTKHDF"], frame)
+        except (OSError, RuntimeError) as error:
+            self._abandon()
+            raise OSError(f"{_reason(error)}; the file holds the {self.frame_count} frames before") from error
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Is in history.csv, which ParaView opens."""
+
+    def finish(self, ok: bool) -> None:
+        """Close the file.
+
+        Raises:
+            OSError: it cannot be closed; it stays as it was after the last frame.
+        """
+        if self._file is None:
+            return
+        try:
+            self._publish(self._file["VTKHDF/Steps"], self.frame_count)  # undoes a frame that was interrupted
+            self._file.close()
+            self._file = None
+        except (OSError, RuntimeError) as error:
+            raise OSError(f"{_reason(error)}; the file holds {self.frame_count} frames") from error
+        finally:
+            self._abandon()
+
+    def _write(self, root: h5py.Group, frame: Frame) -> None:
+        place = slice(self.frame_count * self.node_count, (self.frame_count + 1) * self.node_count)
+        fields = {name: getattr(frame.volume, name) for name in FIELDS}
+        needed = DISK_RESERVE + sum(field.nbytes for field in fields.values())
+        if shutil.disk_usage(self.path.parent).free < needed:
+            raise OSError(errno.ENOSPC, f"less than {needed >> 20} MiB are free on its disk")
+        for name, field in fields.items():
+            root["PointData"][name][place] = field
+        root["FieldData/step"][self.frame_count] = frame.step
+        self._file.flush()  # what a frame holds is in the file before the number of steps speaks of it
+        self._publish(root["Steps"], self.frame_count + 1, frame.time)
+        if self.frame_count == 0:
+            self._unborn.replace(self.path)
+        self.frame_count += 1
+
+    def _publish(self, steps: h5py.Group, count: int, time: float | None = None) -> None:
+        """Set the number of steps; HDF5 writes it and the length of `Values`, its neighbour, in one go."""
+        steps["Values"].resize((max(count, 1),))
+        if time is not None:
+            steps["Values"][count - 1] = time
+        steps.attrs.modify("NSteps", np.int32(count))
+        self._file.flush()
+
+    def _abandon(self) -> None:
+        """Let go of a file that HDF5 may be unable to close, and of one that never got a frame."""
+        if self._file is not None:
+            # It would try again to write what it could not, last when Python exits, and crash it: let it succeed.
+            null = os.open(os.devnull, os.O_RDWR)
+            os.dup2(null, self._file.id.get_vfd_handle())
+            os.close(null)
+            with suppress(OSError, RuntimeError):
+                self._file.close()
+            self._file = None
+        self._unborn.unlink(missing_ok=True)
+
+
+def _make_steps(root: h5py.Group, count: int, node_count: int) -> None:
+    """Make places for `count` frames, and say where each is.
+
+    `Values` is as long as the number of steps, because VTK reads all of it. Its header and the one that holds this
+    number come first in the file, side by side.
+    """
+    from h5py import h5d, h5p
+
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = np.int32(0)
+    steps.create_dataset("Values", data=np.zeros(1), chunks=(count,), maxshape=(count,))
+    root.attrs["Version"] = (2, 0)
+    root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
+    steps["NumberOfParts"] = np.ones(count, dtype=np.int64)
+    for name in ("PartOffsets", "PointOffsets"):
+        steps[name] = np.zeros(count, dtype=np.int64)  # every frame reads the same mesh
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps[name] = np.zeros((count, 1), dtype=np.int64)
+    for name, width in FIELDS.items():
+        sparse = h5p.create(h5p.DATASET_CREATE)
+        sparse.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+        sparse.set_fill_time(h5d.FILL_TIME_NEVER)
+        root.create_dataset(f"PointData/{name}", shape=(count * node_count, *width), dtype=np.float32, dcpl=sparse)
+        steps[f"PointDataOffsets/{name}"] = node_count * np.arange(count)
+    root["FieldData/step"] = np.zeros(count, dtype=np.int64)
+    steps["FieldDataOffsets/step"] = np.arange(count)
+
+
+def _write_mesh(root: h5py.Group, model: Model) -> None:
+    """Points at t = 0 and elements, with the index of body and material, once for all frames."""
+    nodes, body, material = cells(model)
+    root["NumberOfPoints"] = np.array([model.node_count])
+    root["NumberOfCells"] = np.array([model.element_count])
+    root["NumberOfConnectivityIds"] = np.array([nodes.size])
+    root["Points"] = model.X
+    root["Connectivity"] = nodes.ravel()
+    root["Offsets"] = 8 * np.arange(model.element_count + 1)
+    root["Types"] = np.full(model.element_count, VTK_HEXAHEDRON, dtype=np.uint8)
+    root["CellData/body"] = body
+    root["CellData/body"].attrs["names"] = list(model.element_start)
+    root["CellData/material"] = material
+
+
+def _reason(error: Exception) -> str:
+    """The system's message, which HDF5 wraps in a paragraph of its own."""
+    found = re.search(r"error message = '([^']*)'", str(error))
+    return found[1] if found else str(getattr(error, "strerror", None) or error)
