@@ -53,3 +53,27 @@ def test_device_gives_the_figures_of_the_cpu(precision, tolerance):
 def test_device_repeats_bit_for_bit():
     one, two = (mca.run(oblique(), device="cuda:0") for _ in range(2))
     assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one.history)
+
+
+@pytest.mark.gpu
+def test_frames_arrive_in_order_and_equal_those_of_the_cpu():
+    """The host runs ahead of the device: frames must be those of their time, whatever is under way."""
+    from test_recording import Memory, bar
+
+    from warp_mca.recorders import Cadence
+    from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME
+
+    seen = []
+    for device in ("cpu", "cuda:0"):
+        memory = Memory(SURFACE, CONTACT, PATHS, VOLUME, cadence=Cadence(seconds=1e-6))
+        mca.run(bar(), device=device, precision="float64", recorders=[memory])
+        seen.append(memory.frames)
+    assert [frame.step for frame in seen[0]] == [frame.step for frame in seen[1]]
+    for one, other in zip(*seen, strict=True):
+        np.testing.assert_allclose(one.points["bar"], other.points["bar"], atol=1e-8)
+        np.testing.assert_allclose(one.von_mises["bar"], other.von_mises["bar"], rtol=1e-4, atol=10.0)
+        np.testing.assert_allclose(one.path_stress["axis"], other.path_stress["axis"], rtol=1e-4, atol=10.0)
+        np.testing.assert_array_equal(one.contact_stick, other.contact_stick)
+        assert one.volume is not None
+        assert other.volume is not None
+        np.testing.assert_allclose(one.volume.velocity, other.volume.velocity, atol=1e-5)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.errors import McaError, RequestError, bad_value
 from warp_mca.recorders.recorder import VOLUME, Cadence, check_file
@@ -120,11 +120,12 @@ def _mesh(
     path: Path, points: NDArray, nodes: NDArray, fields: Mapping[str, NDArray], cell_fields: Mapping[str, NDArray]
 ) -> meshio.Mesh:
     """What is written to `path`: where formats disagree on six components, stress becomes six scalars."""
-    at_points = dict(fields)
+    at_points: dict[str, ArrayLike] = dict(fields)
     if _format(path) not in SIX_COMPONENTS:
-        stress = at_points.pop("stress")
+        stress = fields["stress"]
+        del at_points["stress"]
         at_points |= {f"stress_{name}": np.ascontiguousarray(stress[:, k]) for k, name in enumerate(COMPONENTS)}
-    at_cells = {name: [field] for name, field in cell_fields.items()}
+    at_cells: dict[str, list[ArrayLike]] = {name: [field] for name, field in cell_fields.items()}
     return _load_meshio().Mesh(points, [("hexahedron", nodes)], point_data=at_points, cell_data=at_cells)
 
 
@@ -145,20 +146,21 @@ def _left_out(path: Path) -> list[str]:
     fields = {name: np.zeros((8, *width), np.float32) for name, width in widths.items()}
     nodes, index = np.arange(8)[None], np.zeros(1, dtype=np.int32)
     mesh = _mesh(path, points, nodes, fields, {"body": index, "material": index})
-    why = "they do not come back"
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / path.name
         try:
             _write(trial, mesh)
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
                 read = _load_meshio().read(trial)
-            sound = [block.type for block in read.cells] == ["hexahedron"] and np.array_equal(read.cells[0].data, nodes)
-        except (Exception, SystemExit) as error:  # what its writers and readers raise, or do, differs
-            sound, why = False, " ".join(str(error).split())
-    if not sound:
-        raise bad_value("final", str(path), f"meshio cannot write 8-node hexahedra in this format ({why}); {USUAL}")
-    wanted = [(name, read.point_data) for name in mesh.point_data] + [(name, read.cell_data) for name in mesh.cell_data]
-    return [name for name, kept in wanted if not any(key.startswith(name) for key in kept)]
+            if [block.type for block in read.cells] != ["hexahedron"] or (read.cells[0].data != nodes).any():
+                raise ValueError("they do not come back")
+        except (Exception, SystemExit) as error:  # its writers and readers raise whatever went wrong, or exit
+            why = " ".join(str(error).split())
+            raise bad_value(
+                "final", str(path), f"meshio cannot write 8-node hexahedra in this format ({why}); {USUAL}"
+            ) from error
+    wanted = [(name, read.point_data) for name in fields] + [(name, read.cell_data) for name in mesh.cell_data]
+    return [name for name, kept in wanted if not any(key.startswith(name) for key in kept)]  # some split fields
 
 
 def _save(path: Path, mesh: meshio.Mesh) -> None:

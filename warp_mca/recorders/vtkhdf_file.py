@@ -9,7 +9,6 @@ A frame then is plain data written to where it belongs, and after that the numbe
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import shutil
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 
     from warp_mca.model import Model
     from warp_mca.recorders.recorder import Frame, RunInfo
+
+    _Datasets = dict[str, h5py.Dataset]
 
 DISK_RESERVE = 64 << 20  # left free on the disk, for the results [byte]
 FRAMES = Cadence(frames=100)
@@ -76,21 +77,21 @@ class VtkHdfFile:
         self.node_count, self.frame_count = info.model.node_count, 0
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            # The earliest version has no marks that lock out readers of a file whose writer was killed; neither may a
-            # lock, so that ParaView can look on.
+            # The earliest version has no marks that keep readers from a file whose writer was killed. A lock would
+            # keep ParaView from looking on.
             self._file = h5py.File(self._unborn, "w", libver="earliest", locking=False)
             root = self._file.create_group("VTKHDF")
-            _make_steps(root, count, self.node_count)
+            self._steps, self._values, self._places = _make_steps(root, count, self.node_count)
             _write_mesh(root, info.model)
             self._file.flush()
             size, free = self._unborn.stat().st_size, shutil.disk_usage(self.path.parent).free
         except (OSError, RuntimeError) as error:
             self._abandon()
-            raise bad_value("vtkhdf", str(self.path), f"it cannot be written ({_reason(error)})") from error
+            remedy = f"it cannot be written ({_reason(error)}); name another file"
+            raise bad_value("vtkhdf", str(self.path), remedy) from error
         if size + DISK_RESERVE > free:
-            info.warn(
-                f"{self.path}: {count} frames take {size / 1e9:.2g} GB, but its disk has {free / 1e9:.2g} GB free"
-            )
+            need = f"{count} frames take {size / 1e9:.2g} GB"
+            info.warn(f"{self.path}: {need}, but its disk has {free / 1e9:.2g} GB free; take fewer frames")
 
     def frame(self, frame: Frame) -> None:
         """Write one frame.
@@ -98,15 +99,15 @@ class VtkHdfFile:
         Raises:
             OSError: it cannot be written; the file stays as it was after the frame before.
         """
-        assert self._file is not None
+        assert self._file is not None and frame.volume is not None
         try:
-            self._write(self._file["VTKHDF"], frame)
+            self._write(self._file, frame.step, frame.time, vars(frame.volume))
         except (OSError, RuntimeError) as error:
             self._abandon()
             raise OSError(f"{_reason(error)}; the file holds the {self.frame_count} frames before") from error
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Is in history.csv, which ParaView opens."""
+        """Has no place in this file; ParaView opens history.csv."""
 
     def finish(self, ok: bool) -> None:
         """Close the file.
@@ -117,7 +118,7 @@ class VtkHdfFile:
         if self._file is None:
             return
         try:
-            self._publish(self._file["VTKHDF/Steps"], self.frame_count)  # undoes a frame that was interrupted
+            self._publish(self._file, self.frame_count)  # undoes a frame that was interrupted
             self._file.close()
             self._file = None
         except (OSError, RuntimeError) as error:
@@ -125,53 +126,51 @@ class VtkHdfFile:
         finally:
             self._abandon()
 
-    def _write(self, root: h5py.Group, frame: Frame) -> None:
-        place = slice(self.frame_count * self.node_count, (self.frame_count + 1) * self.node_count)
-        fields = {name: getattr(frame.volume, name) for name in FIELDS}
+    def _write(self, file: h5py.File, step: int, time: float, fields: Mapping[str, NDArray]) -> None:
         needed = DISK_RESERVE + sum(field.nbytes for field in fields.values())
         if shutil.disk_usage(self.path.parent).free < needed:
-            raise OSError(errno.ENOSPC, f"less than {needed >> 20} MiB are free on its disk")
-        for name, field in fields.items():
-            root["PointData"][name][place] = field
-        root["FieldData/step"][self.frame_count] = frame.step
-        self._file.flush()  # what a frame holds is in the file before the number of steps speaks of it
-        self._publish(root["Steps"], self.frame_count + 1, frame.time)
+            raise OSError(f"less than {needed >> 20} MiB are free on its disk")
+        place = slice(self.frame_count * self.node_count, (self.frame_count + 1) * self.node_count)
+        for name in FIELDS:
+            self._places[name][place] = fields[name]
+        self._places["step"][self.frame_count] = step
+        file.flush()  # a frame is in the file before the number of steps speaks of it
+        self._publish(file, self.frame_count + 1, time)
         if self.frame_count == 0:
             self._unborn.replace(self.path)
         self.frame_count += 1
 
-    def _publish(self, steps: h5py.Group, count: int, time: float | None = None) -> None:
+    def _publish(self, file: h5py.File, count: int, time: float | None = None) -> None:
         """Set the number of steps; HDF5 writes it and the length of `Values`, its neighbour, in one go."""
-        steps["Values"].resize((max(count, 1),))
+        self._values.resize((max(count, 1),))
         if time is not None:
-            steps["Values"][count - 1] = time
-        steps.attrs.modify("NSteps", np.int32(count))
-        self._file.flush()
+            self._values[count - 1] = time
+        self._steps.attrs.modify("NSteps", np.int32(count))
+        file.flush()
 
     def _abandon(self) -> None:
         """Let go of a file that HDF5 may be unable to close, and of one that never got a frame."""
         if self._file is not None:
-            # It would try again to write what it could not, last when Python exits, and crash it: let it succeed.
+            # HDF5 would try again to write what it could not, at last when Python exits, and crash: let it succeed.
             null = os.open(os.devnull, os.O_RDWR)
             os.dup2(null, self._file.id.get_vfd_handle())
             os.close(null)
             with suppress(OSError, RuntimeError):
                 self._file.close()
             self._file = None
-        self._unborn.unlink(missing_ok=True)
+        with suppress(OSError):
+            self._unborn.unlink(missing_ok=True)
 
 
-def _make_steps(root: h5py.Group, count: int, node_count: int) -> None:
-    """Make places for `count` frames, and say where each is.
+def _make_steps(root: h5py.Group, count: int, node_count: int) -> tuple[h5py.Group, h5py.Dataset, _Datasets]:
+    """Make places for `count` frames and say where each is: the group Steps, its Values, what frames are written to.
 
     `Values` is as long as the number of steps, because VTK reads all of it. Its header and the one that holds this
     number come first in the file, side by side.
     """
-    from h5py import h5d, h5p
-
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = np.int32(0)
-    steps.create_dataset("Values", data=np.zeros(1), chunks=(count,), maxshape=(count,))
+    values = steps.create_dataset("Values", data=np.zeros(1), chunks=(count,), maxshape=(count,))
     root.attrs["Version"] = (2, 0)
     root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
     steps["NumberOfParts"] = np.ones(count, dtype=np.int64)
@@ -179,14 +178,15 @@ def _make_steps(root: h5py.Group, count: int, node_count: int) -> None:
         steps[name] = np.zeros(count, dtype=np.int64)  # every frame reads the same mesh
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((count, 1), dtype=np.int64)
+    places = {}
     for name, width in FIELDS.items():
-        sparse = h5p.create(h5p.DATASET_CREATE)
-        sparse.set_alloc_time(h5d.ALLOC_TIME_EARLY)
-        sparse.set_fill_time(h5d.FILL_TIME_NEVER)
-        root.create_dataset(f"PointData/{name}", shape=(count * node_count, *width), dtype=np.float32, dcpl=sparse)
+        shape = (count * node_count, *width)
+        places[name] = root.create_dataset(f"PointData/{name}", shape=shape, dtype=np.float32)
+        places[name][:1] = 0.0  # with the first value HDF5 allots the whole
         steps[f"PointDataOffsets/{name}"] = node_count * np.arange(count)
-    root["FieldData/step"] = np.zeros(count, dtype=np.int64)
+    places["step"] = root.create_dataset("FieldData/step", data=np.zeros(count, dtype=np.int64))
     steps["FieldDataOffsets/step"] = np.arange(count)
+    return steps, values, places
 
 
 def _write_mesh(root: h5py.Group, model: Model) -> None:

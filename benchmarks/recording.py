@@ -1,0 +1,85 @@
+"""What recording costs: `python -m benchmarks.recording [--device cuda:0] [--preset paper] [--models DIR] [--pairs N]`.
+
+Runs the two-link impact in pairs, with and without 100 frames to rerun and USD, and prints the ratio of wall times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import warp_mca as mca
+from warp_mca import scene_file
+from warp_mca.recorders import Cadence, RerunStream, UsdFile, VtkHdfFile
+
+KINDS = {
+    "rerun": lambda folder, cadence: [RerunStream(folder / "a.rrd", cadence=cadence)],
+    "usd": lambda folder, cadence: [UsdFile(folder / "a.usdc", cadence=cadence)],
+    "rerun+usd": lambda folder, cadence: [
+        RerunStream(folder / "a.rrd", cadence=cadence),
+        UsdFile(folder / "a.usdc", cadence=cadence),
+    ],
+    "vtkhdf": lambda folder, cadence: [VtkHdfFile(folder / "a.vtkhdf", cadence=cadence)],
+}
+
+
+def run(scene: mca.Scene, meshes: dict[str, mca.Mesh], device: str, recorders: list) -> tuple[float, mca.Result]:
+    """Wall time of the impact phase and of closing the recorders [s], and the result."""
+    result = mca.run(scene, device=device, meshes=meshes, recorders=recorders)
+    wall = result.summary["wall"]
+    return wall["fe"] + wall["output"], result
+
+
+def measure(args: argparse.Namespace) -> dict[str, object]:
+    """Ratios of paired runs for each kind of recording."""
+    if args.models:
+        stored = scene_file.load(args.models / f"{args.preset}.mca")
+        scene, meshes = stored.scene, stored.meshes
+    else:
+        scene = mca.make_scene("two_link", args.preset)
+        meshes = mca.mesh(scene)
+    run(scene, meshes, args.device, [])  # warms the kernel cache
+    table: dict[str, object] = {}
+    for name in args.kinds:
+        ratios, plain, sizes = [], [], {}
+        for _ in range(args.pairs):
+            with tempfile.TemporaryDirectory() as folder:
+                before, one = run(scene, meshes, args.device, [])
+                recorders = KINDS[name](Path(folder), Cadence(frames=args.frames))
+                after, other = run(scene, meshes, args.device, recorders)
+                assert all((one[c] == other[c])[1:].all() for c in ("F_n_N", "F_t_N", "E_kinetic"))
+                assert not [w for w in other.warnings if "recording" in w], other.warnings
+                ratios.append(after / before)
+                plain.append(before)
+                sizes = {file.suffix: file.stat().st_size / args.frames for file in Path(folder).iterdir()}
+        table[name] = {
+            "ratio": statistics.median(ratios),
+            "ratios": ratios,
+            "wall_without_s": statistics.median(plain),
+            "bytes_per_frame": sizes,
+        }
+        print(name, json.dumps(table[name]), flush=True)
+    return table
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--preset", default="quick")
+    parser.add_argument("--models", type=Path, help="folder of PRESET.mca, where there is no gmsh")
+    parser.add_argument("--pairs", type=int, default=5)
+    parser.add_argument("--frames", type=int, default=100)
+    parser.add_argument("--kinds", nargs="+", default=["rerun+usd"], choices=list(KINDS))
+    args = parser.parse_args()
+    begun = time.perf_counter()
+    measure(args)
+    print(f"{time.perf_counter() - begun:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
