@@ -17,7 +17,7 @@ from rrd import rows
 
 from warp_mca.errors import RequestError
 from warp_mca.recorders import rerun_stream
-from warp_mca.recorders.rerun_blueprint import SLIP, STICK
+from warp_mca.recorders.colours import SLIP, STICK
 from warp_mca.recorders.rerun_stream import RerunStream
 from warp_mca.recorders.rerun_viewer import recording_in
 from warp_mca.results import HISTORY_COLUMNS

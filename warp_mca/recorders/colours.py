@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.errors import bad_value
 from warp_mca.scene import J2Bilinear, Scene
 
-PALETTE_NAME = "viridis"
+STICK, SLIP = 0xF0E442FF, 0xD55E00FF  # contact points, as 0xRRGGBBAA: Okabe and Ito's yellow and vermilion
 _NODES = """
     440154 470d60 48186a 482374 472d7b 453781 424086 3e4989 3b528b 375b8d 33638d
     2f6b8e 2c728e 297a8e 26828e 23898e 21918c 1f978b 1f9f88 21a685 27ad81 31b57b

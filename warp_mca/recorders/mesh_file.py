@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.errors import McaError, RequestError, bad_value
-from warp_mca.recorders.recorder import VOLUME, Cadence, check_file
+from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
 
 if TYPE_CHECKING:
     import meshio
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
 USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"
-DISK_RESERVE = 64 << 20  # left free on the disk, for the results [byte]
 # Formats whose readers take six components as xx, yy, zz, xy, yz, xz; XDMF's take yy as the fourth, gmsh takes none.
 SIX_COMPONENTS = ("vtu", "vtk")
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Float = NDArray[np.float32]
 Index = NDArray[np.int32]
 
+DISK_RESERVE = 64 << 20  # that recorders leave free on a disk, for the results [byte]
 # What a frame can hold. Only what a recorder of the run asks for is computed and copied.
 SURFACE, CONTACT, PATHS, VOLUME = "surface", "contact", "paths", "volume"
 

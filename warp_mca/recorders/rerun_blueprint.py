@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.recorders.colours import PALETTE, ColourScale, stress_at
+from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, stress_at
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -39,7 +39,6 @@ PLOTS = (
         ),
     ),
 )
-STICK, SLIP = 0xF0E442FF, 0xD55E00FF
 PATH_COLOURS = (0xD55E00FF, 0x009E73FF, 0x56B4E9FF, 0xE69F00FF, 0xCC79A7FF)
 BAR = (256, 14)  # of the legend, in its own units
 TICKS = 5

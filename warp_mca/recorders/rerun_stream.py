@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
-from warp_mca.recorders.colours import ColourScale, packed
-from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, Cadence, check_file
+from warp_mca.recorders.colours import SLIP, STICK, ColourScale, packed
+from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, check_file
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 FLUSH_EVERY = 4  # frames: what a killed run may lack
 FLUSH_TIMEOUT = 10.0  # of the file at the end [s]
-DISK_RESERVE = 64 << 20  # left free on the disk, also for the results [byte]
 FRAMES = Cadence(frames=100)
 TO_MPA, TO_MM = 1e-6, 1e3
 
@@ -156,7 +155,7 @@ class RerunStream:
     ) -> None:
         import rerun as rr
 
-        from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, SLIP, STICK, log_ticks
+        from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, log_ticks
 
         stream.set_time("sim_time", duration=float(frame.time))
         stream.set_time("step", sequence=int(frame.step))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from warp_mca.errors import RequestError, bad_value
 from warp_mca.recorders.mesh_file import cells
-from warp_mca.recorders.recorder import VOLUME, Cadence, check_file
+from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
 
 if TYPE_CHECKING:
     import h5py
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     _Datasets = dict[str, h5py.Dataset]
 
-DISK_RESERVE = 64 << 20  # left free on the disk, for the results [byte]
 FRAMES = Cadence(frames=100)
 VTK_HEXAHEDRON = 12
 FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}

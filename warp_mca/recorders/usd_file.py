@@ -1,0 +1,250 @@
+"""Owns the USD recorder: deformed skins over time, with colours, stress and plastic strain."""
+# pyright: reportAttributeAccessIssue=false
+# (usd-core comes without types)
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.errors import bad_value
+from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, levels
+from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, check_file
+
+if TYPE_CHECKING:
+    from warp_mca.recorders.recorder import Frame, RunInfo, SurfaceMesh
+
+FRAMES = Cadence(frames=100)
+SAVE_EVERY = 5  # frames: what a killed run may lack; a save costs more than a frame
+PLAYBACK = 24.0  # frames shown in a second
+POINT_SIZE = 0.004  # of contact points, as a share of the scene
+
+
+class UsdFile:
+    """Writes /World/BODY meshes with one time code for each frame, so that microseconds do not collapse.
+
+    Colours are indices into a static palette, in linear colour space as USD has it. `vonMises` [Pa] and
+    `plasticStrain` [-] are rounded to 256 values of each frame, denser towards zero: off by at most 0.4 % of the
+    frame's greatest. Physical times and the stress at the upper end of the colours are in the layer's customLayerData.
+    """
+
+    def __init__(self, file: str | os.PathLike[str], *, cadence: Cadence = FRAMES, limit: float | None = None) -> None:
+        """Record to `file` (.usdc, .usd or .usda), which is made, or replaced.
+
+        Args:
+            file: the path.
+            cadence: when frames are taken.
+            limit: stress at the upper end of the colours [Pa], see `ColourScale`.
+
+        Raises:
+            RequestError: `file` cannot be written.
+        """
+        self.path = check_file("usd", file, ".usdc", ".usd", ".usda")
+        self.name = str(self.path)
+        self.needs = frozenset((SURFACE, CONTACT))
+        self.cadence, self.limit = cadence, limit
+        self.times: list[float] = []
+        self.limits: list[float] = []
+        self.bodies: dict[str, _Body] = {}
+        self.stage: Any = None
+        self.contact: Any = None
+
+    def start(self, info: RunInfo) -> None:
+        """Write what never changes.
+
+        Raises:
+            RequestError: the file cannot be made.
+        """
+        from pxr import Tf, UsdGeom
+
+        self.info = info
+        self.scale = ColourScale(info.scene, self.limit)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self.stage = _new_stage(str(self.path))
+        except (Tf.ErrorException, OSError) as error:
+            raise bad_value("usd", str(self.path), f"it cannot be written ({_reason(error)}); name another") from error
+        UsdGeom.SetStageMetersPerUnit(self.stage, 1.0)
+        UsdGeom.SetStageUpAxis(self.stage, UsdGeom.Tokens.z if _vertical(info) == 2 else UsdGeom.Tokens.y)
+        self.stage.SetTimeCodesPerSecond(PLAYBACK)
+        self.stage.SetFramesPerSecond(PLAYBACK)
+        world = UsdGeom.Xform.Define(self.stage, "/World")
+        self.stage.SetDefaultPrim(world.GetPrim())
+        for body, surface in info.surfaces.items():
+            name = Tf.MakeValidIdentifier(body)
+            while self.stage.GetPrimAtPath(f"/World/{name}"):
+                name += "_"
+            self.bodies[body] = _Body(UsdGeom.Mesh.Define(self.stage, f"/World/{name}"), body, surface)
+        name = "contact"
+        while self.stage.GetPrimAtPath(f"/World/{name}"):
+            name += "_"
+        size = float(np.ptp(np.concatenate([info.model.X[s.nodes] for s in info.surfaces.values()]), axis=0).max())
+        self.contact = _Contact(UsdGeom.Points.Define(self.stage, f"/World/{name}"), POINT_SIZE * size)
+        self._save()
+
+    def frame(self, frame: Frame) -> None:
+        """Write one frame.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        from pxr import Sdf, Usd
+
+        self.scale.include(max(float(value.max(initial=0.0)) for value in frame.von_mises.values()))
+        code = Usd.TimeCode(len(self.times))
+        with Sdf.ChangeBlock():
+            for name, body in self.bodies.items():
+                body.write(
+                    code, frame.points[name], frame.von_mises[name], frame.plastic_strain[name], self.scale.limit
+                )
+            self.contact.write(code, frame.contact_points, frame.contact_stick)
+        self.times.append(frame.time)
+        self.limits.append(self.scale.limit)
+        if len(self.times) % SAVE_EVERY == 0:
+            self._save()
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Has no place in this file."""
+
+    def finish(self, ok: bool) -> None:
+        """Save what is left.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        if self.stage is not None:
+            try:
+                if ok:
+                    self._save()
+            finally:
+                self.stage, self.bodies, self.contact = None, {}, None
+
+    def _save(self) -> None:
+        from pxr import Tf, Vt
+
+        if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
+            raise OSError(f"less than {DISK_RESERVE >> 20} MiB are free on its disk")
+        self.stage.SetStartTimeCode(0.0)
+        self.stage.SetEndTimeCode(max(0.0, len(self.times) - 1.0))
+        times, limits = (Vt.DoubleArray.FromNumpy(np.array(v, dtype=float)) for v in (self.times, self.limits))
+        facts = {
+            "scene": self.info.scene.name,
+            "times_s": times,
+            "time_step_s": self.info.dt,
+            "colour_scale": self.scale.label,
+            "colour_limits_Pa": limits,
+        }
+        self.stage.GetRootLayer().customLayerData = {"warp_mca": facts}
+        try:
+            self.stage.Save()
+        except Tf.ErrorException as error:
+            raise OSError(_reason(error)) from error
+
+
+class _Body:
+    """A skin as a mesh."""
+
+    def __init__(self, mesh: Any, name: str, surface: SurfaceMesh) -> None:
+        from pxr import Sdf, UsdGeom, Vt
+
+        self.mesh = mesh
+        mesh.GetPrim().SetDisplayName(name)
+        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(surface.quads), 4, dtype=np.int32)))
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(surface.quads.ravel())))
+        self.points, self.extent = mesh.CreatePointsAttr(), mesh.CreateExtentAttr()
+        self.colour = _colours(mesh, _linear(PALETTE / 255.0))
+        primvars = UsdGeom.PrimvarsAPI(mesh)
+        float_array = Sdf.ValueTypeNames.FloatArray
+        self.stress, self.plastic = (
+            primvars.CreatePrimvar(name, float_array, UsdGeom.Tokens.vertex) for name in ("vonMises", "plasticStrain")
+        )
+        self.plastic_max = -1.0
+
+    def write(self, code: Any, points: NDArray, von_mises: NDArray, plastic: NDArray, limit: float) -> None:
+        from pxr import Vt
+
+        _place(self, code, points)
+        self.colour.Set(Vt.IntArray.FromNumpy(levels(von_mises, limit).astype(np.int32)), code)
+        self.stress.Set(Vt.FloatArray.FromNumpy(_rounded(von_mises)), code)
+        # Plastic strain only grows, and held values fill the gaps: what does not change costs nothing.
+        if (greatest := float(plastic.sum(dtype=np.float64))) != self.plastic_max:
+            if self.plastic_max >= 0.0 and self._held != code.GetValue() - 1:
+                self.plastic.Set(self._last, code.GetValue() - 1)  # USD interpolates: end the time without change
+            self._last = Vt.FloatArray.FromNumpy(_rounded(plastic))
+            self.plastic.Set(self._last, code)
+            self.plastic_max, self._held = greatest, code.GetValue()
+
+
+class _Contact:
+    """Slave nodes in contact as points."""
+
+    def __init__(self, prim: Any, width: float) -> None:
+        from pxr import UsdGeom
+
+        prim.CreateWidthsAttr([width])
+        prim.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+        self.points, self.extent = prim.CreatePointsAttr(), prim.CreateExtentAttr()
+        rgb = [[(colour >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)] for colour in (SLIP, STICK)]
+        self.colour = _colours(prim, _linear(np.array(rgb)))
+
+    def write(self, code: Any, points: NDArray, stick: NDArray) -> None:
+        from pxr import Vt
+
+        _place(self, code, points)
+        self.colour.Set(Vt.IntArray.FromNumpy(stick.astype(np.int32)), code)
+
+
+def _new_stage(path: str) -> Any:
+    """An empty stage on `path`; a layer that an earlier run of this process left open is cleared."""
+    from pxr import Sdf, Usd
+
+    layer = Sdf.Layer.Find(path)
+    if layer is None:
+        return Usd.Stage.CreateNew(path)
+    layer.Clear()
+    return Usd.Stage.Open(layer)
+
+
+def _place(item: _Body | _Contact, code: Any, points: NDArray) -> None:
+    """Set points and their extent."""
+    from pxr import Vt
+
+    item.points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points)), code)
+    box = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), dtype=np.float32)
+    item.extent.Set(Vt.Vec3fArray.FromNumpy(box), code)
+
+
+def _colours(prim: Any, palette: NDArray) -> Any:
+    """Author the static palette; the attribute that takes each frame's indices into it."""
+    from pxr import UsdGeom, Vt
+
+    colour = prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    colour.Set(Vt.Vec3fArray.FromNumpy(palette.astype(np.float32)))
+    return colour.CreateIndicesAttr()
+
+
+def _linear(srgb: NDArray) -> NDArray:
+    """Linear colours of sRGB ones (IEC 61966-2-1), both 0 to 1."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def _rounded(value: NDArray) -> NDArray[np.float32]:
+    """Values rounded to 256 of them, which USD stores in a byte or less each."""
+    greatest = float(value.max(initial=0.0))
+    return np.float32(greatest) * (levels(value, greatest).astype(np.float32) / np.float32(255.0)) ** 2
+
+
+def _vertical(info: RunInfo) -> int:
+    """Axis along which gravity points; y without gravity."""
+    gravity = np.abs(info.scene.gravity)
+    return int(np.argmax(gravity)) if gravity.any() else 1
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
