@@ -92,7 +92,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 2) -> 
         (["two_link", "--duration", "soon"], ["'soon'"]),
         (["two_link", "--duration", "nan"], ["duration = nan"]),
         (["two_link", "--duration=-1"], ["duration = -1"]),
-        (["two_link", "--viewer", "rerun"], ["'rerun'", "none"]),
+        (["two_link", "--viewer", "paraview"], ["'paraview'", "rerun"]),
         (["two_link", "--colour"], ["--colour"]),
         ([], ["SCENE"]),
         (["landing.py", "--set", "E=-1"], ["E = -1", "above 0"]),
@@ -251,3 +251,36 @@ def test_as_a_program_it_writes_one_line_on_stderr_and_no_progress_bar(here: Pat
     good = subprocess.run(command, capture_output=True, text=True)
     assert (good.returncode, good.stderr) == (0, "")
     json.loads((here / "landing-tiny" / "summary.json").read_text())
+
+
+def test_every_recorder_has_its_option(here: Path, capsys: pytest.CaptureFixture[str]):
+    files = ["a.rrd", "a.usdc", "a.vtkhdf", "a.vtu"]
+    options = ["--rrd", "a.rrd", "--usd", "a.usdc", "--vtkhdf", "a.vtkhdf", "--final", "a.vtu", "--frames", "3"]
+    assert cli.main(["run", "landing.py", "--duration", "1e-5", *options, "--snapshot", "4e-6"]) == 0
+    out = capsys.readouterr().out
+    assert contents(here) == sorted([*files, "landing-tiny"])
+    assert all(f"wrote {file}" in out for file in (*files, Path("landing-tiny", "snapshot-4us.png")))
+    assert (here / "landing-tiny" / "snapshot-4us.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--rrd", "a.txt"], ["rrd = 'a.txt'", ".rrd"]),
+        (["--usd", "landing.py/a.usdc"], ["usd = ", "not a folder"]),
+        (["--vtkhdf", "a.vtu"], ["vtkhdf = 'a.vtu'", ".vtkhdf"]),
+        (["--final", "a.stl"], ["final = 'a.stl'"]),
+        (["--frames", "1", "--rrd", "a.rrd"], ["frames = 1", "at least 2"]),
+        (["--snapshot", "-1"], ["snapshot = -1", "from 0 s on"]),
+    ],
+)
+def test_a_recorder_that_cannot_write_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: list[str]
+):
+    line = refused(capsys, "run", "landing.py", *options)
+    assert all(word in line for word in words), line
+    assert contents(here) == []
+
+
+def test_view_without_a_recording(capsys: pytest.CaptureFixture[str]):
+    assert "--rrd" in refused(capsys, "view", "nowhere")

@@ -242,7 +242,7 @@ def test_names_become_identifiers_of_their_own(bars: FlyingBars, tmp_path: Path)
     recorder.finish(True)
     stage = opened(tmp_path / "a.usdc")
     names = [prim.GetName() for prim in stage.GetPrimAtPath("/World").GetChildren()]
-    assert sorted(names) == ["_", "a_b", "a_b_", "contact", "contact_"]
+    assert sorted(names) == ["__", "a_b", "a_b_", "contact", "contact_"]
 
 
 @pytest.mark.parametrize(("name", "remedy"), [("file/a.usdc", "not a folder"), ("a.usdx", "suffix")])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.errors import bad_value
 from warp_mca.recorders.recorder import SURFACE, Cadence, Frame, RunInfo, check_file
 
 
@@ -20,6 +22,8 @@ class SnapshotFile:
         Raises:
             RequestError: the file cannot be written, or the time is not one.
         """
+        if not (math.isfinite(time) and time >= 0.0):
+            raise bad_value("snapshot", time, "give a finite time from 0 s on")
         self.path = check_file("snapshot", file, ".png")
         self.name = str(self.path)
         self.needs = frozenset((SURFACE,))
