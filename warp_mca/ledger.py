@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,6 @@ from warp_mca.errors import GuardError
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
-    from warp_mca.solver import Solver
 
 Array = NDArray[np.float64]
 
@@ -41,25 +41,17 @@ class Ledger:
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
 
-    def full(self, written: int) -> bool:
-        """Whether the device's ring of records must be read before it wraps."""
-        from warp_mca.solver import ROWS
-
-        return written % ROWS == 0
-
-    def read(self, solver: Solver) -> int:
-        """Fetch the records written since the last call, hold them against the guards, and return how many they are.
+    def read(self, written: int, records: Mapping[str, NDArray]) -> None:
+        """Take in the first `written` of the device's `records`, see `Solver.records`, and hold them to the guards.
 
         Raises:
             GuardError: a record breaks a guard.
         """
-        partial, velocity, flags, written = solver.records()
-        for raised, message in zip(flags, _FLAGS, strict=True):  # first: these explain what the sums would show
+        for raised, message in zip(records["flag"], _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
                 raise GuardError(f"stopped before t = {(self.count + written) * self.interval:.4g} s: {message}")
         for row in range(written):
-            self._add(partial[row], velocity[row])
-        return written
+            self._add(records["partial"][row], records["point_velocity"][row].copy())
 
     def _add(self, partial: Array, velocity: Array) -> None:
         from warp_mca.solver import JACOBIAN, STRAIN

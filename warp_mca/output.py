@@ -124,14 +124,6 @@ class Output:
         used = [output.stress_kernel(self.solver.precision, plastic) for plastic in kinds]
         return [output.nodal_stress, *used] if self.arrays else []
 
-    def probe_rows(self, count: int) -> NDArray[np.float32]:
-        """The ring's first `count` rows [Pa], shape (count, probe_count, 6), float32; waits for the device."""
-        if not self.has_probes:
-            return np.zeros((count, 0, 6), dtype=np.float32)
-        return np.array(
-            self.path_stress.numpy()[:count], dtype=np.float32
-        )  # copied: on the CPU numpy() shows live memory
-
     def before_step(self, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
         s = self.solver

@@ -212,31 +212,43 @@ def run(
 
 def _advance(solver: Solver, steps: Steps, ledger: Ledger, recording: Recording, tell: Progress) -> list[NDArray]:
     """Run the finite elements: in each output interval search for contact, record, step. Returns the probes' rings."""
+    from warp_mca.solver import ROWS
+    from warp_mca.transfer import Transfer
+
     rings: list[NDArray] = []
+    transfer = Transfer(solver.records(), solver.device)
 
-    def read(done: float) -> None:
+    def read() -> None:
+        written, records = transfer.receive()
         first = ledger.count
-        written = ledger.read(solver)
-        if solver.output:
-            rings.append(solver.output.probe_rows(written))
+        ledger.read(written, records)
+        if "path_stress" in records:
+            rings.append(records["path_stress"][:written].copy())
         recording.history(lambda: ledger.history(first))
-        tell("impact", done)
+        tell("impact", ledger.count / (steps.intervals + 1))
 
-    for interval in range(steps.intervals):
+    def record(interval: int, count: int) -> None:
         needs = recording.needs(interval)
         solver.search()
-        solver.record_and_step(steps.per_search, needs)
+        solver.record_and_step(count, needs)
         recording.take(interval, needs)
+
+    for interval in range(steps.intervals):
+        record(interval, steps.per_search)
         for _ in range(steps.searches - 1):
             solver.search()
             solver.step(steps.per_search)
-        if ledger.full(interval + 1):
-            read((interval + 1) / steps.intervals)
-    needs = recording.needs(steps.intervals)
-    solver.search()
-    solver.record_and_step(1, needs)
-    recording.take(steps.intervals, needs)
-    read(1.0)
+        if (interval + 1) % ROWS == 0:
+            if transfer.full:
+                read()
+            transfer.send(ROWS)
+            while transfer.arrived:
+                read()
+    record(steps.intervals, 1)
+    while transfer.pending:
+        read()
+    transfer.send(steps.intervals % ROWS + 1)
+    read()
     return rings
 
 

@@ -323,20 +323,18 @@ class Solver:
 
         self._launch(f"step {count}", steps)
 
-    def records(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-        """Records since the last call, oldest first, then the flags; waits for the device.
+    def records(self) -> dict[str, wp.array]:
+        """Rings of ROWS records, which wrap, and the flags raised so far.
 
         Returns:
-            Partial sums, shape (ROWS, columns, SUM_WIDTH), float64; point velocities [m/s], shape
-            (ROWS, point_count, 3), float64; flags, shape (3,), int32; how many of the rows are new.
+            `partial`: partial sums, shape (ROWS, columns, SUM_WIDTH), float64; `point_velocity` [m/s], shape
+            (ROWS, point_count), vec3d; `flag`, shape (3,), int32; `path_stress` [Pa], where the scene has paths,
+            shape (ROWS, probe_count), vec6 of float32.
         """
-        row = int(self.row.numpy()[0])
-        written = row if row else ROWS
-        with wp.ScopedDevice(self.device):
-            self.row.zero_()
-        arrays = (self.partial, self.point_velocity, self.flag)  # copied: on the CPU numpy() shows live memory
-        partial, velocity, flag = (np.array(array.numpy()) for array in arrays)
-        return partial, velocity, flag, written
+        found = {"partial": self.partial, "point_velocity": self.point_velocity, "flag": self.flag}
+        if self.output and self.output.has_probes:
+            found["path_stress"] = self.output.path_stress
+        return found
 
     def max_plastic_strain(self) -> float:
         """Greatest equivalent plastic strain of any integration point [-]."""

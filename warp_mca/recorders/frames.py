@@ -1,30 +1,22 @@
-"""Owns the way of frames from the device to the recorders, which the solver never waits for.
-
-Copies go to pinned memory behind the step that made them, and recorders work on one frame while the device computes
-the next: on a GPU the host waits only when both buffers are full.
-"""
+"""Owns the way of frames from the device to the recorders: these work on one while the device computes the next."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.output import OPEN, STICK
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame, Recorder, RunInfo, SurfaceMesh, Volume
+from warp_mca.transfer import Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model import Model
     from warp_mca.output import Output
-
-SLOTS = 2  # frames under way on a GPU: one that is copied, one that recorders work on
 
 
 def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
@@ -36,15 +28,6 @@ def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
         local = np.searchsorted(nodes, quads).astype(np.int32)
         found[body] = SurfaceMesh((nodes + model.node_start[body]).astype(np.int32), local)
     return found
-
-
-@dataclass
-class _Slot:
-    """Host copies of a frame, and when they are complete."""
-
-    arrays: dict[str, dict[str, wp.array]]
-    event: wp.Event | None
-    row: int = 0
 
 
 class Recording:
@@ -61,8 +44,7 @@ class Recording:
         self.info, self.steps, self.output = info, steps, output
         self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = []
         self.taken: dict[int, int] = {}
-        self.slots: list[_Slot] = []
-        self.pending: deque[_Slot] = deque()
+        self.transfer: Transfer[tuple[str, str]] | None = None
         try:
             for recorder in recorders:
                 recorder.start(info)
@@ -71,17 +53,8 @@ class Recording:
             self.finish(False)
             raise
         if output and self.rows:
-            self._allocate(output)
-
-    def _allocate(self, output: Output) -> None:
-        """Make the host's copies of what frames hold, pinned where there is a GPU."""
-        device = wp.get_device(output.solver.device)
-        for _ in range(SLOTS):
-            arrays = {
-                need: {name: wp.empty_like(a, device="cpu", pinned=device.is_cuda) for name, a in group.items()}
-                for need, group in output.arrays.items()
-            }
-            self.slots.append(_Slot(arrays, wp.Event(device) if device.is_cuda else None))
+            arrays = {(need, name): a for need, group in output.arrays.items() for name, a in group.items()}
+            self.transfer = Transfer(arrays, output.solver.device)
 
     def needs(self, row: int) -> frozenset[str]:
         """What a frame at the end of interval `row` must hold; empty when none is due."""
@@ -89,19 +62,14 @@ class Recording:
 
     def take(self, row: int, needs: frozenset[str]) -> None:
         """Copy the frame that the step launched last has reduced, and pass on those that have arrived."""
-        if needs and self.output:
-            if not self.slots:
-                self._deliver()
-            slot = self.slots.pop()
-            slot.row = row
-            for need in needs & slot.arrays.keys():
-                for name, to in slot.arrays[need].items():
-                    wp.copy(to, self.output.arrays[need][name])
-            if slot.event:
-                wp.get_stream(slot.event.device).record_event(slot.event)
-            self.pending.append(slot)
-        while self.pending and (self.pending[0].event is None or self.pending[0].event.is_complete):
-            self._deliver()
+        if self.transfer is None:
+            return
+        if needs:
+            if self.transfer.full:
+                self._deliver(self.transfer)
+            self.transfer.send(row, [key for key in self.transfer.source if key[0] in needs])
+        while self.transfer.arrived:
+            self._deliver(self.transfer)
 
     def history(self, make: Callable[[], Mapping[str, NDArray[np.float64]]]) -> None:
         """Pass on further rows of the history, which are made only if someone takes them."""
@@ -111,23 +79,20 @@ class Recording:
 
     def finish(self, ok: bool) -> None:
         """Pass on what is under way, and close the recorders."""
-        while ok and self.pending:
-            self._deliver()
+        while ok and self.transfer and self.transfer.pending:
+            self._deliver(self.transfer)
         for recorder, _ in list(self.rows):
             self._call(recorder, lambda recorder=recorder: recorder.finish(ok))
         self.rows = []
 
-    def _deliver(self) -> None:
-        slot = self.pending.popleft()
-        if slot.event:
-            wp.synchronize_event(slot.event)
+    def _deliver(self, transfer: Transfer[tuple[str, str]]) -> None:
+        row, arrays = transfer.receive()
         for recorder, rows in list(self.rows):
-            if rows[slot.row]:
+            if rows[row]:
                 index = self.taken.get(id(recorder), 0)
                 self.taken[id(recorder)] = index + 1
-                frame = self._frame(slot, recorder.needs, index)
+                frame = self._frame(row, arrays, recorder.needs, index)
                 self._call(recorder, lambda recorder=recorder, frame=frame: recorder.frame(frame))
-        self.slots.append(slot)
 
     def _call(self, recorder: Recorder, act: Callable[[], None]) -> None:
         """Let a recorder act; one that fails is closed and left out from then on."""
@@ -141,19 +106,19 @@ class Recording:
             with suppress(Exception):
                 recorder.finish(False)
 
-    def _frame(self, slot: _Slot, needs: frozenset[str], index: int) -> Frame:
-        arrays: dict[str, dict[str, Any]] = {
-            need: {name: np.asarray(array.numpy()) for name, array in slot.arrays[need].items()}
-            for need in needs & slot.arrays.keys()
-        }
+    def _frame(self, row: int, sent: Mapping[tuple[str, str], NDArray], needs: frozenset[str], index: int) -> Frame:
+        arrays: dict[str, dict[str, Any]] = {need: {} for need, _ in sent if need in needs}
+        for (need, name), array in sent.items():
+            if need in needs:
+                arrays[need][name] = array
         skin: dict[str, Any] = {name: self._by_body(array) for name, array in arrays.get(SURFACE, {}).items()}
         nothing = {"points": np.zeros((0, 3), np.float32), "state": np.zeros(0, np.int32)}
         contact: dict[str, Any] = arrays.get(CONTACT, nothing)
         closed = contact["state"] != OPEN
         return Frame(
             index=index,
-            step=slot.row * self.steps,
-            time=slot.row * self.info.output_interval,
+            step=row * self.steps,
+            time=row * self.info.output_interval,
             points=skin.get("points", {}),
             von_mises=skin.get("von_mises", {}),
             plastic_strain=skin.get("plastic_strain", {}),

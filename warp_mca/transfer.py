@@ -1,0 +1,73 @@
+"""Owns the way of arrays from the device to the host, which the device never waits for.
+
+Copies go to pinned memory behind the work queued before them, so that the host reads one set while the device goes on.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+Key = TypeVar("Key")
+SLOTS = 2  # sets under way: one that is copied, one that the host reads
+
+
+@dataclass
+class _Slot(Generic[Key]):
+    """Host arrays of one set, and when they are complete."""
+
+    arrays: dict[Key, wp.array]
+    event: wp.Event | None
+    tag: int = 0
+    sent: tuple[Key, ...] = ()
+
+
+class Transfer(Generic[Key]):
+    """Sets of device arrays on their way to the host, received in the order in which they were sent."""
+
+    def __init__(self, arrays: Mapping[Key, wp.array], device: str) -> None:
+        """Allocate the host's copies of `arrays`, pinned where `device` is a GPU."""
+        where = wp.get_device(device)
+        self.source = dict(arrays)
+        self.pending: deque[_Slot[Key]] = deque()
+        self.free = [
+            _Slot(
+                {key: wp.empty_like(a, device="cpu", pinned=where.is_cuda) for key, a in arrays.items()},
+                wp.Event(where) if where.is_cuda else None,
+            )
+            for _ in range(SLOTS)
+        ]
+
+    @property
+    def full(self) -> bool:
+        """Whether one must be received before the next can be sent."""
+        return not self.free
+
+    @property
+    def arrived(self) -> bool:
+        """Whether one can be received without waiting."""
+        return bool(self.pending) and (self.pending[0].event is None or bool(self.pending[0].event.is_complete))
+
+    def send(self, tag: int, keys: Iterable[Key] | None = None) -> None:
+        """Queue copies of the arrays `keys`, all by default, as they are once the work queued so far is done."""
+        slot = self.free.pop()
+        slot.tag, slot.sent = tag, tuple(self.source if keys is None else keys)
+        for key in slot.sent:
+            wp.copy(slot.arrays[key], self.source[key])
+        if slot.event:
+            wp.get_stream(slot.event.device).record_event(slot.event)
+        self.pending.append(slot)
+
+    def receive(self) -> tuple[int, dict[Key, NDArray]]:
+        """Wait for the oldest set: its tag, and its arrays, which hold until the next `send`."""
+        slot = self.pending.popleft()
+        if slot.event:
+            wp.synchronize_event(slot.event)
+        self.free.insert(0, slot)
+        return slot.tag, {key: np.asarray(slot.arrays[key].numpy()) for key in slot.sent}
