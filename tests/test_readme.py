@@ -1,4 +1,4 @@
-"""The README's Python examples run as they stand, and its figures exist."""
+"""The README's Python examples run as they stand, and the documents' links lead somewhere."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ def test_example_runs(number, tmp_path, monkeypatch, capsys):
     assert " N" in capsys.readouterr().out
 
 
-def test_links_lead_somewhere():
-    targets = re.findall(r"\]\(([^)#:]+)\)", README)
-    assert targets
-    assert [target for target in targets if not (ROOT / target).exists()] == []
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path):
+    targets = re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
