@@ -1,4 +1,4 @@
-"""Owns the command line: warp-mca run | build | scenes | view.
+"""Owns the command line: warp-mca run | build | scenes | view | verify.
 
 Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 130 interrupted.
 """
@@ -93,8 +93,7 @@ def _parser() -> argparse.ArgumentParser:
 
     run = commands.add_parser("run", help="run a scene or a built model", allow_abbrev=False)
     _add_scene(run)
-    run.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
-    run.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
+    _add_device(run)
     run.add_argument("--duration", type=float, metavar="SECONDS", help="of the impact phase (default: the scene's)")
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     run.add_argument("--force", action="store_true", help="replace results that the folder holds already")
@@ -113,7 +112,20 @@ def _parser() -> argparse.ArgumentParser:
     view = commands.add_parser("view", help="open a recording in the rerun viewer", allow_abbrev=False)
     view.add_argument("recording", metavar="DIR_OR_FILE", type=Path, help=".rrd file, or a folder that holds some")
     view.set_defaults(command=_view)
+
+    verify = commands.add_parser("verify", help="measure the engine against known answers", allow_abbrev=False)
+    verify.add_argument("cases", nargs="*", metavar="CASE", help="case or group of cases (default: all)")
+    _add_device(verify)
+    verify.add_argument("--level", default="quick", choices=("quick", "full"), help="meshes (default: %(default)s)")
+    verify.add_argument("--out", type=Path, metavar="DIR", help="write verification.md and its figure there")
+    verify.set_defaults(command=_verify)
     return parser
+
+
+def _add_device(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    parser.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
+    parser.add_argument("--element", metavar="NAME", help="of every body: hex8")
 
 
 def _add_scene(parser: argparse.ArgumentParser) -> None:
@@ -247,3 +259,12 @@ def _view(args: argparse.Namespace) -> None:
     from warp_mca.recorders.rerun_viewer import view
 
     view(args.recording)
+
+
+def _verify(args: argparse.Namespace) -> None:
+    from warp_mca.verify.runner import verify
+
+    _start_warp()
+    verify(
+        args.cases, device=args.device, precision=args.precision, element=args.element, level=args.level, out=args.out
+    )

@@ -1,0 +1,37 @@
+"""The quick level of every verification case is met; errors in the engine that cases name can be made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from warp_mca.verify import Setup, cases
+from warp_mca.verify.case import Row
+from warp_mca.verify.mutations import MUTATIONS
+from warp_mca.verify.report import lines
+from warp_mca.verify.runner import outcome
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
+def test_case_is_met(case):
+    found = outcome(case, Setup())
+    assert found.met, "\n".join(lines(found))
+
+
+def test_deliberate_errors_can_be_made():
+    for name in {name for case in cases() for name in case.catches}:
+        text = (ROOT / MUTATIONS[name].file).read_text(encoding="utf-8")
+        assert text.count(MUTATIONS[name].old) == 1, name
+
+
+def test_a_row_is_met_within_its_tolerance_and_order():
+    row = {"quantity": "q", "exact": 2.0, "unit": "-", "tolerance": 0.01, "why": "", "sizes": (2.0, 1.0)}
+    assert Row(measured=(2.08, 2.02), **row).met
+    assert Row(measured=(2.08, 2.02), **row).order == pytest.approx(2.0)
+    assert not Row(measured=(2.08, 2.02), **row, least_order=2.5).met
+    assert not Row(measured=(2.0, 2.03), **row).met
+    assert not Row(measured=(2.0, float("nan")), **row).met
+    assert Row(measured=(2.08, 2.02), **row | {"exact": 0.0}, scale=300.0).met

@@ -1,0 +1,31 @@
+"""Owns verification: problems with known answers, what the engine makes of them, and the report of it.
+
+A case is a function in the file of its group, registered by the decorator `case`; it returns rows. GROUPS lists the
+files, in the order of the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+
+from warp_mca.errors import bad_value
+from warp_mca.verify.case import CASES, Case, Level, Row, Setup, case
+
+GROUPS = ("elements", "material", "waves", "impact", "friction", "rigid")
+
+__all__ = ["GROUPS", "Case", "Level", "Row", "Setup", "case", "cases"]
+
+
+def cases(names: Sequence[str] = ()) -> list[Case]:
+    """The cases of these names, or of these groups; all of them by default.
+
+    Raises:
+        RequestError: there is no such case.
+    """
+    for group in GROUPS:
+        import_module(f"warp_mca.verify.{group}")
+    for name in names:
+        if name not in CASES and name not in GROUPS:
+            raise bad_value("case", name, f"choose among {', '.join(CASES)}, or a group: {', '.join(GROUPS)}")
+    return [item for item in CASES.values() if not names or item.name in names or item.group in names]

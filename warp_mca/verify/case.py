@@ -1,0 +1,145 @@
+"""Owns what a verification case is: a problem with a known answer, measured on one mesh or on several."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warp_mca as mca
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+Level = Literal["quick", "full"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """How cases are run.
+
+    Attributes:
+        device, precision: as in `warp_mca.run`.
+        element: formulation of every body.
+        level: "quick" takes coarse meshes, for a few seconds a case on a CPU; "full" takes fine ones.
+    """
+
+    device: str = "cpu"
+    precision: str = "mixed"
+    element: str = "hex8"
+    level: Level = "quick"
+
+    def choose(self, quick: tuple, full: tuple) -> tuple:
+        """What belongs to the level: meshes from coarse to fine, most often."""
+        return full if self.level == "full" else quick
+
+    def scene(self, name: str, **parameters: Any) -> mca.Scene:
+        """A built-in scene with this element."""
+        return self.with_element(mca.make_scene(name, **parameters))
+
+    def with_element(self, scene: mca.Scene) -> mca.Scene:
+        """The scene with every body made of this element."""
+        bodies = tuple(dataclasses.replace(body, element=self.element) for body in scene.bodies)
+        return dataclasses.replace(scene, bodies=bodies)
+
+    def run(self, scene: mca.Scene, meshes: dict[str, Mesh] | None = None, **more: object) -> mca.Result:
+        """Run a scene on this device in this precision."""
+        settings: dict = {"device": self.device, "precision": self.precision, **more}
+        return mca.run(self.with_element(scene), meshes=meshes, **settings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One quantity beside its known value.
+
+    Attributes:
+        quantity: in a few words, with its symbol.
+        exact: the known value.
+        measured: from the coarsest mesh to the finest.
+        unit: of both.
+        tolerance: largest error allowed on the finest mesh, as a share of `scale`.
+        why: what the tolerance is made of.
+        sizes: element sizes of the meshes, in any one unit; needed for an order.
+        scale: what errors are shares of; |exact| by default, so needed where that is 0.
+        least_order: observed order that is demanded between the two finest meshes, or None.
+    """
+
+    quantity: str
+    exact: float
+    measured: tuple[float, ...]
+    unit: str
+    tolerance: float
+    why: str
+    sizes: tuple[float, ...] = ()
+    scale: float | None = None
+    least_order: float | None = None
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """Relative errors, one for each mesh."""
+        scale = abs(self.exact) if self.scale is None else self.scale
+        return tuple(abs(value - self.exact) / scale for value in self.measured)
+
+    @property
+    def order(self) -> float | None:
+        """Observed order of convergence between the two finest meshes; None without two."""
+        if len(self.sizes) < 2 or len(self.measured) < 2 or min(self.errors[-2:]) == 0.0:
+            return None
+        return math.log(self.errors[-2] / self.errors[-1]) / math.log(self.sizes[-2] / self.sizes[-1])
+
+    @property
+    def met(self) -> bool:
+        """Whether the finest mesh is within the tolerance, and the order is what it must be."""
+        good = self.errors[-1] <= self.tolerance  # not-a-number is not
+        return good and (self.least_order is None or (self.order is not None and self.order >= self.least_order))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A verification case.
+
+    Attributes:
+        name: unique, as the command line takes it.
+        group: heading of the table that lists it.
+        title: what is checked, in one line.
+        reference: where the known answer comes from.
+        measure: runs it.
+        catches: deliberate errors in the engine that it was seen to catch, names out of `mutations.MUTATIONS`.
+    """
+
+    name: str
+    group: str
+    title: str
+    reference: str
+    measure: Callable[[Setup], list[Row]]
+    catches: tuple[str, ...] = ()
+
+
+CASES: dict[str, Case] = {}
+
+
+def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Times at which a curve, taken as straight between its samples, crosses a level, either way."""
+    side = np.sign(value - level)
+    k = np.flatnonzero(side[:-1] * side[1:] < 0.0)
+    share = (level - value[k]) / (value[k + 1] - value[k])
+    return time[k] + share * (time[k + 1] - time[k])
+
+
+def case(
+    *, group: str, title: str, reference: str, catches: tuple[str, ...] = ()
+) -> Callable[[Callable[[Setup], list[Row]]], Callable[[Setup], list[Row]]]:
+    """Register the function below as the case of its name."""
+
+    def register(measure: Callable[[Setup], list[Row]]) -> Callable[[Setup], list[Row]]:
+        name: str = measure.__name__  # type: ignore[attr-defined]
+        assert name not in CASES, name
+        CASES[name] = Case(name=name, group=group, title=title, reference=reference, measure=measure, catches=catches)
+        return measure
+
+    return register

@@ -1,0 +1,47 @@
+"""Owns deliberate errors: changes of the engine's text that verification cases must notice.
+
+`python -m benchmarks.mutations` makes each in a copy and runs the cases that say they catch it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """A deliberate error.
+
+    Attributes:
+        what: is wrong then, to end the sentence "fails when …".
+        file: that is changed, from the repository's root.
+        old: text that stands there once.
+        new: what takes its place.
+    """
+
+    what: str
+    file: str
+    old: str
+    new: str
+
+
+MUTATIONS: dict[str, Mutation] = {
+    "shear_modulus_doubled": Mutation(
+        "the deviatoric stress is 4 G e in place of 2 G e",
+        "kernels/j2.py",
+        "S = R(2.0) * G * (e - eps_p)",
+        "S = R(4.0) * G * (e - eps_p)",
+    ),
+    "pressure_halved": Mutation(
+        "the pressure of an element is halved",
+        "kernels/hex8.py",
+        "pressure = K * dilation / volume",
+        "pressure = R(0.5) * K * dilation / volume",
+    ),
+    "contact_soft": Mutation(
+        "contact springs are ten times too soft",
+        "kernels/contact.py",
+        "Fn = -k * gap",
+        "Fn = -wp.float64(0.1) * k * gap",
+    ),
+}

@@ -1,0 +1,130 @@
+"""Owns the report of a verification: the table on the console, verification.md and its figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from warp_mca.verify.case import Case, Row, Setup
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """A case that was run.
+
+    Attributes:
+        case: that was run.
+        setup: how.
+        rows: what it gave; empty when it failed.
+        failure: why it gave nothing, or None.
+        wall: seconds it took.
+    """
+
+    case: Case
+    setup: Setup
+    rows: tuple[Row, ...]
+    failure: str | None
+    wall: float
+
+    @property
+    def met(self) -> bool:
+        """Whether every row is."""
+        return self.failure is None and bool(self.rows) and all(row.met for row in self.rows)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def cells(row: Row) -> list[str]:
+    """Quantity, exact, measured, error, order, tolerance and verdict, as text."""
+    order = row.order
+    return [
+        row.quantity,
+        f"{_number(row.exact)} {row.unit}".removesuffix(" -"),
+        ", ".join(_number(value) for value in row.measured),
+        f"{row.errors[-1]:.2g}",
+        "" if order is None else f"{order:.1f}",
+        f"{row.tolerance:.2g}",
+        "met" if row.met else "NOT MET",
+    ]
+
+
+HEAD = ["quantity", "exact", "measured, coarse to fine", "error", "order", "tolerance", ""]
+
+
+def lines(outcome: Outcome) -> list[str]:
+    """What the console shows of one case."""
+    case, setup = outcome.case, outcome.setup
+    verdict = "met" if outcome.met else "NOT MET"
+    shown = [
+        f"{case.group}/{case.name} ({setup.element}, {setup.precision}): {case.title}: {verdict}, {outcome.wall:.1f} s"
+    ]
+    if outcome.failure:
+        shown.append(f"  {outcome.failure}")
+    for row in outcome.rows:
+        quantity, exact, measured, error, order, tolerance, met = cells(row)
+        rate = f", order {order}" if order else ""
+        shown.append(f"  {quantity}: {measured} for {exact}, error {error}{rate}, tolerance {tolerance}: {met}")
+    return shown
+
+
+def write(folder: Path, outcomes: Sequence[Outcome], header: str) -> list[Path]:
+    """Write verification.md and images/verification.png into `folder`; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    image = _figure(folder / "images" / "verification.png", outcomes)
+    text = ["# Verification", "", header, ""]
+    if image:
+        text += ["![Error over element size of every row with an order](images/verification.png)", ""]
+    for group in dict.fromkeys(outcome.case.group for outcome in outcomes):
+        text += [f"## {group}", ""]
+        mine = [outcome for outcome in outcomes if outcome.case.group == group]
+        for name in dict.fromkeys(outcome.case.name for outcome in mine):
+            text += _section([outcome for outcome in mine if outcome.case.name == name])
+    page = folder / "verification.md"
+    page.write_text("\n".join(text).rstrip() + "\n", encoding="utf-8")
+    return [page, *([image] if image else [])]
+
+
+def _section(outcomes: Sequence[Outcome]) -> list[str]:
+    from warp_mca.verify.mutations import MUTATIONS
+
+    case = outcomes[0].case
+    text = [f"### {case.name}", "", f"{case.title}. {case.reference}", ""]
+    text += ["| element | precision | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 2) + "|"]
+    reasons: dict[str, str] = {}
+    for outcome in outcomes:
+        who = f"| {outcome.setup.element} | {outcome.setup.precision} | "
+        for row in outcome.rows:
+            text.append(who + " | ".join(cells(row)) + " |")
+            reasons.setdefault(row.quantity, row.why)
+        if outcome.failure:
+            text.append(who + f"{outcome.failure} | | | | | | NOT MET |")
+    text += ["", "Tolerances: " + "; ".join(f"{key}: {why}" for key, why in reasons.items()) + "."]
+    if case.catches:
+        text += ["", "Fails, as it must, when " + "; or ".join(MUTATIONS[name].what for name in case.catches) + "."]
+    return [*text, ""]
+
+
+def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
+    """Error over element size, for every row that has an order; None when there is none."""
+    from warp_mca.report.style import new_figure, save_png, tidy
+
+    curves = [(o, row) for o in outcomes for row in o.rows if len(row.sizes) > 1 and row.order is not None]
+    if not curves:
+        return None
+    groups = list(dict.fromkeys(outcome.case.group for outcome, _ in curves))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure = new_figure(7.0, 3.0 * len(groups))
+    for axes, group in zip(figure.subplots(len(groups), 1, squeeze=False)[:, 0], groups, strict=True):
+        for k, (outcome, row) in enumerate((o, r) for o, r in curves if o.case.group == group):
+            label = f"{outcome.case.name}, {outcome.setup.element}, {outcome.setup.precision}: {row.quantity}"
+            sizes = [size / max(row.sizes) for size in row.sizes]
+            axes.loglog(sizes, row.errors, marker="osv^Dx"[k % 6], label=label, linewidth=1.0, markersize=4)
+        axes.set_title(group, loc="left", fontsize=10)
+        axes.set_xlabel("element size over the coarsest [-]")
+        axes.set_ylabel("relative error [-]")
+        tidy(axes)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=6)
+    return save_png(figure, path)

@@ -1,0 +1,68 @@
+"""Owns running verification cases one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from warp_mca.errors import GuardError, McaError
+from warp_mca.solver import check_device
+from warp_mca.verify import cases
+from warp_mca.verify.case import Case, Level, Setup
+from warp_mca.verify.report import Outcome, lines, write
+
+
+def outcome(case: Case, setup: Setup) -> Outcome:
+    """Run one case; what it raises is its failure."""
+    begun = time.perf_counter()
+    failure, rows = None, ()
+    try:
+        rows = tuple(case.measure(setup))
+    except McaError as error:
+        failure = f"stopped: {error}"
+    return Outcome(case=case, setup=setup, rows=rows, failure=failure, wall=time.perf_counter() - begun)
+
+
+def verify(
+    names: Sequence[str] = (),
+    *,
+    device: str = "cpu",
+    precision: str = "mixed",
+    element: str | None = None,
+    level: Level = "quick",
+    out: Path | None = None,
+) -> list[Outcome]:
+    """Run cases, print what they give, and write the report into `out` where one is named.
+
+    Args:
+        names: of cases or groups; all by default.
+        device, precision: as in `warp_mca.run`.
+        element: formulation of every body; each in turn if None.
+        level: of the meshes.
+        out: folder for verification.md and its figure.
+
+    Raises:
+        RequestError: there is no such case or device.
+        GuardError: a case was not met.
+    """
+    chosen = cases(names)
+    check_device(device)
+    elements = [element] if element else ["hex8"]
+    outcomes = []
+    for case in chosen:
+        for item in elements:
+            found = outcome(case, Setup(device=device, precision=precision, element=item, level=level))
+            print("\n".join(lines(found)), flush=True)
+            outcomes.append(found)
+    failed = [f"{o.case.name} ({o.setup.element})" for o in outcomes if not o.met]
+    rows = sum(len(o.rows) for o in outcomes)
+    wall = sum(o.wall for o in outcomes)
+    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} cases met, {rows} quantities, {wall:.0f} s")
+    if out is not None:
+        command = f"warp-mca verify --level {level} --device {device} --precision {precision}"
+        for file in write(out, outcomes, f"Written by `{command}`."):
+            print(f"wrote {file}")
+    if failed:
+        raise GuardError(f"not met: {', '.join(failed)}")
+    return outcomes
