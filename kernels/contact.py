@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.friction import release, stick_slip
-from warp_mca.kernels.projection import closest_point, face_tangents, interpolate, shape
+from warp_mca.kernels.projection import interpolate, project
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
 
 wp.set_module_options({"enable_backward": False})
@@ -135,13 +135,9 @@ def surface_kernel(friction: bool) -> Any:
             p1 = X[i1] + u[i1] - x
             p2 = X[i2] + u[i2] - x
             p3 = X[i3] + u[i3] - x
-            at = closest_point(wp.vec3d(), p0, p1, p2, p3)
-            reach = wp.float64(_EDGE_REACH)
-            if wp.abs(at[0]) <= reach and wp.abs(at[1]) <= reach:
-                along_xi, along_eta = face_tangents(at[0], at[1], p0, p1, p2, p3)
-                area_normal = wp.cross(along_xi, along_eta)
+            inside, w, area_normal = project(wp.vec3d(), p0, p1, p2, p3, i2 == i3, wp.float64(_EDGE_REACH))
+            if inside:
                 normal = wp.normalize(area_normal)
-                w = shape(at[0], at[1])
                 gap = -wp.dot(interpolate(w, p0, p1, p2, p3), normal)
                 size = wp.float64(2.0) * wp.sqrt(wp.length(area_normal))
                 if gap < wp.float64(0.0) and gap > -size:

@@ -51,7 +51,7 @@ def sum_scalars(
 
 @cache
 def sum_elements_kernel(precision: str) -> Any:
-    """Kernel: elastic and plastic energy summed; largest strain and smallest Jacobian ratio of all elements."""
+    """Kernel: sums of elastic, plastic and hourglass energy; extremes of strain and Jacobian ratio."""
     R = scalars(precision).real
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -64,13 +64,16 @@ def sum_elements_kernel(precision: str) -> Any:
         k = wp.tid()
         elastic = wp.float64(0.0)
         plastic = wp.float64(0.0)
+        hourglass = wp.float64(0.0)
         largest = wp.float64(0.0)
         smallest = wp.float64(1.0)
         for e in range(k, energy.shape[1], width):
             elastic += wp.float64(energy[0, e])
             plastic += wp.float64(energy[1, e])
+            hourglass += wp.float64(energy[4, e])
             largest = wp.max(largest, wp.float64(energy[2, e]))
             smallest = wp.min(smallest, wp.float64(energy[3, e]))
+        partial_out[row[0], 6, k] = hourglass
         partial_out[row[0], 2, k] = elastic
         partial_out[row[0], 3, k] = plastic
         partial_out[row[0], 4, k] = largest

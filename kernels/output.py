@@ -1,97 +1,14 @@
 """Owns what is read off the state for viewers: stress at nodes, skins, probes, contact points, fields of the volume."""
 
-from functools import cache
-from typing import Any
-
 import warp as wp
 
 from warp_mca.kernels.contact import Spring
-from warp_mca.kernels.hex8 import (
-    edge_functions,
-    frame_functions,
-    gradient_function,
-    history_functions,
-    load_function,
-)
-from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
 vec6 = wp.types.vector(6, wp.float32)  # xx, yy, zz, xy, yz, xz
 OPEN, SLIP, STICK = 0, 1, 2  # states of a contact point
 _STICKING = 0.999999  # of mu F_n: a tangential force below this has not reached its limit
-
-
-@cache
-def stress_kernel(precision: str, plastic: bool) -> Any:
-    """Kernel: stress [Pa] and plastic strain [-] at the integration points of some elements, in the world frame.
-
-    A point's values go to the slot of the element's corner that lies nearest: rows xx, yy, zz, xy, yz, xz, p.
-    """
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    half_edges, to_gauss = edge_functions(precision)
-    element_rotation, local_displacement = frame_functions(precision)
-    load_element = load_function(precision)
-    point_gradient = gradient_function(precision)
-    read_plastic_strain, _ = history_functions(precision)
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def hex8_stress(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        element: wp.array(dtype=wp.int32),
-        first: int,
-        stress_out: wp.array2d(dtype=wp.float32),
-    ):
-        k = wp.tid()
-        e = element[k]
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, W)
-        gx = to_gauss(half_edges(Xl, 0))
-        gy = to_gauss(half_edges(Xl, 1))
-        gz = to_gauss(half_edges(Xl, 2))
-        lx = to_gauss(half_edges(ul, 0))
-        ly = to_gauss(half_edges(ul, 1))
-        lz = to_gauss(half_edges(ul, 2))
-        m = material[e]
-        identity = wp.identity(n=3, dtype=R)
-        Q = identity + W
-        volume = R(0.0)
-        dilation = R(0.0)
-        for g in range(8):
-            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
-            trace = wp.trace(grad)
-            volume += det
-            dilation += trace * det
-            eps_p = mat33()
-            p = R(0.0)
-            if wp.static(plastic):
-                if yielded[e] != 0:
-                    eps_p, p = read_plastic_strain(history, g, e)
-            strain = R(0.5) * (grad + wp.transpose(grad)) - trace / R(3.0) * identity - eps_p
-            S = R(2.0) * law[m, 1] * (Q * strain * wp.transpose(Q))
-            slot = first + 8 * k + (g ^ ((g >> 1) & 1))  # corners run around the faces
-            stress_out[0, slot] = wp.float32(S[0, 0])
-            stress_out[1, slot] = wp.float32(S[1, 1])
-            stress_out[2, slot] = wp.float32(S[2, 2])
-            stress_out[3, slot] = wp.float32(S[0, 1])
-            stress_out[4, slot] = wp.float32(S[1, 2])
-            stress_out[5, slot] = wp.float32(S[0, 2])
-            stress_out[6, slot] = wp.float32(p)
-        pressure = wp.float32(law[m, 0] * dilation / volume)
-        for g in range(8):
-            for c in range(3):
-                stress_out[c, first + 8 * k + g] = stress_out[c, first + 8 * k + g] + pressure
-
-    return hex8_stress
 
 
 @wp.func

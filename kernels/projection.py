@@ -19,6 +19,23 @@ def shape(xi: wp.float64, eta: wp.float64) -> wp.vec4d:
 
 
 @wp.func
+def triangle_weights(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec4d:
+    """Area coordinates of the point of the (extended) triangle nearest to x; the last is 0."""
+    ab = b - a
+    ac = c - a
+    ax = x - a
+    d00 = wp.dot(ab, ab)
+    d01 = wp.dot(ab, ac)
+    d11 = wp.dot(ac, ac)
+    d20 = wp.dot(ax, ab)
+    d21 = wp.dot(ax, ac)
+    inverse = wp.float64(1.0) / (d00 * d11 - d01 * d01)
+    s = inverse * (d11 * d20 - d01 * d21)
+    t = inverse * (d00 * d21 - d01 * d20)
+    return wp.vec4d(wp.float64(1.0) - s - t, s, t, wp.float64(0.0))
+
+
+@wp.func
 def interpolate(w: wp.vec4d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d) -> wp.vec3d:
     """Value at weights w of a field given at the four corners."""
     return w[0] * a + w[1] * b + w[2] * c + w[3] * d
@@ -64,3 +81,20 @@ def closest_point(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3
         if moved < wp.float64(1e-9):  # the next step would be its square
             break
     return wp.vec2d(xi, eta)
+
+
+@wp.func
+def project(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, triangle: bool, reach: wp.float64):
+    """Nearest point of a face: whether it lies within `reach` of its half size, weights, a quarter of its area vector.
+
+    A triangle has its last corner twice; coordinates that run along its edges then have no inverse there.
+    """
+    if triangle:
+        w = triangle_weights(x, a, b, c)
+        least = wp.min(w[0], wp.min(w[1], w[2]))
+        inside = least >= wp.float64(0.5) * (wp.float64(1.0) - reach)
+        return inside, w, wp.float64(0.125) * wp.cross(b - a, c - a)
+    at = closest_point(x, a, b, c, d)
+    along_xi, along_eta = face_tangents(at[0], at[1], a, b, c, d)
+    inside = wp.abs(at[0]) <= reach and wp.abs(at[1]) <= reach
+    return inside, shape(at[0], at[1]), wp.cross(along_xi, along_eta)

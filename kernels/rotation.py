@@ -11,8 +11,8 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def nearest_rotation(precision: str) -> Any:
-    """The function F -> W = Q - I with F = Q U.
+def nearest_rotation(precision: str, finite: bool = False) -> Any:
+    """The function F -> W = Q - I with F = Q U; with `finite`, for stretches of up to ten.
 
     Higham's iteration Q <- (Q + Q^-T) / 2 (SIAM J. Sci. Stat. Comput. 7 (1986) 1160) acts on the singular values only
     and squares their distance from one. A last step by Newton and Schulz, Q <- Q (I - (Q^T Q - I) / 2), works on W, so
@@ -21,7 +21,7 @@ def nearest_rotation(precision: str) -> Any:
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    iterations = 2 if precision == "mixed" else 3
+    iterations = 7 if finite else 2 if precision == "mixed" else 3
 
     @wp.func
     def polar_rotation(F: mat33):

@@ -113,7 +113,7 @@ def test_fine_patch_has_the_asked_size():
     mesh = rod(focus_size=0.5e-3).build()
     focus = (LENGTH - R + R * math.cos(FOCUS), R * math.sin(FOCUS), 0.0)
     node = np.linalg.norm(mesh.points - focus, axis=1).argmin()
-    around = edge_lengths(mesh)[(mesh.hexahedra == node).any(axis=1)]
+    around = edge_lengths(mesh).reshape(-1, 12)[(mesh.hexahedra == node).any(axis=1)]
     assert around.min() == pytest.approx(0.5e-3, rel=0.05)
     assert edge_lengths(mesh).min() > 0.8 * 0.5e-3
 
@@ -310,8 +310,8 @@ def test_mesh_file_refusals(tmp_path: Path, capfd):
 
     box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
     cases = {
-        "tetra": [("hexahedron", box.hexahedra), ("tetra", [[0, 1, 2, 4]])],
-        "no hexahedra": [("quad", box.surface("xmin")[0])],
+        "tetra10": [("hexahedron", box.hexahedra), ("tetra10", [[0, 1, 2, 4, 3, 5, 6, 7, 0, 1]])],
+        "no volume cells": [("quad", box.surface("xmin")[0])],
         "nodes beyond its 8 points": [("hexahedron", box.hexahedra + 1)],
     }
     for message, cells in cases.items():

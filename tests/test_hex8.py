@@ -7,7 +7,8 @@ import pytest
 import warp as wp
 from scipy.spatial.transform import Rotation
 
-from warp_mca.element import eigenvalue_bounds, gradients, largest_eigenvalues, lumped_masses
+from warp_mca.elements import ELEMENTS
+from warp_mca.elements.hexahedron import eigenvalue_bounds, gradients, largest_eigenvalues, lumped_masses
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels import hex8
 from warp_mca.kernels.rotation import nearest_rotation
@@ -47,7 +48,7 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         history = [wp.zeros(count * plastic, dtype=int), wp.zeros((48, count * plastic), dtype=t.real)]
         field = wp.array(u, dtype=wp.vec3d)
         force = wp.full(8 * count, np.nan, dtype=t.vec3)
-        energy = wp.full((4, count), np.nan, dtype=t.real)
+        energy = wp.full((5, count), np.nan, dtype=t.real)
         kernel = hex8.force_kernel(precision, plastic)
         wp.launch(kernel, count, inputs=[*arrays, law, field, 0], outputs=[*history, force])
         kernel = hex8.energy_kernel(precision, plastic)
@@ -175,7 +176,7 @@ def test_eigenvalues_bound_each_other_and_meet_the_cubes_closed_form():
     mass = lumped_masses(x, rho)
     exact = largest_eigenvalues(x, *moduli, mass)
     assert (eigenvalue_bounds(x, *moduli, mass) >= exact).all()
-    found = stable_step(x, *moduli, mass, np.zeros(200))
+    found = stable_step(ELEMENTS["hex8"], x, *moduli, mass, np.zeros(200), np.arange(200))
     assert found.element == exact.argmax()
     assert found.dt == pytest.approx(2.0 / np.sqrt(exact.max()), rel=1e-12)
     cube = 1e-3 * CUBE[None]  # uniform dilatation is its fastest mode: energy 9 K / 2 on masses of 1/8 rho h^3

@@ -99,7 +99,8 @@ def test_elements_come_in_the_order_of_the_meshes(bars: FlyingBars):
     X = {name: mesh.points for name, mesh in meshes.items()}
     model = build_model(scene, meshes, X, {name: np.zeros_like(x) for name, x in X.items()})
     assert model.element_of[0] == 10  # the model puts plastic elements first
-    nodes, body, material = cells(model)
+    ((kind, nodes),), body, material = cells(model)
+    assert kind == "hexahedron"
     np.testing.assert_array_equal(nodes, elements(bars))
     np.testing.assert_array_equal(body, np.repeat([0, 1], 10))
     assert model.law[material[10:], 2] == pytest.approx(100e6)

@@ -7,7 +7,8 @@ import pytest
 
 import warp_mca as mca
 from warp_mca import simulation
-from warp_mca.element import eigenvalue_bounds, largest_eigenvalues, lumped_masses
+from warp_mca.elements import ELEMENTS
+from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.solver import Solver
@@ -147,7 +148,7 @@ def test_worst_of_many_elements_is_found_wherever_it_lies():
         G = K * rng.uniform(0.01, 0.6, n)  # the bound is close for small G only
         mass, contact = lumped_masses(x, rho), rng.uniform(0.0, 1e12, n)
         exact = largest_eigenvalues(x, K, G, mass) + contact
-        found = stable_step(x, K, G, mass, contact)
+        found = stable_step(ELEMENTS["hex8"], x, K, G, mass, contact, np.arange(len(x)))
         assert found.element == exact.argmax()
         assert found.dt == pytest.approx(2.0 / np.sqrt(exact.max()), rel=1e-12)
         assert found.contact_share == pytest.approx(contact[found.element] / exact.max(), rel=1e-12)

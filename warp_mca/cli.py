@@ -6,6 +6,7 @@ Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import sys
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import warp_mca as mca
 from warp_mca import registry
+from warp_mca.elements import ELEMENTS
 from warp_mca.errors import McaError, bad_value
 from warp_mca.scene import Scene
 from warp_mca.scene_file import SUFFIX, Origin
@@ -116,22 +118,28 @@ def _parser() -> argparse.ArgumentParser:
     verify = commands.add_parser("verify", help="measure the engine against known answers", allow_abbrev=False)
     verify.add_argument("cases", nargs="*", metavar="CASE", help="case or group of cases (default: all)")
     _add_device(verify)
+    _add_element(verify)
     verify.add_argument("--level", default="quick", choices=("quick", "full"), help="meshes (default: %(default)s)")
     verify.add_argument("--out", type=Path, metavar="DIR", help="write verification.md and its figure there")
     verify.set_defaults(command=_verify)
     return parser
 
 
+def _add_element(parser: argparse.ArgumentParser) -> None:
+    names = ", ".join(ELEMENTS)
+    parser.add_argument("--element", metavar="NAME", choices=tuple(ELEMENTS), help=f"of every body: {names}")
+
+
 def _add_device(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
     parser.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
-    parser.add_argument("--element", metavar="NAME", help="of every body: hex8")
 
 
 def _add_scene(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
     parser.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
     help_text = "change a parameter; may be given several times"
+    _add_element(parser)
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
 
 
@@ -182,11 +190,19 @@ def _request(args: argparse.Namespace) -> Request:
         preset = args.preset or source.default_preset
         origin = Origin(source.name, preset, values) if source.builtin else None
         label = f"{source.name}-{preset}" if preset else source.name
-        return Request(source.build(values), label, source, origin)
+        return Request(_with_element(source.build(values), args.element), label, source, origin)
     if args.preset is not None:
         raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
     stored = scene_file.changed(scene_file.load(args.scene), overrides)
-    return Request(stored.scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
+    scene = _with_element(stored.scene, args.element)
+    return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
+
+
+def _with_element(scene: Scene, element: str | None) -> Scene:
+    """The scene with another element formulation, where one is named."""
+    if element is None:
+        return scene
+    return dataclasses.replace(scene, bodies=tuple(dataclasses.replace(b, element=element) for b in scene.bodies))
 
 
 def _run(args: argparse.Namespace) -> None:

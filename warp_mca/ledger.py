@@ -70,14 +70,14 @@ class Ledger:
         self._balance(sums, t)
 
     def _energies(self, sums: Array) -> dict[str, float]:
-        from warp_mca.solver import DRIVE_WORK, ELASTIC, GRAVITY_WORK, KINETIC, PASS, PASS_COLUMNS, PLASTIC
+        from warp_mca.solver import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, KINETIC, PASS, PASS_COLUMNS, PLASTIC
 
         springs = sums[PASS:].reshape(-1, PASS_COLUMNS)
         return {
             "kinetic": float(sums[KINETIC]),
             "elastic": float(sums[ELASTIC]),
             "plastic": float(sums[PLASTIC]),
-            "hourglass": 0.0,
+            "hourglass": float(sums[HOURGLASS]),
             "contact": float(springs[:, 0].sum()),
             "friction": float(springs[:, 1].sum()),
             "damping": 0.0,
@@ -133,7 +133,7 @@ class Ledger:
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
             velocity[:, 1] = self.model.passes[0].plane.velocity
-        stored = energy["elastic"] + energy["plastic"]
+        stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
         balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
         return {
             "time_s": self.interval * np.arange(first, self.count, dtype=np.float64),

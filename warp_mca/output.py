@@ -37,11 +37,10 @@ class NodalStress:
         corner, first = [], 0
         for stage in solver.elements:
             element = np.flatnonzero((local[stage.block.conn] >= 0).any(axis=0)).astype(np.int32)
-            kernel = output.stress_kernel(solver.precision, stage.block.plastic)
             if len(element):
-                self.parts.append((stage, kernel, wp.array(element, dtype=wp.int32), first))
+                self.parts.append((stage, wp.array(element, dtype=wp.int32), first))
             corner.append(local[stage.block.conn[:, element]].T.ravel())
-            first += 8 * len(element)
+            first += stage.corners * len(element)
         flat = np.concatenate(corner)
         slot = np.argsort(flat, kind="stable")[np.count_nonzero(flat < 0) :]
         offset = np.searchsorted(flat[slot], np.arange(len(nodes) + 1))
@@ -55,9 +54,8 @@ class NodalStress:
     def launch(self) -> None:
         """Compute it for the solver's present displacements."""
         s = self.solver
-        for stage, kernel, element, first in self.parts:
-            inputs = [s.X, stage.conn, stage.material, s.law, stage.yielded, stage.history, s.u, element, first]
-            wp.launch(kernel, len(element), inputs=inputs, outputs=[self.points], block_dim=64)
+        for stage, element, first in self.parts:
+            stage.stresses(s.X, s.law, s.u, element, first, self.points)
         outputs = [self.tensor, self.von_mises, self.plastic]
         wp.launch(output.nodal_stress, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
 
@@ -120,8 +118,7 @@ class Output:
 
     def kernels(self) -> list[Any]:
         """One kernel of every module that a step with output needs."""
-        kinds = {stage.block.plastic for stage in self.solver.elements}
-        used = [output.stress_kernel(self.solver.precision, plastic) for plastic in kinds]
+        used = [stage.stress_kernel for stage in self.solver.elements]
         return [output.nodal_stress, *used] if self.arrays else []
 
     def before_step(self, needs: frozenset[str]) -> None:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.element import shape_functions
+from warp_mca.elements.hexahedron import shape_functions
+from warp_mca.elements.tet4 import gradients
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene import Path, Scene
@@ -84,32 +85,68 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
 
 
 def _elements_around(at: Array, mesh: Mesh, path: Path) -> tuple[NDArray[np.int32], Array]:
-    """Corners of the element around each point, shape (point_count, 8), and the shape functions there."""
+    """Corners of the cell around each point, shape (point_count, 8), and their weights there.
+
+    Raises:
+        RequestError: a point lies outside the mesh.
+    """
+    found = []
+    if len(mesh.hexahedra):
+        found.append(_in_hexahedra(at, mesh))
+    if len(mesh.tetrahedra):
+        found.append(_in_tetrahedra(at, mesh))
+    corners, weights, apart, allowed = (np.stack(parts) for parts in zip(*found, strict=True))
+    rows = np.arange(len(at))
+    best = (apart - allowed).argmin(axis=0)
+    apart, allowed = apart[best, rows], allowed[best, rows]
+    far = int(np.argmax(apart - allowed))
+    if apart[far] > allowed[far]:
+        place = ", ".join(f"{x:.6g}" for x in at[far])
+        raise bad_value(f"Path {path.name}.lines", f"({place})", f"this point lies {apart[far]:.3g} m outside the body")
+    return corners[best, rows], weights[best, rows]
+
+
+def _nearest(at: Array, corners: Array) -> NDArray[np.intp]:
+    """The cells whose centres lie nearest to each point, shape (point_count, candidate_count)."""
     from scipy.spatial import KDTree
 
-    corners = mesh.points[mesh.hexahedra]
     _, near = KDTree(corners.mean(axis=1)).query(at, k=min(CANDIDATES, len(corners)))
-    near = np.asarray(near).reshape(len(at), -1)
+    return np.asarray(near).reshape(len(at), -1)
+
+
+def _in_hexahedra(at: Array, mesh: Mesh) -> tuple[NDArray[np.int32], Array, Array, Array]:
+    """Best hexahedron for each point: corners, weights, distance from the point [m], and what may count as none."""
+    corners = mesh.points[mesh.hexahedra]
+    near = _nearest(at, corners)
     x = corners[near]  # (point, candidate, corner, axis)
     xi = np.zeros((*near.shape, 3))
     for _ in range(8):  # Newton's method on x(xi) = at, kept within the element
         value, slope = shape_functions(xi)
         J = np.einsum("pcak,pcai->pcik", slope, x)
         missing = at[:, None] - np.einsum("pca,pcai->pci", value, x)
-        xi = np.clip(xi + np.linalg.solve(J, missing[..., None])[..., 0], -1.0, 1.0)
+        # the Jacobian has no inverse where corners of a wedge or a pyramid coincide
+        xi = np.clip(xi + (np.linalg.pinv(J) @ missing[..., None])[..., 0], -1.0, 1.0)
     value, _ = shape_functions(xi)
     apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", value, x), axis=-1)
-    best = apart.argmin(axis=1)
-    rows = np.arange(len(at))
-    chosen = x[rows, best]
-    allowed = OUTSIDE * np.linalg.norm(np.ptp(chosen, axis=1), axis=1)
-    far = int(np.argmax(apart[rows, best] - allowed))
-    if apart[far, best[far]] > allowed[far]:
-        place = ", ".join(f"{x:.6g}" for x in at[far])
-        raise bad_value(
-            f"Path {path.name}.lines", f"({place})", f"this point lies {apart[far, best[far]]:.3g} m outside the body"
-        )
-    return mesh.hexahedra[near[rows, best]], value[rows, best]
+    best, rows = apart.argmin(axis=1), np.arange(len(at))
+    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
+    return mesh.hexahedra[near[rows, best]], value[rows, best], apart[rows, best], allowed
+
+
+def _in_tetrahedra(at: Array, mesh: Mesh) -> tuple[NDArray[np.int32], Array, Array, Array]:
+    """The same of tetrahedra, with their last corner repeated at no weight."""
+    corners = mesh.points[mesh.tetrahedra]
+    near = _nearest(at, corners)
+    x = corners[near]
+    slope = gradients(corners)[near]
+    weight = np.einsum("pcai,pci->pca", slope, at[:, None] - x.mean(axis=2)) + 0.25
+    weight = np.clip(weight, 0.0, None)
+    weight /= weight.sum(axis=-1, keepdims=True)
+    apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", weight, x), axis=-1)
+    best, rows = apart.argmin(axis=1), np.arange(len(at))
+    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
+    nodes = mesh.tetrahedra[near[rows, best]][:, [0, 1, 2, 3, 3, 3, 3, 3]]
+    return nodes, np.pad(weight[rows, best], ((0, 0), (0, 4))), apart[rows, best], allowed
 
 
 def path_histories(probes: Probes, rings: Sequence[NDArray[np.float32]]) -> tuple[PathHistory, ...]:

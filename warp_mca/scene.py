@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
 
 if TYPE_CHECKING:
@@ -108,7 +109,10 @@ class Body:
         name: unique in the scene.
         geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
         material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
-        element: element formulation.
+        element: formulation of its hexahedra, wedges and pyramids: "hex8" fully integrated, "hex8r" one point with
+            hourglass stiffness; "tet4" cuts them to tetrahedra. Tetrahedra are tet4 always.
+        kinematics: "corotational" takes strains as small, in the rotated frame; "finite" as logarithmic, for large
+            plastic deformation.
         position: of the body frame's origin [m].
         rotation: of the body frame, as a rotation vector [rad].
         velocity: initial velocity of the body frame's origin [m/s].
@@ -118,15 +122,18 @@ class Body:
     name: str
     geometry: Recipe | Mesh
     material: Material | Mapping[str, Material]
-    element: Literal["hex8"] = "hex8"
+    element: str = "hex8"
+    kinematics: Literal["corotational", "finite"] = "corotational"
     position: Vec3 = (0.0, 0.0, 0.0)
     rotation: Vec3 = (0.0, 0.0, 0.0)
     velocity: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if self.element != "hex8":
-            raise bad_value(f"Body {self.name}.element", self.element, "the element known here is hex8")
+        if self.element not in ELEMENTS:
+            raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
+        if self.kinematics not in ("corotational", "finite"):
+            raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
         _finite(
             f"Body {self.name}",
             position=self.position,

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
+from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.handoff import HandOff, hand_off
 from warp_mca.ledger import Ledger
@@ -82,7 +84,13 @@ def mesh(scene: Scene) -> dict[str, Mesh]:
             made[key] = body.geometry if isinstance(body.geometry, Mesh) else body.geometry.build()
             check(made[key], body.name)
         meshes[body.name] = made[key]
-    return meshes
+    return _cut(scene, meshes)
+
+
+def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
+    """The meshes, cut to tetrahedra where a body's formulation takes them."""
+    cut = {body.name for body in scene.bodies if ELEMENTS[body.element].corners == 4}
+    return {name: tetrahedral(mesh) if name in cut else mesh for name, mesh in meshes.items()}
 
 
 def divide(scene: Scene, model: Model, duration: float) -> Steps:
@@ -171,7 +179,7 @@ def run(
         check_output(out, force=force)
     clock = _Clock()
     tell("mesh", 0.0)
-    meshes = mesh(scene) if meshes is None else meshes
+    meshes = mesh(scene) if meshes is None else _cut(scene, meshes)
     clock.lap("mesh")
     tell("rigid", 0.0)
     start = hand_off(scene, meshes, nodal_masses(scene, meshes))
@@ -287,7 +295,7 @@ def _facts(
         wall=clock.wall,
         device=solver.device_name(),
         precision=solver.precision,
-        element="hex8",
+        element=" ".join(sorted({block.element for block in model.blocks})),
         energy_error=ledger.energy_error,
         energy=ledger.energy(),
         max_plastic_strain=solver.max_plastic_strain(),
@@ -303,10 +311,11 @@ def _facts(
 
 def _warnings(scene: Scene, start: HandOff, ledger: Ledger) -> list[str]:
     found = []
-    if ledger.max_strain > COROTATIONAL_STRAIN:
+    corotational = any(body.kinematics == "corotational" for body in scene.bodies)
+    if corotational and ledger.max_strain > COROTATIONAL_STRAIN:
         found.append(
             f"strain reached {ledger.max_strain:.2f}; the co-rotational element takes strains as small, "
-            f"expect stresses off by about as much where it exceeds {COROTATIONAL_STRAIN}"
+            f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose kinematics='finite'"
         )
     if scene.rigid and scene.rigid.inertia == "slender":
         found.append(

@@ -2,10 +2,10 @@
 
 | stage | kernel | runs |
 |---|---|---|
-| 1 element forces | `hex8_force` | every step, once for plastic and once for elastic elements |
+| 1 element forces | `hex8_force`, `hex8r_force`, `tet4_force`, … | every step, for each block of like elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
-| 3 record at t(n) | `hex8_energy`, sums | first step of each output interval |
-| 3a paths, frames at t(n) | `hex8_stress`, `nodal_stress`, … | the same, where a scene has paths or a frame is due |
+| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval |
+| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | the same, where a scene has paths or a frame is due |
 | 4 gather and integrate | `integrate` | every step |
 | 5 re-joint | `rejoin` | every step, in scenes with joints |
 | 6 prescribed motion | `prescribe` | every step, in scenes with driven axes |
@@ -23,10 +23,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
-from warp_mca.kernels import constraint, contact, hex8, ledger, node, search
+from warp_mca.kernels import constraint, contact, ledger, node, search
 from warp_mca.kernels.scalars import scalars
-from warp_mca.model import Block, Model
+from warp_mca.model import Model
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 SUM_WIDTH = 256  # threads that share a sum, in a fixed order
 ROWS = 32  # records kept on the device before the host reads them
 # Columns of a record, then eight for each contact pass (`contact.sum_springs`).
-KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, DRIVE_WORK, PASS = range(8)
+KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
 PASS_COLUMNS = 8
 
 
@@ -131,21 +132,6 @@ class ContactStage:
         wp.launch(contact.react, len(item.master), inputs=inputs, outputs=[force, flag])
 
 
-class ElementStage:
-    """Device side of one block of elements; an elastic block allocates no history."""
-
-    def __init__(self, block: Block, precision: str) -> None:
-        real = scalars(precision).real
-        self.block = block
-        self.conn = wp.array(block.conn, dtype=wp.int32)
-        self.material = wp.array(block.material, dtype=wp.int32)
-        count = block.conn.shape[1] if block.plastic else 0
-        self.yielded = wp.zeros(count, dtype=wp.int32)
-        self.history = wp.zeros((8 * hex8.j2.HISTORY_SIZE, count), dtype=real)
-        self.force_kernel = hex8.force_kernel(precision, block.plastic)
-        self.energy_kernel = hex8.energy_kernel(precision, block.plastic)
-
-
 class Solver:
     """Advances a model on one device.
 
@@ -175,16 +161,16 @@ class Solver:
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
         self.law = wp.array(model.law, dtype=t.real)
-        self.force = wp.zeros(8 * model.element_count, dtype=t.vec3)
+        self.force = wp.zeros(sum(block.conn.size for block in model.blocks), dtype=t.vec3)
         self.offset = wp.array(model.gather_offset, dtype=wp.int32)
         self.slot = wp.array(model.gather_slot, dtype=wp.int32)
         self.fixed_axes = wp.array(model.fixed_axes if model.fixed_axes.any() else model.fixed_axes[:0], dtype=wp.int32)
-        self.elements = [ElementStage(block, self.precision) for block in model.blocks]
+        self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
         self.contacts = [ContactStage(p, model, PASS + PASS_COLUMNS * k) for k, p in enumerate(model.passes)]
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros(3, dtype=wp.int32)
         self._allocate_constraints()
-        self.energy = wp.zeros((4, model.element_count), dtype=t.real)
+        self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.zeros(1, dtype=wp.int32)
         columns = PASS + PASS_COLUMNS * len(self.contacts)
         self.partial = wp.zeros((ROWS, columns, SUM_WIDTH), dtype=wp.float64)
@@ -209,9 +195,7 @@ class Solver:
 
     def _forces(self) -> None:
         for stage in self.elements:
-            inputs = [self.X, stage.conn, stage.material, self.law, self.u, stage.block.slot]
-            outputs = [stage.yielded, stage.history, self.force]
-            wp.launch(stage.force_kernel, stage.block.conn.shape[1], inputs=inputs, outputs=outputs, block_dim=64)
+            stage.forces(self.X, self.law, self.u, self.force)
         for stage in self.contacts:
             stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
 
@@ -246,11 +230,7 @@ class Solver:
         if self.output:
             self.output.before_step(needs)
         for stage in self.elements:
-            inputs = [self.X, stage.conn, stage.material, self.law, stage.yielded, stage.history, self.u]
-            inputs += [stage.block.first]
-            wp.launch(
-                stage.energy_kernel, stage.block.conn.shape[1], inputs=inputs, outputs=[self.energy], block_dim=64
-            )
+            stage.energies(self.X, self.law, self.u, self.energy)
         self._sum(self.sum_elements_kernel, self.energy, self.row, SUM_WIDTH)
         for stage in self.contacts:
             self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
@@ -286,7 +266,7 @@ class Solver:
     def _kernels(self) -> list[Any]:
         kernels = [constraint.rejoin, ledger.sum_nodes, contact.react, search.face_bounds]
         kernels += [self.integrate_kernel, self.sum_elements_kernel]
-        kernels += [kernel for stage in self.elements for kernel in (stage.force_kernel, stage.energy_kernel)]
+        kernels += [kernel for stage in self.elements for kernel in stage.kernels()]
         kernels += self.output.kernels() if self.output else []
         return kernels + [stage.kernel for stage in self.contacts]
 
@@ -338,9 +318,7 @@ class Solver:
 
     def max_plastic_strain(self) -> float:
         """Greatest equivalent plastic strain of any integration point [-]."""
-        size = hex8.j2.HISTORY_SIZE
-        values = [stage.history.numpy()[size - 1 :: size] for stage in self.elements if stage.block.plastic]
-        return max((float(value.max()) for value in values), default=0.0)
+        return max(stage.max_plastic_strain() for stage in self.elements)
 
     def max_penetration(self) -> float:
         """Greatest depth that a slave node reached below its master [m]."""

@@ -21,7 +21,8 @@ class Faces:
     """A surface in the model's numbering.
 
     Attributes:
-        node: corners of each face, counter-clockwise from outside, shape (face_count, 4), int32.
+        node: corners of each face, counter-clockwise from outside, shape (face_count, 4), int32; triangles have
+            their last one twice.
         element: that each face bounds, shape (face_count,), int32.
         area: [m^2], shape (face_count,), float64.
         stiffness: K A^2 / V of each face [N/m], shape (face_count,), float64.
@@ -104,6 +105,9 @@ def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sig
     softest = float(master.stiffness.min())
     corner = master.node.ravel()
     order = np.argsort(corner, kind="stable")
+    again = np.zeros(master.node.shape, dtype=bool)
+    again[:, 3] = master.node[:, 2] == master.node[:, 3]
+    order = order[~again.ravel()[order]]  # a triangle's last corner gathers once
     return ContactPass(
         slave=nodes,
         stiffness=penalty * np.minimum(_node_mean(nodes, slave, slave.stiffness), softest),

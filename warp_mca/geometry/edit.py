@@ -16,7 +16,7 @@ def mirror(mesh: Mesh, axis: int) -> Mesh:
     """The mesh and its reflection, joined at the plane where coordinate `axis` is 0.
 
     Args:
-        mesh: lies on one side of the plane; what touches it within gmsh's rounding is put exactly on it.
+        mesh: hexahedra on one side of the plane; what touches it within gmsh's rounding is put exactly on it.
         axis: 0, 1 or 2.
     """
     points = snapped(mesh.points, axis, 0.0)
@@ -61,10 +61,10 @@ def pinned(points: np.ndarray, place: ArrayLike) -> np.ndarray:
 
 def compact(mesh: Mesh) -> Mesh:
     """The mesh without the nodes that no element uses; sets keep the nodes that are left."""
-    used = np.unique(mesh.hexahedra)
+    used = np.union1d(mesh.hexahedra, mesh.tetrahedra)
     if len(used) == len(mesh.points):
         return mesh
     index = np.full(len(mesh.points), -1, dtype=np.int32)
     index[used] = np.arange(len(used), dtype=np.int32)
     node_sets = {name: index[nodes][index[nodes] >= 0] for name, nodes in mesh.node_sets.items()}
-    return Mesh(mesh.points[used], index[mesh.hexahedra], node_sets, mesh.cell_sets)
+    return Mesh(mesh.points[used], index[mesh.hexahedra], node_sets, mesh.cell_sets, index[mesh.tetrahedra])

@@ -16,29 +16,60 @@ HEX_FACES = np.array(
 )
 
 
+TET_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], dtype=np.int32)
+
+
 @dataclass(frozen=True)
 class Mesh:
-    """A volume mesh in the frame of its body.
+    """A volume mesh in the frame of its body; cells are counted over the hexahedra, then the tetrahedra.
 
     Attributes:
         points: node positions [m], shape (node_count, 3), float64.
-        hexahedra: node indices in VTK order, shape (element_count, 8), int32.
+        hexahedra: node indices in VTK order, shape (hexahedron_count, 8), int32. Wedges and pyramids are hexahedra
+            whose corners coincide, see `warp_mca.geometry.degenerate`.
         node_sets: named node indices, each shape (count,), int32.
-        cell_sets: named element indices, each shape (count,), int32.
+        cell_sets: named cell indices, each shape (count,), int32.
+        tetrahedra: node indices in VTK order, shape (tetrahedron_count, 4), int32.
     """
 
     points: NDArray[np.float64]
     hexahedra: NDArray[np.int32]
     node_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     cell_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
+    tetrahedra: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+
+    @property
+    def cell_count(self) -> int:
+        """Number of cells."""
+        return len(self.hexahedra) + len(self.tetrahedra)
+
+    def cell(self, index: int) -> NDArray[np.int32]:
+        """Nodes of one cell."""
+        first = len(self.hexahedra)
+        return self.hexahedra[index] if index < first else self.tetrahedra[index - first]
 
     @cached_property
     def boundary(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Faces that belong to one element only, oriented outwards: nodes (face_count, 4), element (face_count,)."""
-        faces = self.hexahedra[:, HEX_FACES].reshape(-1, 4)
-        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+        """Faces that belong to one cell only, oriented outwards: nodes (face_count, 4), cell (face_count,).
+
+        Triangles have their last corner twice.
+        """
+        quads = _triangles_last(self.hexahedra[:, HEX_FACES].reshape(-1, 4))
+        triangles = self.tetrahedra[:, TET_FACES].reshape(-1, 3)
+        faces = np.concatenate([quads, triangles[:, [0, 1, 2, 2]]])
+        cells = np.concatenate(
+            [
+                np.repeat(np.arange(len(self.hexahedra)), len(HEX_FACES)),
+                len(self.hexahedra) + np.repeat(np.arange(len(self.tetrahedra)), len(TET_FACES)),
+            ]
+        )
+        key = faces.copy()
+        key[faces[:, 2] == faces[:, 3], 3] = -1
+        key = np.sort(key, axis=1)
+        _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
         own = np.sort(first[count == 1])
-        return faces[own], (own // len(HEX_FACES)).astype(np.int32)
+        own = own[faces[own, 1] != faces[own, 2]]  # what collapsed to an edge or a point is no face
+        return faces[own].astype(np.int32), cells[own].astype(np.int32)
 
     def surface(self, name: str) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Boundary faces whose nodes all lie in the node set `name` ("boundary": all of them).
@@ -68,3 +99,22 @@ class Mesh:
         if name not in self.node_sets:
             raise bad_value("node set", name, f"the mesh has {', '.join(sorted(self.node_sets)) or 'no sets'}")
         return self.node_sets[name]
+
+
+def _triangles_last(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Faces turned so that a corner that appears twice comes last; with more than two alike, corners 1 and 2 are."""
+    turned = faces.copy()
+    for k in range(3):
+        twice = faces[:, k] == faces[:, k + 1]
+        turned[twice] = np.roll(faces, 2 - k, axis=1)[twice]
+    ends = (faces[:, 0] == faces[:, 3]) & (faces[:, 0] != faces[:, 1])
+    turned[ends] = np.roll(faces, -1, axis=1)[ends]
+    collapsed = _kinds(faces) < 3
+    turned[collapsed] = faces[collapsed][:, :1]
+    return turned
+
+
+def _kinds(faces: NDArray[np.int32]) -> NDArray[np.intp]:
+    """Number of different corners of each face."""
+    ordered = np.sort(faces, axis=1)
+    return 1 + (np.diff(ordered, axis=1) != 0).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Owns `MeshFile`: a mesh of hexahedra read from any file format that meshio knows."""
+"""Owns `MeshFile`: a mesh of hexahedra, wedges, pyramids and tetrahedra from any file format that meshio knows."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import RequestError, bad_value
+from warp_mca.geometry.degenerate import AS_HEXAHEDRON, oriented
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.mesh import Mesh
 
 if TYPE_CHECKING:
     import meshio
 
+KINDS = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4}  # cells that are read, in the order they are kept
+
 
 @dataclass(frozen=True)
 class MeshFile:
-    """A mesh from a file; nodes that no hexahedron uses are dropped.
+    """A mesh from a file; nodes that no cell uses are dropped.
 
     Node sets come from the file's point sets and from its named groups of faces, edges or vertices; cell sets from
-    its named groups of hexahedra. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
+    its named groups of cells. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
     a name is called physical_N after its number.
 
     Attributes:
@@ -44,16 +47,20 @@ class MeshFile:
             RequestError: it cannot be read, or holds something other than sound hexahedra.
         """
         read = self._read()
-        hexahedra = self._hexahedra(read)
         points = np.array(read.points, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise self._bad("its points are not three-dimensional; save it with x, y and z")
         if not np.isfinite(points).all():
             raise self._bad("it has coordinates that are not finite; repair the mesh")
-        if hexahedra.min() < 0 or hexahedra.max() >= len(points):
-            raise self._bad(f"its elements use nodes beyond its {len(points)} points; repair the mesh")
+        cells = self._cells(read)
+        for block in cells.values():
+            if len(block) and (block.min() < 0 or block.max() >= len(points)):
+                raise self._bad(f"its elements use nodes beyond its {len(points)} points; repair the mesh")
+        hexahedra = [cells["hexahedron"]]
+        hexahedra += [oriented(points, cells[kind], kind)[:, order] for kind, order in AS_HEXAHEDRON.items()]
         node_sets, cell_sets = _sets(read)
-        return compact(Mesh(points, hexahedra.astype(np.int32), node_sets, cell_sets))
+        tetrahedra = oriented(points, cells["tetra"], "tetra")
+        return compact(Mesh(points, np.concatenate(hexahedra), node_sets, cell_sets, tetrahedra))
 
     def _read(self) -> meshio.Mesh:
         if not Path(self.path).is_file():
@@ -68,35 +75,51 @@ class MeshFile:
         except (Exception, SystemExit) as error:  # some of its readers exit, others raise whatever went wrong
             raise self._bad("meshio cannot read it; save it as binary .msh or as .vtu") from error
 
-    def _hexahedra(self, read: meshio.Mesh) -> NDArray[np.integer]:
-        other = sorted({block.type for block in read.cells if block.dim == 3 and block.type != "hexahedron"})
+    def _cells(self, read: meshio.Mesh) -> dict[str, NDArray[np.int32]]:
+        """Nodes of the cells of each kind, in the order of KINDS."""
+        other = sorted({block.type for block in read.cells if block.dim == 3 and block.type not in KINDS})
         if other:
-            raise self._bad(f"it holds {', '.join(other)}; only 8-node hexahedra are supported so far")
-        blocks = [block.data for block in read.cells if block.type == "hexahedron" and len(block.data)]
-        if not blocks:
-            raise self._bad("it holds no hexahedra; mesh the volume with hexahedra")
-        return np.concatenate(blocks)
+            raise self._bad(f"it holds {', '.join(other)}; save it with linear cells: {', '.join(KINDS)}")
+        found = {
+            kind: np.concatenate(
+                [np.zeros((0, size), np.int64), *(block.data for block in read.cells if block.type == kind)]
+            )
+            for kind, size in KINDS.items()
+        }
+        if not any(map(len, found.values())):
+            raise self._bad("it holds no volume cells; mesh the volume with hexahedra or tetrahedra")
+        return {kind: cells.astype(np.int32) for kind, cells in found.items()}
 
     def _bad(self, remedy: str) -> RequestError:
         return bad_value("MeshFile.path", str(self.path), remedy)
 
 
 def _sets(read: meshio.Mesh) -> tuple[dict[str, NDArray[np.int32]], dict[str, NDArray[np.int32]]]:
-    """Node sets and cell sets by name; cells are counted over the file's blocks of hexahedra."""
+    """Node sets and cell sets by name; cells are counted as in `Mesh`."""
     nodes = {name: [np.asarray(members)] for name, members in read.point_sets.items()}
     cells: dict[str, list[NDArray]] = {}
+    firsts = _first_cells(read)
     for name, by_block in _groups(read).items():
-        first = 0
-        for block, members in zip(read.cells, by_block, strict=False):
-            is_volume = block.type == "hexahedron"
+        for block, first, members in zip(read.cells, firsts, by_block, strict=False):
             if members is not None and len(members):
                 members = np.asarray(members, dtype=np.int64)
-                if is_volume:
+                if block.type in KINDS:
                     cells.setdefault(name, []).append(first + members)
                 else:
                     nodes.setdefault(name, []).append(np.asarray(block.data)[members].ravel())
-            first += len(block.data) if is_volume else 0
     return _merged(nodes), _merged(cells)
+
+
+def _first_cells(read: meshio.Mesh) -> list[int]:
+    """Index that the first cell of each block of the file has in the mesh."""
+    firsts = [0] * len(read.cells)
+    count = 0
+    for kind in KINDS:
+        for index, block in enumerate(read.cells):
+            if block.type == kind:
+                firsts[index] = count
+                count += len(block.data)
+    return firsts
 
 
 def _groups(read: meshio.Mesh) -> dict[str, list]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.element import jacobians
+from warp_mca.elements import hexahedron, tet4
 from warp_mca.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 
@@ -14,49 +14,68 @@ _NEIGHBOURS = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [
 _EDGES = np.array([[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3], [1, 2, 3, 0, 5, 6, 7, 4, 4, 5, 6, 7]])
 
 
-def corner_edges(mesh: Mesh) -> NDArray[np.float64]:
-    """Edges from each corner of each element to its three neighbours [m], shape (element_count, 8, 3, 3)."""
-    corners = mesh.points[mesh.hexahedra]
-    return corners[:, _NEIGHBOURS] - corners[:, :, None, :]
+# The same of a tetrahedron.
+_TET_NEIGHBOURS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+_TET_EDGES = np.array([[0, 0, 0, 1, 1, 2], [1, 2, 3, 2, 3, 3]])
+
+
+def _corner_volumes(mesh: Mesh, unit: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Determinants of the three edges at each corner of hexahedra and tetrahedra; of unit edges where `unit`.
+
+    1 where edges collapsed, as in wedges and pyramids.
+    """
+    found = []
+    for cells, neighbours in ((mesh.hexahedra, _NEIGHBOURS), (mesh.tetrahedra, _TET_NEIGHBOURS)):
+        corners = mesh.points[cells]
+        edges = corners[:, neighbours] - corners[:, :, None, :]
+        length = np.linalg.norm(edges, axis=-1, keepdims=True)
+        volume = np.linalg.det(edges / np.where(length > 0.0, length, 1.0) if unit else edges)
+        near = cells[:, neighbours]
+        collapsed = (length[..., 0] == 0.0).any(axis=-1) | (np.diff(np.sort(near, axis=-1), axis=-1) == 0).any(axis=-1)
+        found.append(np.where(collapsed, 1.0, volume))
+    return found[0], found[1]
 
 
 def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
-    """Least determinant of the three unit edges over the corners of each element [-], shape (element_count,).
+    """Least determinant of the three unit edges over the corners of each cell [-], shape (cell_count,).
 
-    1 is a brick, 0 a flat corner, below 0 an inverted one.
+    1 is a brick, 0 a flat corner, below 0 an inverted one; at a corner of a regular tetrahedron it is 0.71.
     """
-    edges = corner_edges(mesh)
-    length = np.linalg.norm(edges, axis=-1, keepdims=True)
-    return np.linalg.det(edges / np.where(length > 0.0, length, 1.0)).min(axis=1)
+    return np.concatenate([part.min(axis=1, initial=1.0) for part in _corner_volumes(mesh, unit=True)])
 
 
 def gauss_jacobians(mesh: Mesh) -> NDArray[np.float64]:
-    """Jacobian determinants at the 2 x 2 x 2 Gauss points [m^3], shape (element_count, 8)."""
-    return np.linalg.det(jacobians(mesh.points[mesh.hexahedra]))
+    """Jacobian determinants of the hexahedra at the 2 x 2 x 2 Gauss points [m^3], shape (hexahedron_count, 8)."""
+    return np.linalg.det(hexahedron.jacobians(mesh.points[mesh.hexahedra]))
 
 
 def volumes(mesh: Mesh) -> NDArray[np.float64]:
-    """Volume of each element by 8-point Gauss quadrature [m^3], shape (element_count,)."""
-    return gauss_jacobians(mesh).sum(axis=1)
+    """Volume of each cell [m^3], shape (cell_count,)."""
+    return np.concatenate([gauss_jacobians(mesh).sum(axis=1), tet4.volumes(mesh.points[mesh.tetrahedra])])
 
 
 def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
-    """Lengths of the twelve edges of each element [m], shape (element_count, 12)."""
-    corners = mesh.points[mesh.hexahedra]
-    return np.linalg.norm(corners[:, _EDGES[1]] - corners[:, _EDGES[0]], axis=-1)
+    """Lengths of the edges of all cells [m], shape (edge_count,), without those that collapsed."""
+    found = []
+    for cells, edges in ((mesh.hexahedra, _EDGES), (mesh.tetrahedra, _TET_EDGES)):
+        corners = mesh.points[cells]
+        found.append(np.linalg.norm(corners[:, edges[1]] - corners[:, edges[0]], axis=-1).ravel())
+    length = np.concatenate(found)
+    return length[length > 0.0]
 
 
 def check(mesh: Mesh, name: str) -> None:
-    """Refuses a mesh with an inverted element.
+    """Refuses a mesh with an inverted cell.
 
     Args:
         mesh: the mesh of one body.
         name: the body, for the message.
 
     Raises:
-        RequestError: the Jacobian determinant is not positive at some corner or Gauss point of an element.
+        RequestError: the Jacobian determinant is not positive at some corner or Gauss point of a cell.
     """
-    good = (np.linalg.det(corner_edges(mesh)) > 0.0).all(axis=1) & (gauss_jacobians(mesh) > 0.0).all(axis=1)
+    hexahedra, tetrahedra = (part > 0.0 for part in _corner_volumes(mesh, unit=False))
+    good = np.append(hexahedra.all(axis=1) & (gauss_jacobians(mesh) > 0.0).all(axis=1), tetrahedra.all(axis=1))
     bad = np.flatnonzero(~good)
     if len(bad):
         raise RequestError(

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import io
+import itertools
 import os
 import shutil
 import tempfile
 from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.errors import McaError, RequestError, bad_value
+from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
 
 if TYPE_CHECKING:
@@ -82,23 +84,31 @@ class FinalState:
         """
         fields, self._fields = self._fields, None
         if ok and fields is not None:
-            nodes, body, material = cells(self.model)
+            runs, body, material = cells(self.model)
             points = self.model.X + fields["displacement"]
-            _save(self.path, _mesh(self.path, points, nodes, fields, {"body": body, "material": material}))
+            _save(self.path, _mesh(self.path, points, runs, fields, {"body": body, "material": material}))
 
 
-def cells(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
-    """Nodes of each element, shape (element_count, 8); index of its body in the scene; its row in `Model.law`.
+def cells(model: Model) -> tuple[list[tuple[str, NDArray[np.int64]]], NDArray[np.int32], NDArray[np.int32]]:
+    """Runs of cells of one kind, as (kind, nodes); index of each cell's body in the scene; its row in `Model.law`.
 
-    Elements come in the order of the concatenated meshes, which is not the model's.
+    Cells come in the order of the concatenated meshes, which is not the model's.
     """
-    nodes = np.empty((model.element_count, 8), dtype=np.int64)
+    nodes = np.full((model.element_count, 8), -1, dtype=np.int64)
     material = np.empty(model.element_count, dtype=np.int32)
-    nodes[model.element_of] = np.concatenate([block.conn.T for block in model.blocks])
-    material[model.element_of] = np.concatenate([block.material for block in model.blocks])
+    for block in model.blocks:
+        index = model.element_of[block.first : block.first + block.conn.shape[1]]
+        nodes[index, : len(block.conn)] = block.conn.T
+        material[index] = block.material
+    kinds = cell_kinds(nodes)
+    ends = [0, *(np.flatnonzero(kinds[1:] != kinds[:-1]) + 1), len(kinds)]
+    runs = []
+    for first, end in itertools.pairwise(ends):
+        kind = str(kinds[first])
+        runs.append((kind, nodes[first:end][:, CORNERS_OF[kind]]))
     start = list(model.element_start.values())
     body = np.searchsorted(start, np.arange(model.element_count), side="right") - 1
-    return nodes, body.astype(np.int32), material
+    return runs, body.astype(np.int32), material
 
 
 def _load_meshio():
@@ -116,7 +126,11 @@ def _format(path: Path) -> str:
 
 
 def _mesh(
-    path: Path, points: NDArray, nodes: NDArray, fields: Mapping[str, NDArray], cell_fields: Mapping[str, NDArray]
+    path: Path,
+    points: NDArray,
+    runs: list[tuple[str, NDArray]],
+    fields: Mapping[str, NDArray],
+    cell_fields: Mapping[str, NDArray],
 ) -> meshio.Mesh:
     """What is written to `path`: where formats disagree on six components, stress becomes six scalars."""
     at_points: dict[str, ArrayLike] = dict(fields)
@@ -124,8 +138,10 @@ def _mesh(
         stress = fields["stress"]
         del at_points["stress"]
         at_points |= {f"stress_{name}": np.ascontiguousarray(stress[:, k]) for k, name in enumerate(COMPONENTS)}
-    at_cells: dict[str, list[ArrayLike]] = {name: [field] for name, field in cell_fields.items()}
-    return _load_meshio().Mesh(points, [("hexahedron", nodes)], point_data=at_points, cell_data=at_cells)
+    ends = np.cumsum([len(nodes) for _, nodes in runs])[:-1]
+    at_cells: dict[str, list[ArrayLike]] = {name: list(np.split(field, ends)) for name, field in cell_fields.items()}
+    blocks: list[Any] = list(runs)
+    return _load_meshio().Mesh(points, blocks, point_data=at_points, cell_data=at_cells)
 
 
 def _write(path: Path, mesh: meshio.Mesh) -> None:
@@ -144,7 +160,7 @@ def _left_out(path: Path) -> list[str]:
     widths = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
     fields = {name: np.zeros((8, *width), np.float32) for name, width in widths.items()}
     nodes, index = np.arange(8)[None], np.zeros(1, dtype=np.int32)
-    mesh = _mesh(path, points, nodes, fields, {"body": index, "material": index})
+    mesh = _mesh(path, points, [("hexahedron", nodes)], fields, {"body": index, "material": index})
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / path.name
         try:
@@ -170,7 +186,7 @@ def _save(path: Path, mesh: meshio.Mesh) -> None:
     """
     folder = None
     try:
-        arrays = [mesh.points, mesh.cells[0].data, *mesh.point_data.values()]
+        arrays = [mesh.points, *(block.data for block in mesh.cells), *mesh.point_data.values()]
         if shutil.disk_usage(path.parent).free < DISK_RESERVE + sum(array.nbytes for array in arrays):
             raise OSError("too little is free on its disk")
         folder = Path(tempfile.mkdtemp(prefix=f".{path.stem}-", dir=path.parent))

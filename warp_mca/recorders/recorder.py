@@ -69,7 +69,8 @@ class SurfaceMesh:
 
     Attributes:
         nodes: model node of each vertex, shape (vertex_count,), int32.
-        quads: vertices of each face, counter-clockwise from outside, shape (face_count, 4), int32.
+        quads: vertices of each face, counter-clockwise from outside, shape (face_count, 4), int32; triangles have
+            their last one twice.
     """
 
     nodes: Index
@@ -77,8 +78,14 @@ class SurfaceMesh:
 
     @cached_property
     def triangles(self) -> Index:
-        """The faces, each cut in two, shape (2 face_count, 3), int32."""
-        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]]).astype(np.int32)
+        """The faces, quadrilaterals cut in two, shape (triangle_count, 3), int32."""
+        four = self.quads[:, 2] != self.quads[:, 3]
+        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[four][:, [0, 2, 3]]]).astype(np.int32)
+
+    @property
+    def corner_counts(self) -> Index:
+        """Corners of each face: 4, or 3 for triangles, shape (face_count,), int32."""
+        return np.where(self.quads[:, 2] == self.quads[:, 3], 3, 4).astype(np.int32)
 
 
 @dataclass(frozen=True)

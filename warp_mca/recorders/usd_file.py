@@ -155,8 +155,9 @@ class _Body:
         self.mesh = mesh
         mesh.GetPrim().SetDisplayName(name)
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(surface.quads), 4, dtype=np.int32)))
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(surface.quads.ravel())))
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(surface.corner_counts))
+        corners = surface.quads[np.arange(4) < surface.corner_counts[:, None]]
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(corners)))
         self.points, self.extent = mesh.CreatePointsAttr(), mesh.CreateExtentAttr()
         self.colour = _colours(mesh, _linear(PALETTE / 255.0))
         primvars = UsdGeom.PrimvarsAPI(mesh)

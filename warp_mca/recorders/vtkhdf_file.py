@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     _Datasets = dict[str, h5py.Dataset]
 
 FRAMES = Cadence(frames=100)
-VTK_HEXAHEDRON = 12
+VTK_TYPES = {"tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14}
 FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
 
 
@@ -190,14 +190,15 @@ def _make_steps(root: h5py.Group, count: int, node_count: int) -> tuple[h5py.Gro
 
 def _write_mesh(root: h5py.Group, model: Model) -> None:
     """Points at t = 0 and elements, with the index of body and material, once for all frames."""
-    nodes, body, material = cells(model)
+    runs, body, material = cells(model)
+    sizes = np.concatenate([np.full(len(nodes), nodes.shape[1]) for _, nodes in runs])
     root["NumberOfPoints"] = np.array([model.node_count])
     root["NumberOfCells"] = np.array([model.element_count])
-    root["NumberOfConnectivityIds"] = np.array([nodes.size])
+    root["NumberOfConnectivityIds"] = np.array([sizes.sum()])
     root["Points"] = model.X
-    root["Connectivity"] = nodes.ravel()
-    root["Offsets"] = 8 * np.arange(model.element_count + 1)
-    root["Types"] = np.full(model.element_count, VTK_HEXAHEDRON, dtype=np.uint8)
+    root["Connectivity"] = np.concatenate([nodes.ravel() for _, nodes in runs])
+    root["Offsets"] = np.append(0, np.cumsum(sizes))
+    root["Types"] = np.concatenate([np.full(len(nodes), VTK_TYPES[kind], dtype=np.uint8) for kind, nodes in runs])
     root["CellData/body"] = body
     root["CellData/body"].attrs["names"] = list(model.element_start)
     root["CellData/material"] = material

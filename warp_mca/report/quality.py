@@ -64,7 +64,7 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     bodies = tuple(
         BodyQuality(
             body=name,
-            elements=len(mesh.hexahedra),
+            elements=mesh.cell_count,
             nodes=len(mesh.points),
             min_scaled_jacobian=float(scaled_jacobian(mesh).min()),
             min_edge=float(edge_lengths(mesh).min()),
@@ -76,7 +76,7 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     worst = model.stable.element
     first, owner = max((first, name) for name, first in model.element_start.items() if first <= worst)
     element = worst - first
-    x, y, z = meshes[owner].points[meshes[owner].hexahedra[element]].mean(axis=0).tolist()
+    x, y, z = meshes[owner].points[meshes[owner].cell(element)].mean(axis=0).tolist()
     return Quality(
         bodies=bodies,
         stable_dt=float(model.stable.dt),

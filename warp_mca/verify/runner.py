@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from warp_mca.elements import ELEMENTS
 from warp_mca.errors import GuardError, McaError
 from warp_mca.solver import check_device
 from warp_mca.verify import cases
@@ -48,7 +49,7 @@ def verify(
     """
     chosen = cases(names)
     check_device(device)
-    elements = [element] if element else ["hex8"]
+    elements = [element] if element else list(ELEMENTS)
     outcomes = []
     for case in chosen:
         for item in elements:

@@ -1,0 +1,207 @@
+"""Owns the strain measures: small strain in the rotated frame, and logarithmic strain for large deformation.
+
+Both act on the displacement gradient H in a frame that has turned with the element, F = I + H. The deviatoric strain
+goes to the return map; the stress that comes back, work-conjugate to it, turns into the first Piola-Kirchhoff stress.
+Logarithmic: E = ln(F^T F) / 2 with additive plastic strain, Miehe, Apel and Lambrecht, Comput. Meth. Appl. Mech.
+Engng 191 (2002) 5383.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.scalars import scalars
+
+wp.set_module_options({"enable_backward": False})
+
+
+SWEEPS = 4  # of Jacobi's method: quadratic, so that the fourth works on rounding alone
+
+
+@cache
+def eigen_function(precision: str) -> Any:
+    """The function C -> (N, d): directions as columns and eigenvalues of a symmetric matrix, by Jacobi's method.
+
+    Warp's eig3 leaves errors of up to 1e-3 of the largest entry in float32; this one 1e-6.
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+
+    @wp.func
+    def jacobi_eigen(C: mat33):
+        A = C
+        N = wp.identity(n=3, dtype=R)
+        for _ in range(wp.static(SWEEPS)):
+            for k in range(3):
+                i = int(0)
+                j = int(1)
+                if k == 1:
+                    j = 2
+                if k == 2:
+                    i = 1
+                    j = 2
+                if A[i, j] != R(0.0):
+                    tau = (A[j, j] - A[i, i]) / (R(2.0) * A[i, j])
+                    slope = R(1.0) / (wp.abs(tau) + wp.sqrt(R(1.0) + tau * tau))
+                    if tau < R(0.0):
+                        slope = -slope
+                    c = R(1.0) / wp.sqrt(R(1.0) + slope * slope)
+                    s = c * slope
+                    for m in range(3):
+                        a = A[m, i]
+                        b = A[m, j]
+                        A[m, i] = c * a - s * b
+                        A[m, j] = s * a + c * b
+                    for m in range(3):
+                        a = A[i, m]
+                        b = A[j, m]
+                        A[i, m] = c * a - s * b
+                        A[j, m] = s * a + c * b
+                    for m in range(3):
+                        a = N[m, i]
+                        b = N[m, j]
+                        N[m, i] = c * a - s * b
+                        N[m, j] = s * a + c * b
+        return N, vec3(A[0, 0], A[1, 1], A[2, 2])
+
+    return jacobi_eigen
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Functions of a strain measure.
+
+    Attributes:
+        dilation: H -> J - 1 [-], change of volume over volume.
+        deviator: H -> (deviatoric strain e, principal directions N, eigenvalues d of F^T F - I).
+        nominal: (H, S, N, d) -> first Piola-Kirchhoff stress [Pa] of the stress S conjugate to e.
+        cofactor: H -> derivative of J with respect to F.
+        pressure: (K, J - 1) -> derivative of the volumetric energy with respect to J [Pa].
+        volumetric_energy: (K, J - 1) -> energy per reference volume [J/m^3].
+        cauchy: (H, S, N, d, pressure) -> Cauchy stress in the rotated frame [Pa].
+    """
+
+    dilation: Any
+    deviator: Any
+    nominal: Any
+    cofactor: Any
+    pressure: Any
+    volumetric_energy: Any
+    cauchy: Any
+
+
+@cache
+def kinematics(precision: str, finite: bool) -> Kinematics:
+    """The functions of logarithmic strain where `finite`, else of small strain."""
+    return _logarithmic(precision) if finite else _small(precision)
+
+
+def _small(precision: str) -> Kinematics:
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+
+    @wp.func
+    def small_dilation(H: mat33):
+        return wp.trace(H)
+
+    @wp.func
+    def small_deviator(H: mat33):
+        mean = wp.trace(H) / R(3.0)
+        return R(0.5) * (H + wp.transpose(H)) - mean * wp.identity(n=3, dtype=R), mat33(), vec3()
+
+    @wp.func
+    def small_nominal(H: mat33, S: mat33, N: mat33, d: vec3):
+        return S
+
+    @wp.func
+    def small_cofactor(H: mat33):
+        return wp.identity(n=3, dtype=R)
+
+    @wp.func
+    def small_pressure(K: R, theta: R):
+        return K * theta
+
+    @wp.func
+    def small_volumetric(K: R, theta: R):
+        return R(0.5) * K * theta * theta
+
+    @wp.func
+    def small_cauchy(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
+        return S + pressure * wp.identity(n=3, dtype=R)
+
+    return Kinematics(
+        small_dilation, small_deviator, small_nominal, small_cofactor, small_pressure, small_volumetric, small_cauchy
+    )
+
+
+def _logarithmic(precision: str) -> Kinematics:
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    principal = eigen_function(precision)
+
+    @wp.func
+    def log_over(x: R):
+        """ln(1 + x) / x, to rounding also where x is small (Kahan)."""
+        one = R(1.0)
+        y = one + x
+        if y == one:
+            return one
+        return wp.log(y) / (y - one)
+
+    @wp.func
+    def log_dilation(H: mat33):
+        trace = wp.trace(H)
+        second = R(0.5) * (trace * trace - wp.trace(H * H))
+        return trace + second + wp.determinant(H)
+
+    @wp.func
+    def log_deviator(H: mat33):
+        C = H + wp.transpose(H) + wp.transpose(H) * H
+        N, d = principal(C)
+        e0 = R(0.5) * d[0] * log_over(d[0])
+        e1 = R(0.5) * d[1] * log_over(d[1])
+        e2 = R(0.5) * d[2] * log_over(d[2])
+        mean = (e0 + e1 + e2) / R(3.0)
+        e = N * wp.diag(vec3(e0 - mean, e1 - mean, e2 - mean)) * wp.transpose(N)
+        return R(0.5) * (e + wp.transpose(e)), N, d
+
+    @wp.func
+    def log_nominal(H: mat33, S: mat33, N: mat33, d: vec3):
+        T = wp.transpose(N) * S * N
+        for i in range(3):
+            for j in range(3):
+                c = R(1.0) + d[j]
+                # divided difference of ln at the squared stretches
+                T[i, j] = T[i, j] * log_over((d[i] - d[j]) / c) / c
+        P = N * T * wp.transpose(N)
+        return P + H * P
+
+    @wp.func
+    def log_cofactor(H: mat33):
+        F = wp.identity(n=3, dtype=R) + H
+        r0 = vec3(F[0, 0], F[0, 1], F[0, 2])
+        r1 = vec3(F[1, 0], F[1, 1], F[1, 2])
+        r2 = vec3(F[2, 0], F[2, 1], F[2, 2])
+        k0 = wp.cross(r1, r2)
+        k1 = wp.cross(r2, r0)
+        k2 = wp.cross(r0, r1)
+        return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
+
+    @wp.func
+    def log_pressure(K: R, theta: R):
+        return K * theta * log_over(theta) / (R(1.0) + theta)
+
+    @wp.func
+    def log_volumetric(K: R, theta: R):
+        strain = theta * log_over(theta)
+        return R(0.5) * K * strain * strain
+
+    @wp.func
+    def log_cauchy(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
+        P = log_nominal(H, S, N, d)
+        sigma = (P + P * wp.transpose(H)) / (R(1.0) + log_dilation(H))
+        return R(0.5) * (sigma + wp.transpose(sigma)) + pressure * wp.identity(n=3, dtype=R)
+
+    return Kinematics(log_dilation, log_deviator, log_nominal, log_cofactor, log_pressure, log_volumetric, log_cauchy)

@@ -1,0 +1,264 @@
+"""Every element: forces are the slope of its energy, rotation costs nothing, patches of all cells, stable step."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import warp as wp
+from scipy.spatial.transform import Rotation
+
+import warp_mca as mca
+from warp_mca.elements import ELEMENTS
+from warp_mca.geometry.degenerate import AS_HEXAHEDRON, CORNERS_OF, cell_kinds, oriented, tetrahedral
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.quality import check, scaled_jacobian, volumes
+from warp_mca.model import build_model
+from warp_mca.solver import Solver
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+KINDS = [(name, kinematics) for name in ELEMENTS for kinematics in ("corotational", "finite")]
+
+
+def mixed_cube() -> Mesh:
+    """A unit cube of 2 x 2 x 2 cells: one is of pyramids and tetrahedra, two of wedges, five are hexahedra."""
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+    points = box.points.copy()
+    inside = ((points > 0.0) & (points < 1.0)).all(axis=1)
+    points[inside] += [0.03, -0.05, 0.04]
+    middle = points[box.hexahedra].mean(axis=1)
+    corners = box.hexahedra[np.argmin(middle @ [1.0, 1.0, -1.0])]
+    centre = len(points)
+    points = np.vstack([points, points[corners].mean(axis=0)])
+    # faces seen from inside; the last two are free, so that they may be cut in triangles
+    faces = [[0, 1, 2, 3], [4, 7, 6, 5], [1, 5, 6, 2], [2, 6, 7, 3], [0, 4, 5, 1], [3, 7, 4, 0]]
+    pyramids = [[*corners[face], centre] for face in faces[:4]]
+    tetrahedra = [[*corners[face][pick], centre] for face in faces[4:] for pick in ([0, 1, 2], [0, 2, 3])]
+    column = np.flatnonzero((middle[:, 0] > 0.5) & (middle[:, 2] > 0.5))  # cut by one plane along y
+    wedges = []
+    for h in box.hexahedra[column]:
+        wedges += [[h[0], h[1], h[5], h[3], h[2], h[6]], [h[0], h[5], h[4], h[3], h[6], h[7]]]
+    kept = [c for c in range(8) if c not in column and (box.hexahedra[c] != corners).any()]
+    hexahedra = [box.hexahedra[kept]]
+    for kind, cells in (("wedge", wedges), ("pyramid", pyramids)):
+        hexahedra.append(oriented(points, np.array(cells), kind)[:, AS_HEXAHEDRON[kind]])
+    tetrahedra = oriented(points, np.array(tetrahedra), "tetra")
+    return Mesh(points, np.concatenate(hexahedra).astype(np.int32), {}, {}, tetrahedra)
+
+
+def solver_of(mesh: Mesh, element: str, kinematics: str, precision: str = "float64", material=STEEL) -> Solver:
+    body = mca.Body(name="body", geometry=mesh, material=material, element=element, kinematics=kinematics)
+    scene = mca.Scene(name="test", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6))
+    meshes = mca.mesh(scene)
+    X = meshes["body"].points
+    model = build_model(scene, meshes, {"body": X}, {"body": np.zeros_like(X)})
+    return Solver(model, device="cpu", precision=precision, dt=1e-9)
+
+
+def forces(solver: Solver, u: np.ndarray) -> np.ndarray:
+    """Nodal forces [N] of a displacement field."""
+    solver.u.assign(u)
+    with wp.ScopedDevice("cpu"):
+        solver._forces()
+    force, total = solver.force.numpy().astype(float), np.zeros_like(u)
+    for block in solver.model.blocks:
+        part = force[block.slot : block.slot + block.conn.size]
+        np.add.at(total, block.conn.ravel(), part)
+    return total
+
+
+def energy(solver: Solver, u: np.ndarray) -> float:
+    """Elastic and hourglass energy [J]."""
+    forces(solver, u)
+    with wp.ScopedDevice("cpu"):
+        for stage in solver.elements:
+            stage.energies(solver.X, solver.law, solver.u, solver.energy)
+    return float(solver.energy.numpy()[[0, 4]].sum())
+
+
+@pytest.fixture(scope="module")
+def cube() -> Mesh:
+    box = mca.Box(size=(1.0, 0.8, 1.2), divisions=(2, 2, 1)).build()
+    points = box.points + np.random.default_rng(3).uniform(-0.06, 0.06, box.points.shape)
+    return dataclasses.replace(box, points=points)
+
+
+@pytest.mark.parametrize(("element", "kinematics"), KINDS)
+def test_forces_are_the_slope_of_the_energy(element: str, kinematics: str, cube: Mesh):
+    """At strains of 20 %, along random directions; small strain takes the rotation for that of the energy's minimum."""
+    rng = np.random.default_rng(0)
+    solver = solver_of(cube, element, kinematics)
+    size = 0.2 if kinematics == "finite" else 1e-3
+    u = cube.points @ rng.uniform(-size, size, (3, 3)) + size * 0.3 * rng.uniform(-1, 1, cube.points.shape)
+    force = forces(solver, u)
+    for _ in range(3):
+        way = rng.normal(size=u.shape)
+        h = 1e-6 * size
+        slope = (energy(solver, u + h * way) - energy(solver, u - h * way)) / (2.0 * h)
+        # The co-rotational forces of hexahedra leave out how the rotation changes with the strain, a product of both
+        # strains; so do the hourglass forces.
+        tolerance = {"finite": 1e-6, "corotational": 5e-3}[kinematics]
+        tolerance = 0.05 if element == "hex8r" and kinematics == "finite" else tolerance
+        assert -(force * way).sum() == pytest.approx(slope, rel=tolerance, abs=tolerance * np.abs(force).max())
+
+
+@pytest.mark.parametrize(("precision", "tolerance"), [("float64", 3e-14), ("mixed", 2e-6)])
+@pytest.mark.parametrize(("element", "kinematics"), KINDS)
+def test_rotation_leaves_no_force_and_turns_those_there_are(element, kinematics, precision, tolerance, cube: Mesh):
+    solver = solver_of(cube, element, kinematics, precision)
+    turn = Rotation.from_rotvec([0.9, -1.3, 0.6]).as_matrix()
+    rigid = cube.points @ turn.T - cube.points + [3.0, -1.0, 2.0]
+    assert np.abs(forces(solver, rigid)).max() < tolerance * STEEL.E
+    rng = np.random.default_rng(1)
+    u = 0.05 * rng.uniform(-1, 1, cube.points.shape)
+    force = forces(solver, u)
+    turned = forces(solver, (cube.points + u) @ turn.T - cube.points)
+    assert turned == pytest.approx(force @ turn.T, abs=30 * tolerance * np.abs(force).max() + tolerance * STEEL.E)
+
+
+@pytest.mark.parametrize("kinematics", ["corotational", "finite"])
+@pytest.mark.parametrize("element", list(ELEMENTS))
+def test_patch_of_hexahedra_wedges_pyramids_and_tetrahedra(element: str, kinematics: str):
+    """A linear field, also with 10 % strain, leaves no force at inner nodes."""
+    mesh = mixed_cube()
+    check(mesh, "mixed")
+    assert volumes(mesh).sum() == pytest.approx(1.0, rel=1e-12)
+    gradient = 0.1 * np.array([[0.5, 0.3, -0.2], [0.1, -0.4, 0.6], [0.7, 0.2, 0.3]])
+    solver = solver_of(mesh, element, kinematics)
+    force = forces(solver, mesh.points @ gradient.T)
+    inner = ((mesh.points > 1e-9) & (mesh.points < 1.0 - 1e-9)).all(axis=1)
+    assert inner.sum() == 2
+    assert np.abs(force[inner]).max() < 1e-13 * np.abs(force).max() * len(force)
+
+
+@pytest.mark.parametrize("element", list(ELEMENTS))
+def test_uniform_stretch_at_finite_strain(element: str, cube: Mesh):
+    """Twice as long without change of width: Cauchy stress (K + 4 G / 3) ln 2 / 2 along, from logarithmic strain."""
+    solver = solver_of(cube, element, "finite")
+    force = forces(solver, cube.points * [1.0, 0.0, 0.0])
+    K, G = STEEL.bulk_modulus, STEEL.shear_modulus
+    virial = (cube.points * [2.0, 1.0, 1.0]).T @ force  # minus the Kirchhoff stress times the volume
+    cut = tetrahedral(cube) if element == "tet4" else cube
+    stress = -np.diag(virial) / volumes(cut).sum()
+    expected = np.log(2.0) * np.array([K + 4.0 * G / 3.0, K - 2.0 * G / 3.0, K - 2.0 * G / 3.0])
+    np.testing.assert_allclose(stress, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("kinematics", ["corotational", "finite"])
+@pytest.mark.parametrize("element", list(ELEMENTS))
+def test_plastic_work_of_a_stretched_block(element: str, kinematics: str, cube: Mesh):
+    """Isochoric stretch in one step: dp = (2 G e - sigma_y) / (3 G + H) of the equivalent strain, by hand."""
+    metal = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=200e6, E_t=10e9, beta=1.0)
+    solver = solver_of(cube, element, kinematics, material=metal)
+    stretch = 1.02
+    if kinematics == "finite":
+        forces(solver, cube.points * [stretch - 1.0, stretch**-0.5 - 1.0, stretch**-0.5 - 1.0])
+        strain = np.log(stretch)
+    else:
+        forces(solver, cube.points * [0.02, -0.01, -0.01])
+        strain = 0.02
+    G, H = metal.shear_modulus, metal.hardening_modulus
+    expected = (3.0 * G * strain - metal.sigma_y) / (3.0 * G + H)
+    found = [stage.history.numpy()[5::6] for stage in solver.elements]
+    np.testing.assert_allclose(np.concatenate([part.ravel() for part in found]), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("element", list(ELEMENTS))
+def test_bounds_hold_the_largest_eigenvalue(element: str):
+    kind = ELEMENTS[element]
+    rng = np.random.default_rng(5)
+    box = mca.Box(size=(1.0, 0.7, 1.6), divisions=(4, 4, 4)).build()
+    points = box.points + rng.uniform(-0.05, 0.05, box.points.shape)
+    mesh = tetrahedral(dataclasses.replace(box, points=points)) if kind.corners == 4 else box
+    x = points[mesh.tetrahedra if kind.corners == 4 else mesh.hexahedra]
+    n = len(x)
+    K, G, rho = np.full(n, 175e9), np.full(n, 80e9), np.full(n, 7850.0)
+    mass = kind.lumped_masses(x, rho)
+    exact, bound = kind.largest_eigenvalues(x, K, G, mass), kind.eigenvalue_bounds(x, K, G, mass)
+    assert (bound >= exact * (1.0 - 1e-12)).all()
+    assert (bound <= 1.7 * exact).all()
+
+
+@pytest.mark.parametrize(("element", "kinematics"), KINDS)
+def test_element_eigenvalue_is_that_of_its_forces(element: str, kinematics: str):
+    """Stiffness by differences of the kernel's forces, on one distorted cell; averaging only lowers tet4's."""
+    kind = ELEMENTS[element]
+    x = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+    x = x * [1.0, 0.6, 1.3] + np.random.default_rng(2).uniform(-0.08, 0.08, x.shape)
+    if kind.corners == 4:
+        mesh = Mesh(x[[0, 1, 3, 4]], np.zeros((0, 8), np.int32), {}, {}, np.arange(4, dtype=np.int32)[None])
+    else:
+        mesh = Mesh(x, np.arange(8, dtype=np.int32)[None])
+    solver = solver_of(mesh, element, kinematics)
+    n = mesh.points.size
+    stiffness = np.zeros((n, n))
+    for k in range(n):
+        step = np.zeros(n)
+        step[k] = 1e-7
+        way = step.reshape(-1, 3)
+        stiffness[:, k] = -(forces(solver, way) - forces(solver, -way)).ravel() / 2e-7
+    assert stiffness == pytest.approx(stiffness.T, abs=1e-5 * np.abs(stiffness).max())
+    root = np.repeat(solver.model.mass, 3) ** -0.5
+    largest = np.linalg.eigvalsh(root[:, None] * stiffness * root)[-1]
+    args = np.full(1, STEEL.bulk_modulus), np.full(1, STEEL.shear_modulus)
+    mass = kind.lumped_masses(mesh.points[None], np.full(1, STEEL.rho))
+    assert kind.largest_eigenvalues(mesh.points[None], *args, mass)[0] == pytest.approx(largest, rel=1e-5)
+
+
+@pytest.mark.parametrize(("element", "kinematics"), KINDS)
+def test_bodies_of_every_element_strike_and_bounce(element: str, kinematics: str):
+    """Hexahedra, or triangles, on both sides of the contact: energy is kept, momentum handed over."""
+    bodies = tuple(
+        mca.Body(
+            name=name,
+            geometry=mca.Box(size=(0.02, 0.02, 0.02), divisions=(3, 3, 3), origin=(-0.01, low, -0.01)),
+            material=STEEL,
+            element=element,
+            kinematics=kinematics,
+            velocity=(0.0, v, 0.0),
+        )
+        for name, low, v in (("upper", 0.0, -2.0), ("lower", -0.02, 0.0))
+    )
+    contact = mca.Contact(
+        slave=mca.Surface(body="upper", nodes="ymin"), master=mca.Surface(body="lower", nodes="ymax"), penalty=0.5
+    )
+    scene = mca.Scene(
+        name="cubes",
+        bodies=bodies,
+        contacts=(contact,),
+        impact=mca.ImpactPhase(duration=3e-5, output_interval=1e-6, energy_tolerance=1e-2),
+        tip=mca.Point(body="upper", at=(0.0, 0.01, 0.0)),
+    )
+    result = mca.run(scene, precision="mixed")
+    impulse = float(result.F_n[1:].sum() * (result.time[1] - result.time[0]))
+    mass = 7850.0 * 0.02**3
+    assert impulse == pytest.approx(2.0 * mass, rel=0.12)  # equal bodies exchange their velocities, but for waves
+    assert result.summary["element"] == element
+
+
+def test_cells_keep_their_kind():
+    mesh = mixed_cube()
+    padded = np.full((mesh.cell_count, 8), -1)
+    padded[: len(mesh.hexahedra)] = mesh.hexahedra
+    padded[len(mesh.hexahedra) :, :4] = mesh.tetrahedra
+    kinds = cell_kinds(padded)
+    assert {name: int((kinds == name).sum()) for name in CORNERS_OF} == {
+        "hexahedron": 5, "wedge": 4, "pyramid": 4, "tetra": 4,
+    }  # fmt: skip
+    assert scaled_jacobian(mesh).min() > 0.2
+
+
+def test_cutting_keeps_volume_boundary_and_sets():
+    mesh = mixed_cube()
+    mesh = dataclasses.replace(mesh, cell_sets={"some": np.array([0, 5, mesh.cell_count - 1], np.int32)})
+    cut = tetrahedral(mesh)
+    assert not len(cut.hexahedra)
+    assert volumes(cut).sum() == pytest.approx(1.0, rel=1e-12)
+    assert volumes(cut)[cut.cell_sets["some"]].sum() == pytest.approx(
+        volumes(mesh)[mesh.cell_sets["some"]].sum(), rel=0.01
+    )
+    faces, _ = cut.boundary
+    assert (faces[:, 2] == faces[:, 3]).all()
+    area = 0.5 * np.linalg.norm(np.cross(*(cut.points[faces[:, k]] - cut.points[faces[:, 0]] for k in (1, 2))), axis=1)
+    assert area.sum() == pytest.approx(6.0, rel=1e-12)

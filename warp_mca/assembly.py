@@ -1,0 +1,252 @@
+"""Owns the way from a scene's meshes to flat arrays: elements by formulation, materials, masses, blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.elements import ELEMENTS, Element
+from warp_mca.errors import bad_value
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.scene import Body, Elastic, J2Bilinear, Point, Scene, Surface
+from warp_mca.surfaces import Faces, make_faces
+from warp_mca.timestep import StableStep, stable_step
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+GROUND = -1  # in place of a node where there is none
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Elements that run the same kernels.
+
+    Attributes:
+        element: name of their formulation.
+        plastic: whether they keep a plastic history.
+        finite: whether strains may be large.
+        conn: nodes of each element, shape (corners, element_count), int32.
+        material: row of `Model.law`, shape (element_count,), int32.
+        first: index of the first element in the model.
+        slot: where the block's element forces start in the force array, corner by corner.
+    """
+
+    element: str
+    plastic: bool
+    finite: bool
+    conn: Index
+    material: Index
+    first: int
+    slot: int
+
+
+def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
+    """Materials of a body with the cells that each fills; together they fill the body.
+
+    Raises:
+        RequestError: a named cell set is unknown, or cells are left without material.
+    """
+    if isinstance(body.material, Elastic):
+        return [(body.material, np.arange(mesh.cell_count, dtype=np.int32))]
+    owner = np.full(mesh.cell_count, -1, dtype=np.int32)
+    listed = list(body.material.items())
+    for k, (name, _) in enumerate(listed):
+        if name == "*":
+            owner[owner < 0] = k
+        elif name in mesh.cell_sets:
+            owner[mesh.cell_sets[name]] = k
+        else:
+            known = ", ".join(sorted(mesh.cell_sets)) or "none"
+            raise bad_value(f"Body {body.name}.material", name, f"the mesh's cell sets are {known}; or use '*'")
+    if (owner < 0).any():
+        raise bad_value(f"Body {body.name}.material", [n for n, _ in listed], "some cells have none; add a '*' entry")
+    return [(m, np.flatnonzero(owner == k).astype(np.int32)) for k, (_, m) in enumerate(listed)]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of one formulation and strain measure.
+
+    Attributes:
+        element: the formulation.
+        finite: whether strains may be large.
+        conn: nodes of each cell, shape (cell_count, corners), int32.
+        index: of each in the concatenated meshes, shape (cell_count,), int32.
+    """
+
+    element: Element
+    finite: bool
+    conn: Index
+    index: Index
+
+
+def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
+    """The cells of a body by formulation, in the mesh's own numbering.
+
+    Raises:
+        RequestError: the mesh holds hexahedra, and the body takes tetrahedra only.
+    """
+    finite, split = body.kinematics == "finite", len(mesh.hexahedra)
+    found = []
+    if split:
+        element = ELEMENTS[body.element]
+        if element.corners != 8:
+            remedy = "its mesh holds hexahedra; pass meshes through warp_mca.mesh"
+            raise bad_value(f"Body {body.name}.element", body.element, remedy)
+        found.append(Cells(element, finite, mesh.hexahedra, np.arange(split, dtype=np.int32)))
+    if len(mesh.tetrahedra):
+        index = np.arange(split, mesh.cell_count, dtype=np.int32)
+        found.append(Cells(ELEMENTS["tet4"], finite, mesh.tetrahedra, index))
+    return found
+
+
+def _sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
+    """Sum of what each element gives its corners, shape (node_count,), float64."""
+    return np.bincount(conn.ravel(), value.ravel(), minlength=node_count).astype(np.float64)
+
+
+def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
+    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum."""
+    masses = {}
+    for body in scene.bodies:
+        mesh = meshes[body.name]
+        rho = np.empty(mesh.cell_count)
+        for material, cells in body_materials(body, mesh):
+            rho[cells] = material.rho
+        total = np.zeros(len(mesh.points))
+        for part in body_cells(body, mesh):
+            value = part.element.lumped_masses(mesh.points[part.conn], rho[part.index])
+            total += _sum_to_nodes(part.conn, value, len(total))
+        masses[body.name] = total
+    return masses
+
+
+class Assembly:
+    """Concatenated meshes of a scene on the way to a Model.
+
+    Attributes:
+        X: positions [m], shape (node_count, 3).
+        cells: the elements by formulation and strain measure.
+        materials: those of the scene; `material` is each element's index among them.
+        K, G: moduli [Pa], and volume [m^3], of each element.
+        mass: lumped masses [kg], shape (node_count,).
+    """
+
+    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> None:
+        self.scene, self.meshes = scene, meshes
+        self.node_start: dict[str, int] = {}
+        self.element_start: dict[str, int] = {}
+        nodes = elements = 0
+        for body in scene.bodies:
+            self.node_start[body.name], self.element_start[body.name] = nodes, elements
+            nodes += len(meshes[body.name].points)
+            elements += meshes[body.name].cell_count
+        self.element_count = elements
+        self.X = np.concatenate([X[body.name] for body in scene.bodies])
+        self.cells = self._merged_cells()
+        self.materials: list[Elastic] = []
+        self.material = np.empty(elements, dtype=np.int32)
+        for body in scene.bodies:
+            for material, cells in body_materials(body, meshes[body.name]):
+                if material not in self.materials:
+                    self.materials.append(material)
+                self.material[cells + self.element_start[body.name]] = self.materials.index(material)
+        self.K = np.array([m.bulk_modulus for m in self.materials])[self.material]
+        self.G = np.array([m.shear_modulus for m in self.materials])[self.material]
+        rho = np.array([m.rho for m in self.materials])[self.material]
+        self.volume = np.empty(elements)
+        self.mass = np.zeros(nodes)
+        self.element_mass = []
+        for part in self.cells:
+            corners = self.X[part.conn]
+            self.volume[part.index] = part.element.volumes(corners)
+            self.element_mass.append(part.element.lumped_masses(corners, rho[part.index]))
+            self.mass += _sum_to_nodes(part.conn, self.element_mass[-1], nodes)
+
+    def _merged_cells(self) -> list[Cells]:
+        found: dict[tuple[str, bool], list[Cells]] = {}
+        for body in self.scene.bodies:
+            first, start = self.node_start[body.name], self.element_start[body.name]
+            for part in body_cells(body, self.meshes[body.name]):
+                moved = Cells(part.element, part.finite, part.conn + first, part.index + start)
+                found.setdefault((part.element.name, part.finite), []).append(moved)
+        return [
+            Cells(
+                parts[0].element,
+                parts[0].finite,
+                np.concatenate([part.conn for part in parts]),
+                np.concatenate([part.index for part in parts]),
+            )
+            for parts in found.values()
+        ]
+
+    def law(self) -> Array:
+        """Rows of K, G, sigma_y, H, beta; an elastic material never yields."""
+        rows = []
+        for m in self.materials:
+            plastic = (m.sigma_y, m.hardening_modulus, m.beta) if isinstance(m, J2Bilinear) else (0.0, 0.0, 0.0)
+            rows.append((m.bulk_modulus, m.shear_modulus, *plastic))
+        return np.array(rows)
+
+    def blocks(self) -> tuple[tuple[Block, ...], Index]:
+        """Elements grouped by kernels, and the order that this gives them."""
+        plastic = np.array([isinstance(m, J2Bilinear) for m in self.materials])[self.material]
+        blocks, order, first, slot = [], [], 0, 0
+        for flag in (True, False):
+            for part in self.cells:
+                mine = plastic[part.index] == flag
+                if mine.any():
+                    conn = np.ascontiguousarray(part.conn[mine].T)
+                    material = self.material[part.index[mine]]
+                    blocks.append(
+                        Block(
+                            element=part.element.name,
+                            plastic=flag,
+                            finite=part.finite,
+                            conn=conn,
+                            material=material,
+                            first=first,
+                            slot=slot,
+                        )
+                    )
+                    order.append(part.index[mine])
+                    first, slot = first + conn.shape[1], slot + conn.size
+        return tuple(blocks), np.concatenate(order)
+
+    def stable(self, added: Array) -> StableStep:
+        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
+        steps = [
+            stable_step(
+                part.element,
+                self.X[part.conn],
+                self.K[part.index],
+                self.G[part.index],
+                mass,
+                added[part.conn].max(axis=1),
+                part.index,
+            )
+            for part, mass in zip(self.cells, self.element_mass, strict=True)
+        ]
+        return min(steps, key=lambda step: step.dt)
+
+    def nodes(self, body: str, name: str) -> Index:
+        """Nodes of a set of a body's mesh."""
+        return self.meshes[body].nodes(name) + self.node_start[body]
+
+    def faces(self, surface: Surface) -> Faces:
+        """Boundary faces of a surface."""
+        node, element = self.meshes[surface.body].surface(surface.nodes)
+        node = (node + self.node_start[surface.body]).astype(np.int32)
+        element = (element + self.element_start[surface.body]).astype(np.int32)
+        return make_faces(self.X, node, element, self.K, self.volume)
+
+    def nearest(self, point: Point | None) -> int:
+        """Node nearest to a point, or GROUND."""
+        if point is None:
+            return GROUND
+        offsets = self.meshes[point.body].points - np.asarray(point.at)
+        return int(np.argmin((offsets**2).sum(axis=1))) + self.node_start[point.body]

@@ -1,0 +1,49 @@
+"""Owns what an element formulation is: host integrals for mass and stable step, and its stage on the device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from warp_mca.elements.stage import ElementStage
+    from warp_mca.model import Block
+
+Array = NDArray[np.float64]
+
+
+class Element(Protocol):
+    """An element formulation, by which a body's cells are computed.
+
+    Arguments `x` are corners [m], shape (element_count, corners, 3); `K`, `G` moduli [Pa] and `rho` [kg/m^3], shape
+    (element_count,); `mass` lumped masses [kg], shape (element_count, corners); all float64.
+
+    Attributes:
+        name: as `Body.element` and the command line have it.
+        corners: nodes of each element.
+    """
+
+    name: str
+    corners: int
+
+    def volumes(self, x: Array) -> Array:
+        """Volumes [m^3], shape (element_count,)."""
+        ...
+
+    def lumped_masses(self, x: Array, rho: Array) -> Array:
+        """Lumped masses [kg], shape (element_count, corners), that keep the mass and the centre of mass exactly."""
+        ...
+
+    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+        """Upper bounds on the largest eigenvalue omega^2 [1/s^2], shape (element_count,)."""
+        ...
+
+    def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+        """The largest eigenvalue omega^2 itself [1/s^2], or a closer bound, shape (element_count,)."""
+        ...
+
+    def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
+        """Its arrays and kernels on the current device; `X` are the model's positions [m]."""
+        ...

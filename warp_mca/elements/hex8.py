@@ -1,0 +1,30 @@
+"""Owns `hex8`: the fully integrated hexahedron with mean dilatation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from warp_mca.elements.element import Array
+from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses, volumes
+
+if TYPE_CHECKING:
+    from warp_mca.elements.stage import ElementStage
+    from warp_mca.model import Block
+
+
+class Hex8:
+    """See `warp_mca.kernels.hex8`; wedges and pyramids are hexahedra whose corners coincide."""
+
+    name = "hex8"
+    corners = 8
+    volumes = staticmethod(volumes)
+    lumped_masses = staticmethod(lumped_masses)
+    eigenvalue_bounds = staticmethod(eigenvalue_bounds)
+    largest_eigenvalues = staticmethod(largest_eigenvalues)
+
+    def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
+        """Its arrays and kernels on the current device."""
+        from warp_mca.elements.stage import ElementStage
+        from warp_mca.kernels import hex8
+
+        return ElementStage(block, precision, hex8, points=8)

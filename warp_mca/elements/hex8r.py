@@ -1,0 +1,98 @@
+"""Owns `hex8r`: the one-point hexahedron with assumed-strain hourglass stiffness."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.elements.element import Array
+from warp_mca.elements.hexahedron import CORNERS, chunks, gradients, lumped_masses, volumes
+
+if TYPE_CHECKING:
+    from warp_mca.elements.stage import ElementStage
+    from warp_mca.model import Block
+
+# Signs of the patterns eta zeta, zeta xi, xi eta, xi eta zeta at the corners, shape (4, 8).
+_PATTERNS = np.array(
+    [CORNERS[:, 1] * CORNERS[:, 2], CORNERS[:, 2] * CORNERS[:, 0], CORNERS[:, 0] * CORNERS[:, 1], CORNERS.prod(axis=1)]
+)
+
+
+def _parts(x: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Mean gradients b (n, 8, 3), volumes, hourglass vectors (n, 4, 8), edge directions (n, 3, 3), half lengths."""
+    point, weight = gradients(x)
+    volume = weight.sum(axis=1)
+    b = np.einsum("eg,egai->eai", weight, point, optimize=True) / volume[:, None, None]
+    sums = np.einsum("ma,eai->emi", _PATTERNS, x)
+    gamma = 0.125 * (_PATTERNS - np.einsum("emi,eai->ema", sums, b, optimize=True))
+    mean = np.einsum("ak,eai->eki", CORNERS, x) / 8.0
+    length = np.linalg.norm(mean, axis=2)
+    return b, volume, gamma, mean / length[..., None], length
+
+
+def _hourglass_stiffness(volume: Array, a: Array, K: Array, G: Array) -> Array:
+    """Matrices of the amplitudes p (pattern m, edge k), flattened to 12, shape (n, 12, 12); as in the kernel."""
+    nu = (3.0 * K - 2.0 * G) / (6.0 * K + 2.0 * G)
+    plane, E = 2.0 * G / (1.0 - nu), 2.0 * G * (1.0 + nu)
+    D = np.zeros((len(volume), 12, 12))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        ei, ej = np.zeros((2, len(volume), 12))
+        shear = np.zeros((len(volume), 12))
+        ei[:, 3 * j + i] = 1.0 / a[:, i]
+        ej[:, 3 * i + j] = 1.0 / a[:, j]
+        shear[:, 3 * j + j], shear[:, 3 * i + i] = 1.0 / a[:, i], 1.0 / a[:, j]
+        for left, right, modulus in ((ei, ei, plane), (ej, ej, plane), (shear, shear, G)):
+            D += (volume * modulus / 3.0)[:, None, None] * left[:, :, None] * right[:, None, :]
+        mixed = ei[:, :, None] * ej[:, None, :]
+        D += (volume * plane * nu / 3.0)[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+        D[:, 9 + k, 9 + k] += volume * E / (9.0 * a[:, k] ** 2)
+    return D
+
+
+class Hex8r:
+    """See `warp_mca.kernels.hex8r`; wedges and pyramids are hexahedra whose corners coincide."""
+
+    name = "hex8r"
+    corners = 8
+    volumes = staticmethod(volumes)
+    lumped_masses = staticmethod(lumped_masses)
+
+    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+        """Sum of bounds of the mean strain's part, as for hex8 with 3 x 3 problems, and of the hourglass part."""
+        bound = np.empty(len(x))
+        for part in chunks(len(x), 20000):
+            b, volume, gamma, _, a = _parts(x[part])
+            root = 1.0 / np.sqrt(mass[part])
+            b, gamma = b * root[..., None], gamma * root[:, None, :]
+            tensor = np.einsum("eai,eaj->eij", b, b, optimize=True)
+            modes = np.einsum("ema,ena->emn", gamma, gamma, optimize=True)
+            mean = K[part] * np.trace(tensor, axis1=1, axis2=2) + 2.0 * G[part] * np.linalg.eigvalsh(tensor)[:, -1]
+            stiff = np.linalg.eigvalsh(_hourglass_stiffness(volume, a, K[part], G[part]))[:, -1]
+            bound[part] = volume * mean + stiff * np.linalg.eigvalsh(modes)[:, -1]
+        return bound
+
+    def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+        """Of the 24 x 24 problem."""
+        n = len(x)
+        b, volume, gamma, directions, a = _parts(x)
+        root = 1.0 / np.sqrt(mass)
+        b, gamma = b * root[..., None], gamma * root[:, None, :]
+        same = np.einsum("eai,ebi->eab", b, b)
+        cross = np.einsum("eai,ebj->eaibj", b, b)
+        matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
+        stiffness = (volume * G)[:, None, None] * matrix.reshape(n, 24, 24)
+        flat = b.reshape(n, 24)
+        stiffness += (K * volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+        amplitude = np.einsum("ema,eki->emkai", gamma, directions, optimize=True).reshape(n, 12, 24)
+        D = _hourglass_stiffness(volume, a, K, G)
+        stiffness += np.einsum("epx,epq,eqy->exy", amplitude, D, amplitude, optimize=True)
+        return np.linalg.eigvalsh(stiffness)[:, -1].astype(np.float64)
+
+    def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
+        """Its arrays and kernels on the current device."""
+        from warp_mca.elements.stage import ElementStage
+        from warp_mca.kernels import hex8r
+
+        return ElementStage(block, precision, hex8r, points=1)

@@ -1,0 +1,65 @@
+"""Owns `tet4`: the 4-node tetrahedron with averaged nodal pressure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.elements.element import Array
+from warp_mca.elements.hexahedron import chunks
+
+if TYPE_CHECKING:
+    from warp_mca.elements.stage import ElementStage
+    from warp_mca.model import Block
+
+
+def volumes(x: Array) -> Array:
+    """Volumes [m^3], shape (element_count,), negative where inverted."""
+    return (np.linalg.det(x[:, 1:] - x[:, :1]) / 6.0).astype(np.float64)
+
+
+def gradients(x: Array) -> Array:
+    """Gradients of the shape functions [1/m], shape (element_count, 4, 3)."""
+    last = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
+    return np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1).astype(np.float64)
+
+
+class Tet4:
+    """See `warp_mca.kernels.tet4`."""
+
+    name = "tet4"
+    corners = 4
+    volumes = staticmethod(volumes)
+
+    def lumped_masses(self, x: Array, rho: Array) -> Array:
+        """A quarter of the mass at each corner."""
+        return np.repeat((0.25 * rho * volumes(x))[:, None], 4, axis=1)
+
+    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+        """Bounds without the averaging of the pressure, which only takes energy away (Jensen's inequality)."""
+        bound = np.empty(len(x))
+        for part in chunks(len(x), 50000):
+            b = gradients(x[part]) / np.sqrt(mass[part])[..., None]
+            tensor = np.einsum("eai,eaj->eij", b, b)
+            spread = 2.0 * G[part] * np.linalg.eigvalsh(tensor)[:, -1]
+            bound[part] = volumes(x[part]) * (K[part] * np.trace(tensor, axis1=1, axis2=2) + spread)
+        return bound
+
+    def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+        """Of the 12 x 12 problem without averaging."""
+        n = len(x)
+        b = gradients(x) / np.sqrt(mass)[..., None]
+        same = np.einsum("eai,ebi->eab", b, b)
+        cross = np.einsum("eai,ebj->eaibj", b, b)
+        matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
+        flat = b.reshape(n, 12)
+        stiffness = G[:, None, None] * matrix.reshape(n, 12, 12)
+        stiffness += K[:, None, None] * flat[:, :, None] * flat[:, None, :]
+        return (volumes(x) * np.linalg.eigvalsh(stiffness)[:, -1]).astype(np.float64)
+
+    def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
+        """Its arrays and kernels on the current device."""
+        from warp_mca.elements.tet4_stage import Tet4Stage
+
+        return Tet4Stage(block, volumes(X[block.conn.T]), precision)

@@ -1,0 +1,53 @@
+"""Owns the device side of `tet4`: its pressure nodes, and the two kernels before that of the forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.elements.element import Array
+from warp_mca.elements.stage import ElementStage
+from warp_mca.kernels import tet4
+from warp_mca.kernels.scalars import scalars
+
+if TYPE_CHECKING:
+    from warp_mca.model import Block
+
+
+class Tet4Stage(ElementStage):
+    """Pressure nodes, one for each node and material, and their dilatation."""
+
+    def __init__(self, block: Block, volume: Array, precision: str) -> None:
+        super().__init__(block, precision, tet4, points=1)
+        real = scalars(precision).real
+        key = block.conn.astype(np.int64) * (int(block.material.max()) + 1) + block.material
+        found, group = np.unique(key, return_inverse=True)
+        group = group.reshape(block.conn.shape)
+        order = np.argsort(group.ravel(), kind="stable")
+        offset = np.searchsorted(group.ravel()[order], np.arange(len(found) + 1))
+        around = np.bincount(group.ravel(), np.tile(volume, 4))
+        self.group = wp.array(group, dtype=wp.int32)
+        self.offset = wp.array(offset, dtype=wp.int32)
+        self.element = wp.array(order % self.count, dtype=wp.int32)
+        self.inverse_volume = wp.array(1.0 / around, dtype=real)
+        self.growth = wp.zeros(self.count, dtype=real)
+        self.dilation = wp.zeros(len(found), dtype=real)
+        self.dilation_kernel = tet4.dilation_kernel(precision, block.finite)
+        self.average_kernel = tet4.average_kernel(precision)
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [*super().kernels(), self.dilation_kernel, self.average_kernel]
+
+    def more(self) -> list[wp.array]:
+        """Pressure nodes of each element, and their dilatation."""
+        return [self.group, self.dilation]
+
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
+        """Forces of each element on its nodes [N], after the dilatation at the pressure nodes."""
+        wp.launch(self.dilation_kernel, self.count, inputs=[X, self.conn, u], outputs=[self.growth])
+        inputs = [self.offset, self.element, self.inverse_volume, self.growth]
+        wp.launch(self.average_kernel, len(self.dilation), inputs=inputs, outputs=[self.dilation])
+        super().forces(X, law, u, force)
