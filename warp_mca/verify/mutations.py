@@ -44,4 +44,10 @@ MUTATIONS: dict[str, Mutation] = {
         "Fn = -k * gap",
         "Fn = -wp.float64(0.1) * k * gap",
     ),
+    "reaction_halved": Mutation(
+        "what touches gives back half the force that it takes",
+        "kernels/contact.py",
+        "total -= w[c] * spring.force[s]",
+        "total -= wp.float64(0.5) * w[c] * spring.force[s]",
+    ),
 }
