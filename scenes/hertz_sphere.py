@@ -30,8 +30,15 @@ def build(
     sphere = mca.Sphere(
         radius=radius, part="quarter", section=section, ring=ring, pole_size=pole_size, pole_layers=pole_layers
     )
-    turned = {"position": (0.0, radius, 0.0), "rotation": (0.0, 0.0, -0.5 * math.pi)}  # the pole points downwards
-    bodies = [mca.Body(name="sphere", geometry=sphere, material=material, velocity=(0.0, -v, 0.0), **turned)]
+    moving = mca.Body(
+        name="sphere",
+        geometry=sphere,
+        material=material,
+        position=(0.0, radius, 0.0),
+        rotation=(0.0, 0.0, -0.5 * math.pi),  # the pole points downwards
+        velocity=(0.0, -v, 0.0),
+    )
+    bodies = [moving]
     fixed = [mca.Fixed(body="sphere", nodes="ymin", axes="x"), mca.Fixed(body="sphere", nodes="zmin", axes="z")]
     master: mca.Surface | mca.RigidPlane = mca.RigidPlane()
     if target == "block":
