@@ -199,3 +199,45 @@ def sticking_energy(setup: Setup) -> list[Row]:
             scale=1.0,
         ),
     ]
+
+
+@case(
+    group="friction",
+    title="A block on a belt and a spring: it sticks until the spring's force is mu F_n, then swings about that",
+    reference=(
+        "Rigid mass m on a spring k: it sticks for mu F_n / (k v), then x = mu F_n / k + (v / omega) sin(omega t), "
+        "omega = sqrt(k / m), whose speed is the belt's again after 2 pi / omega; heat mu F_n v 2 pi / omega by then."
+    ),
+    catches=("friction_limit_halved", "belt_stands_still"),
+)
+def stick_slip(setup: Setup) -> list[Row]:
+    """v = 0.1 m/s, mu F_n = 1 N, k = 20 kN/m, m = 2 g and a third of the spring's 0.008 g."""
+    cells = setup.choose((4, 8), (4, 8, 16))
+    force, stiffness, v = 1.0, 2e4, 0.1
+    omega = math.sqrt(stiffness / (2e-3 * (1.0 + 0.004 / 3.0)))
+    slowed = 6.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
+    stuck, period, amplitude, heat = [], [], [], []
+    for count in cells:
+        result = setup.run(setup.scene("stick_slip", cells=count))
+        interval = result.time[1] - result.time[0]
+        way = np.cumsum(result["tip_vx"]) * interval
+        row = int(np.flatnonzero(result["stick_fraction"] > 0.0)[0])
+        row += int(np.flatnonzero(result["stick_fraction"][row:] == 0.0)[0])
+        first = float(result.time[row]) - 1.5 * interval  # the last node let go in the interval before
+        turns = crossings(result.time, result["tip_vx"], 0.0)
+        reached = np.interp(turns[:2], result.time, way)
+        stuck.append(first - slowed)
+        period.append(float(turns[2] - turns[0]))
+        amplitude.append(0.5 * float(reached[0] - reached[1]))
+        warmed = np.interp([first, first + 2.0 * math.pi / omega], result.time, result["E_friction"])
+        heat.append(float(warmed[1] - warmed[0]))
+    rows = (
+        ("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
+        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0005, "the block yields"),
+        ("amplitude", v / omega, amplitude, "m", 0.002, "contact stretches by 0.01 %, waves stay in the spring"),
+        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.001, "the start is read to 0.1 %"),
+    )
+    return [
+        Row(quantity=quantity, exact=exact, measured=tuple(measured), unit=unit, tolerance=tolerance, why=why)
+        for quantity, exact, measured, unit, tolerance, why in rows
+    ]
