@@ -6,12 +6,13 @@ import math
 import sys
 import threading
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from warp_mca.errors import RequestError
-from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod
+from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
 from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.quality import check, edge_lengths, scaled_jacobian, volumes
@@ -192,7 +193,55 @@ def test_plate(changes: dict):
     assert area(mesh, "contact") > (2.0 * 1.8e-3) * (2.0 * 1.2e-3) * (1.0 - 1e-9)
 
 
-@pytest.mark.parametrize("recipe", [rod(), plate(), Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))], ids=repr)
+def test_quarter_of_a_plate():
+    mesh = plate(part="quarter").build()
+    assert_sound(mesh)
+    assert volumes(mesh).sum() == pytest.approx(1.2 * 0.1 * 0.05 / 4.0, rel=1e-9)
+    assert area(mesh, "xmin") == pytest.approx(0.05 * 0.05, rel=1e-9)
+    assert (mesh.points[mesh.nodes("xmin"), 0] == 0.0).all()
+
+
+def test_sphere_volume_converges_at_second_order():
+    exact = 4.0 / 3.0 * math.pi * R**3
+    errors = [
+        1.0 - volumes(Sphere(radius=R, section=n, ring=n // 2, pole_layers=n).build()).sum() / exact for n in (4, 8, 16)
+    ]
+    assert errors[0] < 0.08
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("part", "share", "cuts"), [("whole", 1.0, ""), ("half", 0.5, "z"), ("quarter", 0.25, "yz")])
+@pytest.mark.parametrize("changes", [{}, {"section": 4, "pole_size": R / 200.0, "pole_layers": 10}], ids=str)
+def test_sphere(part: Literal["whole", "half", "quarter"], share: float, cuts: str, changes: dict):
+    mesh = Sphere(radius=R, part=part, **changes).build()
+    assert_sound(mesh)
+    assert scaled_jacobian(mesh).min() > 0.5
+    assert has_node(mesh, (R, 0.0, 0.0))
+    assert has_node(mesh, (0.0, 0.0, 0.0))
+    assert np.linalg.norm(mesh.points[mesh.nodes("surface")], axis=1) == pytest.approx(R, rel=4e-15)
+    assert area(mesh, "surface") == pytest.approx(share * 4.0 * math.pi * R**2, rel=0.05)
+    for axis in cuts:
+        assert area(mesh, f"{axis}min") == pytest.approx(math.pi * R**2 / len(cuts), rel=0.05)
+    assert set(mesh.node_sets) == {"surface", "pole", *(f"{axis}min" for axis in cuts)}
+    pole = mesh.points[mesh.nodes("pole")]
+    reach = np.linalg.norm(pole - [R, 0.0, 0.0], axis=1).max()
+    assert 0.5 * R < reach < 1.2 * R
+    if "pole_size" in changes:
+        assert edge_lengths(mesh).min() > 0.8 * R / 200.0
+
+
+@pytest.mark.parametrize(("field", "value"), [("radius", 0.0), ("section", 3), ("part", "third"), ("pole_size", R)])
+def test_sphere_refusals(field: str, value: object):
+    with pytest.raises(RequestError, match=f"Sphere.{field}"):
+        Sphere(**{"radius": R, field: value})
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [rod(), plate(), Sphere(radius=R, part="quarter"), Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))],
+    ids=repr,
+)
 def test_same_recipe_same_bits(recipe):
     first, second = recipe.build(), recipe.build()
     assert first.points.tobytes() == second.points.tobytes()

@@ -29,7 +29,7 @@ from warp_mca.scene import (
 )
 
 if TYPE_CHECKING:
-    from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod
+    from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
     from warp_mca.registry import Param, make_scene
     from warp_mca.report.quality import quality_table
     from warp_mca.results import Result, load
@@ -43,6 +43,7 @@ _LAZY = {
     "MeshFile": "warp_mca.geometry",
     "Plate": "warp_mca.geometry",
     "Rod": "warp_mca.geometry",
+    "Sphere": "warp_mca.geometry",
     "Param": "warp_mca.registry",
     "make_scene": "warp_mca.registry",
     "Result": "warp_mca.results",
@@ -71,6 +72,7 @@ __all__ = [
     "ImpactPhase",
     "Box",
     "Rod",
+    "Sphere",
     "Plate",
     "MeshFile",
     "Mesh",

@@ -6,5 +6,6 @@ from warp_mca.geometry.mesh_file import MeshFile
 from warp_mca.geometry.plate import Plate
 from warp_mca.geometry.recipe import Recipe
 from warp_mca.geometry.rod import Rod
+from warp_mca.geometry.sphere import Sphere
 
-__all__ = ["HEX_FACES", "Box", "Mesh", "MeshFile", "Plate", "Recipe", "Rod"]
+__all__ = ["HEX_FACES", "Box", "Mesh", "MeshFile", "Plate", "Recipe", "Rod", "Sphere"]

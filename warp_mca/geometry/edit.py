@@ -36,6 +36,15 @@ def mirror(mesh: Mesh, axis: int) -> Mesh:
     )
 
 
+def halved(mesh: Mesh, axis: int) -> Mesh:
+    """The half of the mesh on the positive side of the plane where coordinate `axis` is 0, which no cell crosses."""
+    points = snapped(mesh.points, axis, 0.0)
+    keep = points[mesh.hexahedra].mean(axis=1)[:, axis] > 0.0
+    index = np.cumsum(keep) - 1
+    cell_sets = {name: index[cells[keep[cells]]].astype(np.int32) for name, cells in mesh.cell_sets.items()}
+    return compact(Mesh(points, mesh.hexahedra[keep], mesh.node_sets, cell_sets))
+
+
 def snapped(points: np.ndarray, axis: int, value: float) -> np.ndarray:
     """Copy of `points` (count, 3) whose coordinates `axis` within gmsh's rounding of `value` [m] equal it exactly."""
     points = points.copy()

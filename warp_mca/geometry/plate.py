@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class Plate:
         extension: number of cells along x from the box to each end of the plate.
         extension_z: the same along z; unused where the box is as wide as the plate.
         contact: half the extent of the node set contact [m]; None: four times the core's.
+        part: "whole"; or "quarter", with x >= 0 and z >= 0, whose cut faces are xmin and zmin.
     """
 
     length: float
@@ -49,6 +51,7 @@ class Plate:
     extension: int = 20
     extension_z: int = 4
     contact: float | None = None
+    part: Literal["whole", "quarter"] = "whole"
 
     def __post_init__(self) -> None:
         _validate.lengths("Plate", length=self.length, width=self.width, height=self.height, core_size=self.core_size)
@@ -60,6 +63,8 @@ class Plate:
         for name in ("box", "contact"):
             if getattr(self, name) is not None:
                 _validate.lengths("Plate", **{name: getattr(self, name)})
+        if self.part not in ("whole", "quarter"):
+            raise bad_value("Plate.part", self.part, "choose whole or quarter")
         half = self._half_box
         if 2.0 * half > min(self.length, self.width) * (1.0 + 1e-12):
             raise bad_value("Plate.box", self.box, "it must fit the plate: at most half its length and width")
@@ -74,14 +79,17 @@ class Plate:
         return min(0.5 * self.length, 0.5 * self.width, self.height) if self.box is None else self.box
 
     def build(self) -> Mesh:
-        """The mesh: one quarter by gmsh, mirrored twice."""
-        quarter = self._quarter()
-        mesh = mirror(mirror(quarter, 0), 2)
+        """The mesh: one quarter by gmsh, mirrored twice for the whole."""
+        mesh = self._quarter()
+        whole = self.part == "whole"
+        if whole:
+            mesh = mirror(mirror(mesh, 0), 2)
         points = mesh.points
         ends = {"x": 0.5 * self.length, "z": 0.5 * self.width}
         planes = {"top": (1, 0.0), "bottom": (1, -self.height)}
         for name, end in ends.items():
-            planes |= {f"{name}min": ("xyz".index(name), -end), f"{name}max": ("xyz".index(name), end)}
+            axis = "xyz".index(name)
+            planes |= {f"{name}min": (axis, -end if whole else 0.0), f"{name}max": (axis, end)}
         for axis, value in planes.values():
             points = snapped(points, axis, value)
         sets = {name: np.flatnonzero(points[:, axis] == value) for name, (axis, value) in planes.items()}

@@ -15,6 +15,9 @@ Vector = NDArray[np.float64]
 # The two ends of each outer side; corners 0 and 1 lie in the plane z = 0, where the other half is mirrored on.
 SIDES = ((1, 2), (2, 3), (3, 0))
 
+_CORE_RADIUS = 0.64  # from the axis to the corners of a disc's core [radius]
+_CORE_BULGE = 0.24  # of the core's edges [rad]
+
 
 @dataclass(frozen=True)
 class Ring:
@@ -81,3 +84,18 @@ def bowed_face(blocks: Blocks, origin: Vector, near: Vector, far: Vector, bulge:
             away *= 0.5 * np.linalg.norm(chord) / math.tan(bulge) / np.linalg.norm(away)
             blocks.arc(handles[a], handles[b], blocks.point(origin + foot - away))
     return handles
+
+
+def disc(blocks: Blocks, x: float, radius: float) -> tuple[Ring, int]:
+    """The ring of a round section of this radius [m] at `x` [m] on the x axis, and its centre."""
+    origin = np.array([x, 0.0, 0.0])
+    centre = blocks.point(origin)
+    d = math.sqrt(0.5)
+    near, far = np.array([0.0, d, d]), np.array([0.0, -d, d])
+    inner = _CORE_RADIUS * radius
+    core = bowed_face(blocks, origin, inner * near, inner * far, _CORE_BULGE)
+    outer = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]), near, far
+    rim = [blocks.point(origin + radius * place) for place in outer]
+    for a, b in SIDES:
+        blocks.arc(rim[a], rim[b], centre)
+    return Ring(core, rim), centre

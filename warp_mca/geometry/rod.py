@@ -15,10 +15,8 @@ from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import mirror, pinned, snapped
 from warp_mca.geometry.hemisphere import DEPTH_LIMIT, FOCUS_LIMIT, PATCH_LIMIT, Hemisphere
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.geometry.rings import SIDES, Ring, bands, bowed_face, join
+from warp_mca.geometry.rings import bands, disc, join
 
-_CORE_RADIUS = 0.64  # from the axis to the corners of the section's core [radius]
-_CORE_BULGE = 0.24  # of the core's edges [rad]
 _FOCUS_SIZE = 0.28  # default edge of the fine cells, times the cells along the section's core [radius]
 
 
@@ -119,8 +117,8 @@ class Rod:
     def _half(self) -> Mesh:
         """The half with z >= 0, its focus turned to y >= 0."""
         blocks = Blocks()
-        start, _ = self._section(blocks, 0.0)
-        end, centre = self._section(blocks, self._cylinder)
+        start, _ = disc(blocks, 0.0, self.radius)
+        end, centre = disc(blocks, self._cylinder, self.radius)
         join(blocks, start, end, (self.section, self.ring, self.axial), "body")
         factor = self.axial_ratio ** (-1.0 / max(self.axial - 1, 1))
         for a, b in zip(start.core + start.rim, end.core + end.rim, strict=True):
@@ -144,17 +142,3 @@ class Rod:
                 focus_layers=self.focus_layers,
             ).add(blocks, end, centre)
         return blocks.mesh()
-
-    def _section(self, blocks: Blocks, x: float) -> tuple[Ring, int]:
-        """The ring of the section at `x`, and its centre."""
-        origin = np.array([x, 0.0, 0.0])
-        centre = blocks.point(origin)
-        d = math.sqrt(0.5)
-        near, far = np.array([0.0, d, d]), np.array([0.0, -d, d])
-        inner = _CORE_RADIUS * self.radius
-        core = bowed_face(blocks, origin, inner * near, inner * far, _CORE_BULGE)
-        outer = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]), near, far
-        rim = [blocks.point(origin + self.radius * place) for place in outer]
-        for a, b in SIDES:
-            blocks.arc(rim[a], rim[b], centre)
-        return Ring(core, rim), centre

@@ -1,1 +1,243 @@
-"""Owns the cases of group friction."""
+"""Owns the cases of friction: blocks and spheres that slide, stick and roll as Coulomb's law says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warp_mca as mca
+from warp_mca.verify.case import Row, Setup, case, crossings
+
+COULOMB = "Coulomb's law and the motion of a rigid body."
+MASS, MU, GRAVITY, SPEED = 0.2, 0.3, 300.0, 1.0  # of sliding_block and block_on_belt [kg, -, m/s^2, m/s]
+
+
+def impulse(result: mca.Result) -> NDArray[np.float64]:
+    """Impulse of the tangential force up to each row [N s], shape (row_count,), float64."""
+    return np.cumsum(result.F_t) * (result.time[1] - result.time[0])  # the first row's mean force is 0
+
+
+@case(
+    group="friction",
+    title="A block slides to rest: over v^2 / (2 mu g), in v / (mu g), and all its energy becomes heat",
+    reference=COULOMB,
+    catches=("friction_limit_doubled", "slip_work_halved"),
+)
+def sliding_block(setup: Setup) -> list[Row]:
+    """v = 1 m/s, mu = 0.3, g = 300 m/s^2, 0.2 kg; the speed is that of the centre of mass, out of the impulse."""
+    cells = setup.choose((1, 2), (1, 2, 4))
+    distance, time, heat = [], [], []
+    for count in cells:
+        result = setup.run(setup.scene("sliding_block", cells=count))
+        speed = SPEED + impulse(result) / MASS
+        distance.append(float(np.trapezoid(speed, result.time)))
+        time.append(float(crossings(result.time, speed, 0.0)[0]))
+        heat.append(float(result["E_friction"][-1]))
+    springs = "the tangential springs stretch by 0.015 % of the way, and the block swings on them in the end"
+    return [
+        Row(
+            quantity="distance",
+            exact=SPEED**2 / (2.0 * MU * GRAVITY),
+            measured=tuple(distance),
+            unit="m",
+            tolerance=0.0005,
+            why=springs,
+        ),
+        Row(
+            quantity="time",
+            exact=SPEED / (MU * GRAVITY),
+            measured=tuple(time),
+            unit="s",
+            tolerance=0.0005,
+            why="the block bounces on its contact springs by 2 % of its weight",
+        ),
+        Row(
+            quantity="heat",
+            exact=0.5 * MASS * SPEED**2,
+            measured=tuple(heat),
+            unit="J",
+            tolerance=0.0002,
+            why=springs,
+        ),
+    ]
+
+
+@case(
+    group="friction",
+    title="A belt takes a block along: at its speed after v / (mu g); half its work is heat, half motion",
+    reference=COULOMB,
+    catches=("belt_stands_still", "belt_work_halved"),
+)
+def block_on_belt(setup: Setup) -> list[Row]:
+    """As `sliding_block`, seen from the ground on which the block was at rest."""
+    cells = setup.choose((1, 2), (1, 2, 4))
+    time, speed, heat, work, rest = [], [], [], [], []
+    exact = SPEED / (MU * GRAVITY)
+    for count in cells:
+        result = setup.run(setup.scene("block_on_belt", cells=count))
+        of_block = impulse(result) / MASS
+        caught = crossings(result.time, of_block, SPEED)
+        time.append(float(caught[0]))
+        carried = (result.time > caught[0]) & (result.time < caught[2 * ((len(caught) - 1) // 2)])  # whole swings
+        speed.append(float(of_block[carried].mean()))
+        rest.append(float(result.F_t[carried].mean()))
+        heat.append(float(result["E_friction"][-1]))
+        work.append(float(result.summary["energy"]["external_work"]))
+    swing = "the block swings on its contact springs"
+    return [
+        Row(quantity="time", exact=exact, measured=tuple(time), unit="s", tolerance=0.0005, why=swing),
+        Row(quantity="speed then", exact=SPEED, measured=tuple(speed), unit="m/s", tolerance=0.0005, why=swing),
+        Row(
+            quantity="friction F_t then",
+            exact=0.0,
+            measured=tuple(rest),
+            unit="N",
+            tolerance=0.02,
+            why=swing,
+            scale=MU * MASS * GRAVITY,
+        ),
+        Row(quantity="heat", exact=0.5 * MASS * SPEED**2, measured=tuple(heat), unit="J", tolerance=0.0002, why=swing),
+        Row(
+            quantity="work of the belt",
+            exact=MASS * SPEED**2,
+            measured=tuple(work),
+            unit="J",
+            tolerance=0.005,
+            why=swing + ": mu g / omega is 0.5 % of its speed",
+        ),
+    ]
+
+
+@case(
+    group="friction",
+    title="Friction's energy is its force times the slip",
+    reference="The work of a force; a spring at its limit mu F_n holds mu^2 / (1 + mu^2) of its contact's energy.",
+    catches=("slip_work_halved", "friction_limit_doubled"),
+)
+def friction_work(setup: Setup) -> list[Row]:
+    """The block of `block_on_belt`, held, while the belt slides at v = 1 m/s: slip is the belt's way.
+
+    The work done over the second half of the run, from when all springs slip, is compared.
+    """
+    result = setup.run(setup.scene("block_on_belt", cells=1, held=True))
+    half = len(result.time) // 2
+    work = SPEED * (impulse(result)[-1] - impulse(result)[half])
+    heat = result["E_friction"][-1] - result["E_friction"][half]
+    stored = MU**2 / (1.0 + MU**2) * (result["E_contact"][-1] - result["E_contact"][half])
+    return [
+        Row(
+            quantity="heat and springs' energy over force times slip",
+            exact=1.0,
+            measured=(float((heat + stored) / work),),
+            unit="-",
+            tolerance=2e-5,
+            why="the force is summed by rectangles, the heat by trapezoids",
+        ),
+        Row(
+            quantity="heat over mu m g v t",
+            exact=1.0,
+            measured=(float(result["E_friction"][-1] / (MU * MASS * GRAVITY * SPEED * result.time[-1])),),
+            unit="-",
+            tolerance=0.0005,
+            why="the springs are stretched first, over 0.015 % of the way",
+        ),
+    ]
+
+
+@case(
+    group="friction",
+    title="Sticking contact gives all of its elastic energy back, at the frequency of its springs",
+    reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V for each node of the sole.",
+    catches=("tangential_spring_halved", "friction_limit_halved"),
+)
+def sticking_energy(setup: Setup) -> list[Row]:
+    """10 periods at 80 % of the limit of friction; height and so normal force are held."""
+    cells = setup.choose((2, 4), (2, 4, 8))
+    omega, kept, heat = [], [], []
+    exact = 0.0
+    for count in cells:
+        scene = setup.scene("sticking_block", cells=count)
+        material = scene.body("block").material
+        assert isinstance(material, mca.Elastic)
+        edge = 0.01
+        springs = 0.001 * material.bulk_modulus * edge * (count + 1) ** 2
+        exact = math.sqrt(springs / (material.rho * count**2 * edge**3))
+        result = setup.run(scene)
+        turns = crossings(result.time, result["tip_vx"], 0.0)
+        omega.append(math.pi * (len(turns) - 1) / float(turns[-1] - turns[0]) / exact)
+        energy = result["E_kinetic"] + result["E_internal"] + result["E_contact"]
+        moving = float(result["E_kinetic"][0])
+        kept.append(float(np.abs(energy - energy[0]).max()) / moving)
+        heat.append(float(result["E_friction"][-1]) / moving)
+    return [
+        Row(
+            quantity="frequency over sqrt(k / m)",
+            exact=1.0,
+            measured=tuple(omega),
+            unit="-",
+            tolerance=0.001,
+            why="the block itself yields by 0.1 % of what its springs do",
+        ),
+        Row(
+            quantity="energy lost or won over that of the motion",
+            exact=0.0,
+            measured=tuple(kept),
+            unit="-",
+            tolerance=1e-5,
+            why="elements in single precision",
+            scale=1.0,
+        ),
+        Row(
+            quantity="heat over the energy of the motion",
+            exact=0.0,
+            measured=tuple(heat),
+            unit="-",
+            tolerance=1e-12,
+            why="nothing slips: rounding alone",
+            scale=1.0,
+        ),
+    ]
+
+
+@case(
+    group="friction",
+    title="A block on a belt and a spring: it sticks until the spring's force is mu F_n, then swings about that",
+    reference=(
+        "Rigid mass m on a spring k: it sticks for mu F_n / (k v), then x = mu F_n / k + (v / omega) sin(omega t), "
+        "omega = sqrt(k / m), whose speed is the belt's again after 2 pi / omega; heat mu F_n v 2 pi / omega by then."
+    ),
+    catches=("friction_limit_halved", "belt_stands_still"),
+)
+def stick_slip(setup: Setup) -> list[Row]:
+    """v = 0.1 m/s, mu F_n = 1 N, k = 20 kN/m, m = 2 g and a third of the spring's 0.008 g."""
+    cells = setup.choose((4, 8), (4, 8, 16))
+    force, stiffness, v = 1.0, 2e4, 0.1
+    omega = math.sqrt(stiffness / (2e-3 * (1.0 + 0.004 / 3.0)))
+    slowed = 6.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
+    stuck, period, amplitude, heat = [], [], [], []
+    for count in cells:
+        result = setup.run(setup.scene("stick_slip", cells=count))
+        interval = result.time[1] - result.time[0]
+        way = np.cumsum(result["tip_vx"]) * interval
+        row = int(np.flatnonzero(result["stick_fraction"] > 0.0)[0])
+        row += int(np.flatnonzero(result["stick_fraction"][row:] == 0.0)[0])
+        first = float(result.time[row]) - 1.5 * interval  # the last node let go in the interval before
+        turns = crossings(result.time, result["tip_vx"], 0.0)
+        reached = np.interp(turns[:2], result.time, way)
+        stuck.append(first - slowed)
+        period.append(float(turns[2] - turns[0]))
+        amplitude.append(0.5 * float(reached[0] - reached[1]))
+        warmed = np.interp([first, first + 2.0 * math.pi / omega], result.time, result["E_friction"])
+        heat.append(float(warmed[1] - warmed[0]))
+    rows = (
+        ("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
+        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0005, "the block yields"),
+        ("amplitude", v / omega, amplitude, "m", 0.002, "contact stretches by 0.01 %, waves stay in the spring"),
+        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.001, "the start is read to 0.1 %"),
+    )
+    return [
+        Row(quantity=quantity, exact=exact, measured=tuple(measured), unit=unit, tolerance=tolerance, why=why)
+        for quantity, exact, measured, unit, tolerance, why in rows
+    ]

@@ -44,4 +44,46 @@ MUTATIONS: dict[str, Mutation] = {
         "Fn = -k * gap",
         "Fn = -wp.float64(0.1) * k * gap",
     ),
+    "reaction_halved": Mutation(
+        "what touches gives back half the force that it takes",
+        "kernels/contact.py",
+        "total -= w[c] * spring.force[s]",
+        "total -= wp.float64(0.5) * w[c] * spring.force[s]",
+    ),
+    "friction_limit_doubled": Mutation(
+        "friction may reach 2 mu F_n",
+        "kernels/contact.py",
+        "normal, mu * Fn, k)",
+        "normal, wp.float64(2.0) * mu * Fn, k)",
+    ),
+    "friction_limit_halved": Mutation(
+        "friction may reach only mu F_n / 2",
+        "kernels/contact.py",
+        "normal, mu * Fn, k)",
+        "normal, wp.float64(0.5) * mu * Fn, k)",
+    ),
+    "slip_work_halved": Mutation(
+        "half of the work of slip is counted",
+        "kernels/friction.py",
+        "work = wp.float64(0.5) *",
+        "work = wp.float64(0.25) *",
+    ),
+    "tangential_spring_halved": Mutation(
+        "tangential springs are half as stiff as their energy takes them for",
+        "kernels/friction.py",
+        "trial = f_start - k *",
+        "trial = f_start - wp.float64(0.5) * k *",
+    ),
+    "belt_stands_still": Mutation(
+        "slip is measured against a plane that does not move",
+        "kernels/contact.py",
+        "du = dt * (v[i] - velocity)",
+        "du = dt * v[i]",
+    ),
+    "belt_work_halved": Mutation(
+        "half of a moving plane's work is counted",
+        "kernels/contact.py",
+        "+ half * dt * wp.dot(before",
+        "+ half * half * dt * wp.dot(before",
+    ),
 }
