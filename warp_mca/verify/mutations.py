@@ -44,4 +44,22 @@ MUTATIONS: dict[str, Mutation] = {
         "Fn = -k * gap",
         "Fn = -wp.float64(0.1) * k * gap",
     ),
+    "elastic_shear_soft": Mutation(
+        "an elastic element's deviatoric stress is 1.9 G e in place of 2 G e",
+        "kernels/hex8.py",
+        "S = R(2.0) * G * strain",
+        "S = R(1.9) * G * strain",
+    ),
+    "bulk_modulus_low": Mutation(
+        "the bulk modulus is E / (3 (1 - nu)) in place of E / (3 (1 - 2 nu))",
+        "warp_mca/scene.py",
+        "return self.E / (3.0 * (1.0 - 2.0 * self.nu))",
+        "return self.E / (3.0 * (1.0 - self.nu))",
+    ),
+    "hardening_is_tangent": Mutation(
+        "the tangent modulus E_t is taken for the hardening modulus E E_t / (E - E_t)",
+        "warp_mca/scene.py",
+        "return self.E * self.E_t / (self.E - self.E_t)",
+        "return self.E_t",
+    ),
 }
