@@ -62,4 +62,10 @@ MUTATIONS: dict[str, Mutation] = {
         "return self.E * self.E_t / (self.E - self.E_t)",
         "return self.E_t",
     ),
+    "shear_modulus_low": Mutation(
+        "the shear modulus is E / (2 (1 + 2 nu)) in place of E / (2 (1 + nu))",
+        "warp_mca/scene.py",
+        "return self.E / (2.0 * (1.0 + self.nu))",
+        "return self.E / (2.0 * (1.0 + 2.0 * self.nu))",
+    ),
 }
