@@ -68,4 +68,10 @@ MUTATIONS: dict[str, Mutation] = {
         "return self.E / (2.0 * (1.0 + self.nu))",
         "return self.E / (2.0 * (1.0 + 2.0 * self.nu))",
     ),
+    "one_density": Mutation(
+        "every part of a body takes the density of its first material",
+        "warp_mca/model.py",
+        "rho = np.array([m.rho for m in self.materials])[self.material]",
+        "rho = np.array([self.materials[0].rho for m in self.materials])[self.material]",
+    ),
 }

@@ -285,3 +285,36 @@ def timoshenko_wave(setup: Setup) -> list[Row]:
         )
         for k, n in enumerate((1, 3))
     ]
+
+
+@case(
+    group="waves",
+    title="An interface of two metals sends back (Z2 - Z1) / (Z1 + Z2) of a pulse and lets 2 Z2 / (Z1 + Z2) pass",
+    reference="Graff, Wave Motion in Elastic Solids (1975), section 2.4; Z = rho c.",
+    catches=("one_density",),
+)
+def impedance_step(setup: Setup) -> list[Row]:
+    """Steel, then aluminium, 0.5 m each, no Poisson effect; pulse of 50 us, probes 0.2 m from the interface."""
+    counts = setup.choose((50, 100, 200), (50, 100, 200, 400))
+    c = math.sqrt(200e9 / 7800.0)
+    Z, Z_far = 7800.0 * c, math.sqrt(70e9 * 2700.0)
+    back, on = [], []
+    for count in counts:
+        result = setup.run(setup.scene("two_metal_bar", axial=count))
+        near, far = -_stress(result, 0.3), -_stress(result, 0.7)
+        arriving = result.time < 0.5 / c + 25e-6  # the pulse's middle meets the interface
+        back.append(-_peak(-near[~arriving]) / _peak(near[arriving]))
+        on.append(_peak(far) / _peak(near[arriving]))
+    exact = {"sent back": (Z_far - Z) / (Z + Z_far), "let through": 2.0 * Z_far / (Z + Z_far)}
+    return [
+        Row(
+            quantity=f"share of the stress that is {name}",
+            exact=exact[name],
+            measured=tuple(measured),
+            unit="-",
+            tolerance=2e-4,
+            why="dispersion of the mesh, with 100 cells in the pulse, alike before and behind the interface",
+            sizes=tuple(0.5 / count for count in counts),
+        )
+        for name, measured in (("sent back", back), ("let through", on))
+    ]
