@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -36,10 +37,17 @@ def stored(path: Path, name: str = "two_link"):
     return scene, load(path)
 
 
+def without_meshes(scene: mca.Scene) -> mca.Scene:
+    """The scene with a box in place of each finished mesh, whose arrays have no truth value of their own."""
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
+    bodies = (dataclasses.replace(b, geometry=box) if isinstance(b.geometry, Mesh) else b for b in scene.bodies)
+    return dataclasses.replace(scene, bodies=tuple(bodies))
+
+
 @pytest.mark.parametrize("name", scene_names())
 def test_a_built_in_scene_comes_back_equal(tmp_path: Path, name: str):
     scene, model = stored(tmp_path / "m.mca", name)
-    assert model.scene == scene
+    assert without_meshes(model.scene) == without_meshes(scene)
     assert model.origin == Origin(name, load_source(name).default_preset, dict(scene.parameters))
     for body, mesh in stand_ins(scene).items():
         np.testing.assert_array_equal(model.meshes[body].points, mesh.points)

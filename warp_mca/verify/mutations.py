@@ -86,4 +86,58 @@ MUTATIONS: dict[str, Mutation] = {
         "+ half * dt * wp.dot(before",
         "+ half * half * dt * wp.dot(before",
     ),
+    "elastic_shear_soft": Mutation(
+        "an elastic element's deviatoric stress is 1.99 G e in place of 2 G e",
+        "kernels/hex8.py",
+        "S = R(2.0) * G * strain",
+        "S = R(1.99) * G * strain",
+    ),
+    "bulk_modulus_low": Mutation(
+        "the bulk modulus is E / (3 (1 - nu)) in place of E / (3 (1 - 2 nu))",
+        "warp_mca/scene.py",
+        "return self.E / (3.0 * (1.0 - 2.0 * self.nu))",
+        "return self.E / (3.0 * (1.0 - self.nu))",
+    ),
+    "hardening_is_tangent": Mutation(
+        "the tangent modulus E_t is taken for the hardening modulus E E_t / (E - E_t)",
+        "warp_mca/scene.py",
+        "return self.E * self.E_t / (self.E - self.E_t)",
+        "return self.E_t",
+    ),
+    "shear_modulus_low": Mutation(
+        "the shear modulus is E / (2 (1 + 2 nu)) in place of E / (2 (1 + nu))",
+        "warp_mca/scene.py",
+        "return self.E / (2.0 * (1.0 + self.nu))",
+        "return self.E / (2.0 * (1.0 + 2.0 * self.nu))",
+    ),
+    "one_density": Mutation(
+        "every part of a body takes the density of its first material",
+        "warp_mca/model.py",
+        "rho = np.array([m.rho for m in self.materials])[self.material]",
+        "rho = np.array([self.materials[0].rho for m in self.materials])[self.material]",
+    ),
+    "back_stress_high": Mutation(
+        "the back stress is 0.68 (1 - beta) H eps_p in place of two thirds of (1 - beta) H eps_p",
+        "kernels/j2.py",
+        "xi = S - (R(2.0) / R(3.0)) * (R(1.0) - beta) * H * eps_p",
+        "xi = S - R(0.68) * (R(1.0) - beta) * H * eps_p",
+    ),
+    "isotropic_work_high": Mutation(
+        "the plastic work of isotropic hardening is one percent too high",
+        "kernels/j2.py",
+        "R(0.5) * beta * H * p * p",
+        "R(0.505) * beta * H * p * p",
+    ),
+    "stress_not_turned": Mutation(
+        "recorded stress is left in the element's own frame",
+        "kernels/output.py",
+        "(Q * strain * wp.transpose(Q))",
+        "strain",
+    ),
+    "return_too_short": Mutation(
+        "the return to the yield surface takes twice the hardening modulus",
+        "kernels/j2.py",
+        "(R(3.0) * G + H)",
+        "(R(3.0) * G + R(2.0) * H)",
+    ),
 }

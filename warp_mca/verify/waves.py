@@ -1,1 +1,320 @@
-"""Owns the cases of group waves."""
+"""Owns the cases of waves: their speeds, elastic and plastic, their dispersion, and what an interface sends back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warp_mca as mca
+from warp_mca.verify.case import Row, Setup, case, crossings
+
+Array = NDArray[np.float64]
+
+
+def _stress(result: mca.Result, position: float, component: int = 0) -> Array:
+    """One component of the stress over time [Pa] at the probe nearest to a position along the first path [m]."""
+    path = result.paths[0]
+    probe = int(np.argmin(np.abs(path.position - position)))
+    return path.stress[:, probe, component].astype(np.float64)
+
+
+def _peak(curve: Array) -> float:
+    """Greatest value of a smooth curve: of the parabola through the samples around its top."""
+    top = int(np.argmax(curve))
+    offset = np.arange(-5, 6)
+    a, b, c = np.polyfit(offset, curve[top + offset], 2)
+    return float(c - 0.25 * b * b / a)
+
+
+@case(
+    group="waves",
+    title="A long pulse runs along a slender bar at sqrt(E / rho), with the stress rho c v",
+    reference="One-dimensional wave theory: Graff, Wave Motion in Elastic Solids (1975), section 2.1.",
+    catches=("bulk_modulus_low", "elastic_shear_soft"),
+)
+def bar_wave(setup: Setup) -> list[Row]:
+    """Square bar, 4 mm wide, nu = 0.3; pulse of 80 us, 0.4 m; probes 0.4 m apart."""
+    counts = setup.choose((50, 100, 200), (50, 100, 200, 400))
+    c, v, near, far = math.sqrt(200e9 / 7800.0), 1.0, 0.2, 0.6
+    exact = 7800.0 * c * v
+    centroid, half, peak = [], [], []
+    for count in counts:
+        result = setup.run(setup.scene("pulse_bar", axial=count, v=v))
+        curves = [-_stress(result, x) for x in (near, far)]
+        mean = [float((result.time * s).sum() / s.sum()) for s in curves]
+        rise = [float(crossings(result.time, s, 0.5 * exact)[0]) for s in curves]
+        centroid.append((far - near) / (mean[1] - mean[0]))
+        half.append((far - near) / (rise[1] - rise[0]))
+        peak.append(_peak(curves[1]))
+    sizes = tuple(1.0 / count for count in counts)
+    return [
+        Row(
+            quantity="speed of the pulse's centroid",
+            exact=c,
+            measured=tuple(centroid),
+            unit="m/s",
+            tolerance=2e-5,
+            why="the centroid travels at the speed of infinitely long waves, on any mesh; sums over 600 rows",
+        ),
+        Row(
+            quantity="speed of the rise to half",
+            exact=c,
+            measured=tuple(half),
+            unit="m/s",
+            tolerance=5e-4,
+            why="dispersion of the mesh with 80 cells in the pulse; that of lateral inertia is 5e-5",
+            sizes=sizes,
+            least_order=1.8,
+        ),
+        Row(
+            quantity="greatest stress rho c v",
+            exact=exact,
+            measured=tuple(peak),
+            unit="Pa",
+            tolerance=5e-4,
+            why="dispersion of the mesh, and the mean of the two cells around a probe",
+            sizes=sizes,
+            least_order=1.7,
+        ),
+    ]
+
+
+@case(
+    group="waves",
+    title="An elastic precursor at the yield stress runs ahead of a plastic wave at sqrt(E_t / rho)",
+    reference="Von Karman and Duwez, J. Appl. Phys. 21 (1950) 987; Kolsky, Stress Waves in Solids (1963), chapter VII.",
+    catches=("hardening_is_tangent",),
+)
+def plastic_wave(setup: Setup) -> list[Row]:
+    """Square bar, 4 mm wide, nu = 0.3, sigma_y = 400 MPa, E_t = E / 9, driven at three times the yield velocity."""
+    counts = setup.choose((160, 320), (160, 320, 640))
+    E, rho, sigma_y, E_t, length, rise = 200e9, 7800.0, 400e6, 200e9 / 9.0, 0.4, 40e-6
+    c, c_p = math.sqrt(E / rho), math.sqrt(E_t / rho)
+    v_y = sigma_y / (rho * c)
+    plateau = sigma_y + rho * c_p * (3.0 * v_y - v_y)
+    near, middle, far = 0.05, 0.1, 0.15
+    precursor, behind, front = [], [], []
+    for count in counts:
+        scene = setup.scene(
+            "pulse_bar",
+            **{"drive": "kept", "rise": rise, "v": 3.0 * v_y, "sigma_y": sigma_y, "E_t": E_t},
+            **{"length": length, "axial": count, "duration": 125e-6},
+        )
+        result = setup.run(scene)
+        time = result.time
+        between = (time > middle / c + 0.75 * rise) & (time < middle / c_p + 0.125 * rise)
+        precursor.append(float(-_stress(result, middle)[between].mean()))
+        behind.append(float(-_stress(result, near)[time > near / c_p + 1.25 * rise].mean()))
+        arrival = [float(crossings(time, -_stress(result, x), 0.5 * (sigma_y + plateau))[0]) for x in (near, far)]
+        front.append((far - near) / (arrival[1] - arrival[0]))
+    sizes = tuple(length / count for count in counts)
+    return [
+        Row(
+            quantity="stress of the precursor",
+            exact=sigma_y,
+            measured=tuple(precursor),
+            unit="Pa",
+            tolerance=1e-3,
+            why="the foot of the plastic wave, smeared by lateral inertia, begins within the mean",
+            sizes=sizes,
+        ),
+        Row(
+            quantity="stress behind the plastic wave",
+            exact=plateau,
+            measured=tuple(behind),
+            unit="Pa",
+            tolerance=1e-3,
+            why="lateral inertia of the bar, 4 mm wide: a bar of 2 mm leaves a quarter of it",
+            sizes=sizes,
+        ),
+        Row(
+            quantity="speed of the plastic wave",
+            exact=c_p,
+            measured=tuple(front),
+            unit="m/s",
+            tolerance=5e-3,
+            why="the front, 70 mm long, is smeared over a few cells and bar widths between the probes, 100 mm apart",
+            sizes=sizes,
+        ),
+    ]
+
+
+def _frequency(time: Array, curve: Array, guess: float) -> float:
+    """Angular frequency of a curve's strongest vibration within 20 % of a guess [rad/s]: the top of its spectrum."""
+    from scipy.optimize import minimize_scalar
+
+    windowed = np.hanning(len(time)) * (curve - curve.mean())
+
+    def strength(omega: float) -> float:
+        return float(np.abs(windowed @ np.exp(-1j * omega * time)))
+
+    scan = np.linspace(0.8 * guess, 1.2 * guess, 400)
+    top, step = scan[int(np.argmax([strength(omega) for omega in scan]))], scan[1] - scan[0]
+    found = minimize_scalar(lambda omega: -strength(omega), bounds=(top - step, top + step), method="bounded")
+    return float(found.x)  # type: ignore[attr-defined]
+
+
+def _phase_speeds(result: mca.Result, length: float, guesses: dict[int, float], motion: str) -> list[float]:
+    """Phase speeds of standing waves [m/s]: with n half waves in the length, for each n and its guess.
+
+    The recorded stress is even about the ends of a bar that rings along itself, and odd where it rings across.
+    """
+    path = result.paths[0]
+    weight = np.ones(len(path.position))
+    weight[[0, -1]] = 0.5
+    shape = np.cos if motion == "along" else np.sin
+    speeds = []
+    for n, guess in guesses.items():
+        k = n * math.pi / length
+        amplitude = path.stress[:, :, 0].astype(np.float64) @ (weight * shape(k * path.position))
+        speeds.append(_frequency(result.time, amplitude, guess * k) / k)
+    return speeds
+
+
+def _pochhammer(a: float, k: float, E: float, nu: float, rho: float) -> float:
+    """Phase speed of the lowest longitudinal wave of a round bar [m/s], from the frequency equation.
+
+    Args:
+        a: radius [m].
+        k: wavenumber [1/m].
+        E, nu, rho: of the bar [Pa], [-], [kg/m^3].
+    """
+    from scipy.optimize import brentq
+    from scipy.special import jv
+
+    bar = math.sqrt(E / rho)
+    dilatational = bar * math.sqrt((1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)))
+    shear = bar / math.sqrt(2.0 * (1.0 + nu))
+
+    def equation(c: float) -> float:
+        p = k * np.sqrt(complex((c / dilatational) ** 2 - 1.0))
+        q = k * np.sqrt(complex((c / shear) ** 2 - 1.0))
+        J0p, J1p, J0q, J1q = jv(0, p * a), jv(1, p * a), jv(0, q * a), jv(1, q * a)
+        left = 2.0 * p / a * (q * q + k * k) * J1p * J1q - (q * q - k * k) ** 2 * J0p * J1q
+        return float(((left - 4.0 * k * k * p * q * J1p * J0q) / (q * k**4)).real)  # over q, it has no imaginary part
+
+    # The lowest branch comes first: from the Rayleigh speed at least, up to the bar speed.
+    scan = np.linspace(0.55 * bar, 1.001 * bar, 200)
+    values = [equation(c) for c in scan]
+    first = next(i for i in range(len(scan) - 1) if values[i] * values[i + 1] < 0.0)
+    return float(brentq(equation, scan[first], scan[first + 1], xtol=1e-9))  # type: ignore[arg-type]
+
+
+@case(
+    group="waves",
+    title="Longitudinal waves of a round bar slow down as they shorten",
+    reference="Pochhammer and Chree, the root of their equation: Graff, Wave Motion in Elastic Solids (1975), "
+    "section 8.2; c / c0 = 0.991 at a / wavelength = 0.1, nu = 0.3: Davies, Phil. Trans. R. Soc. A 240 (1948) 375.",
+    catches=("bulk_modulus_low",),
+)
+def pochhammer(setup: Setup) -> list[Row]:
+    """Bar of radius a = 10 mm and length 5 a between planes of symmetry, one or three half waves in it."""
+    meshes = setup.choose(((4, 20), (6, 30)), ((4, 20), (6, 30), (8, 40)))
+    a, length, E, nu, rho = 0.01, 0.05, 200e9, 0.3, 7800.0
+    c0 = math.sqrt(E / rho)
+    exact = {n: _pochhammer(a, n * math.pi / length, E, nu, rho) for n in (1, 3)}
+    speeds = []
+    for section, axial in meshes:
+        result = setup.run(setup.scene("ringing_bar", section=section, axial=axial, duration=120e-6, rows=600))
+        speeds.append(_phase_speeds(result, length, exact, "along"))
+    why = "dispersion of the mesh, with {} cells in the wavelength and six across the core of the section"
+    return [
+        Row(
+            quantity=f"c / c0 at a / wavelength = {n * a / (2.0 * length):.1f}",
+            exact=exact[n] / c0,
+            measured=tuple(found[k] / c0 for found in speeds),
+            unit="-",
+            tolerance=tolerance,
+            why=why.format(2 * meshes[-1][1] // n),
+            sizes=tuple(length / axial for _, axial in meshes),
+            least_order=1.8,
+        )
+        for k, (n, tolerance) in enumerate(((1, 6e-4), (3, 9e-3)))
+    ]
+
+
+def _timoshenko(k: float, h: float, E: float, nu: float, rho: float) -> float:
+    """Phase speed of bending waves in a beam of square section [m/s], the lower root of Timoshenko's equation.
+
+    The shear coefficient is 5 (1 + nu) / (6 + 5 nu), by which Timoshenko matched the plane solution.
+
+    Args:
+        k: wavenumber [1/m].
+        h: side of the section [m].
+        E, nu, rho: of the beam [Pa], [-], [kg/m^3].
+    """
+    shear = 5.0 * (1.0 + nu) / (6.0 + 5.0 * nu) * E / (2.0 * (1.0 + nu))
+    r2 = h * h / 12.0  # radius of gyration, squared
+    # r2 rho^2 / shear c^4 - rho (1 + 1 / (r2 k^2) + E / shear) r2 c^2 + E r2 = 0, over r2
+    b = 1.0 + 1.0 / (r2 * k * k) + E / shear
+    return math.sqrt((b - math.sqrt(b * b - 4.0 * E / shear)) * shear / (2.0 * rho))
+
+
+@case(
+    group="waves",
+    title="Bending waves of a beam travel at the speeds of Timoshenko's theory",
+    reference="Timoshenko, Phil. Mag. 43 (1922) 125, shear coefficient 5 (1 + nu) / (6 + 5 nu); Kaneko, J. Phys. D 8 "
+    "(1975) 1927.",
+    catches=("shear_modulus_low",),
+)
+def timoshenko_wave(setup: Setup) -> list[Row]:
+    """Beam of side h = 20 mm and length 5 h between planes of antisymmetry, one or three half waves in it."""
+    meshes = setup.choose(((4, 40), (6, 60)), ((4, 40), (6, 60), (8, 80)))
+    h, length, E, nu, rho = 0.02, 0.1, 200e9, 0.3, 7800.0
+    c0 = math.sqrt(E / rho)
+    exact = {n: _timoshenko(n * math.pi / length, h, E, nu, rho) for n in (1, 3)}
+    speeds = []
+    for section, axial in meshes:
+        scene = setup.scene(
+            "ringing_bar",
+            **{"motion": "across", "shape": "square", "thickness": h, "length": length},
+            **{"section": section, "axial": axial, "duration": 0.9e-3, "rows": 450},
+        )
+        speeds.append(_phase_speeds(setup.run(scene), length, exact, "across"))
+    return [
+        Row(
+            quantity=f"c / c0 at k h = {n * math.pi * h / length:.2f}",
+            exact=exact[n] / c0,
+            measured=tuple(found[k] / c0 for found in speeds),
+            unit="-",
+            tolerance=2.5e-3,
+            why="0.2 % of stiffness of the mesh, six cells through the depth, and 0.2 % of the theory itself",
+            sizes=tuple(length / axial for _, axial in meshes),
+        )
+        for k, n in enumerate((1, 3))
+    ]
+
+
+@case(
+    group="waves",
+    title="An interface of two metals sends back (Z2 - Z1) / (Z1 + Z2) of a pulse and lets 2 Z2 / (Z1 + Z2) pass",
+    reference="Graff, Wave Motion in Elastic Solids (1975), section 2.4; Z = rho c.",
+    catches=("one_density",),
+)
+def impedance_step(setup: Setup) -> list[Row]:
+    """Steel, then aluminium, 0.5 m each, no Poisson effect; pulse of 50 us, probes 0.2 m from the interface."""
+    counts = setup.choose((50, 100, 200), (50, 100, 200, 400))
+    c = math.sqrt(200e9 / 7800.0)
+    Z, Z_far = 7800.0 * c, math.sqrt(70e9 * 2700.0)
+    back, on = [], []
+    for count in counts:
+        result = setup.run(setup.scene("two_metal_bar", axial=count))
+        near, far = -_stress(result, 0.3), -_stress(result, 0.7)
+        arriving = result.time < 0.5 / c + 25e-6  # the pulse's middle meets the interface
+        back.append(-_peak(-near[~arriving]) / _peak(near[arriving]))
+        on.append(_peak(far) / _peak(near[arriving]))
+    exact = {"sent back": (Z_far - Z) / (Z + Z_far), "let through": 2.0 * Z_far / (Z + Z_far)}
+    return [
+        Row(
+            quantity=f"share of the stress that is {name}",
+            exact=exact[name],
+            measured=tuple(measured),
+            unit="-",
+            tolerance=2e-4,
+            why="dispersion of the mesh, with 100 cells in the pulse, alike before and behind the interface",
+            sizes=tuple(0.5 / count for count in counts),
+        )
+        for name, measured in (("sent back", back), ("let through", on))
+    ]
