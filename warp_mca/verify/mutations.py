@@ -44,4 +44,22 @@ MUTATIONS: dict[str, Mutation] = {
         "Fn = -k * gap",
         "Fn = -wp.float64(0.1) * k * gap",
     ),
+    "gauss_points_moved": Mutation(
+        "the Gauss points lie at 0.5 in place of 0.577",
+        "kernels/hex8.py",
+        "_GAUSS = 0.5773502691896257",
+        "_GAUSS = 0.5",
+    ),
+    "rotation_to_first_order": Mutation(
+        "displacements are turned back without their own part",
+        "kernels/hex8.py",
+        "u[a] + Wt * (X[a] + u[a])",
+        "u[a] + Wt * X[a]",
+    ),
+    "forces_not_turned_back": Mutation(
+        "forces stay in the element's own frame",
+        "kernels/hex8.py",
+        "= f[a] + W * f[a]",
+        "= f[a]",
+    ),
 }
