@@ -62,4 +62,28 @@ MUTATIONS: dict[str, Mutation] = {
         "= f[a] + W * f[a]",
         "= f[a]",
     ),
+    "rate_force_reversed": Mutation(
+        "centrifugal forces of the rigid chain have the wrong sign",
+        "warp_mca/chain.py",
+        "(upper.T - upper) @ theta_dot**2",
+        "(upper - upper.T) @ theta_dot**2",
+    ),
+    "hand_off_spins_backwards": Mutation(
+        "nodes take the link's angular velocity with the wrong sign at hand-off",
+        "warp_mca/handoff.py",
+        "np.cross(self.angular_velocity, r)",
+        "np.cross(r, self.angular_velocity)",
+    ),
+    "vibration_energy_doubled": Mutation(
+        "hand-back doubles the kinetic energy that does not fit",
+        "warp_mca/handback.py",
+        "vibration_energy=float(0.5 * left)",
+        "vibration_energy=float(left)",
+    ),
+    "far_links_weightless": Mutation(
+        "a link of the rigid chain does not carry the weight of the links beyond it",
+        "warp_mca/chain.py",
+        "return perpendicular(self._turn(theta, self._moments[0])) @ np.asarray(self.gravity)",
+        "return perpendicular(self._turn(theta, self._mass[:, None] * self._centre)) @ np.asarray(self.gravity)",
+    ),
 }
