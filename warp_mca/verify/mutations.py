@@ -86,4 +86,10 @@ MUTATIONS: dict[str, Mutation] = {
         "return perpendicular(self._turn(theta, self._moments[0])) @ np.asarray(self.gravity)",
         "return perpendicular(self._turn(theta, self._mass[:, None] * self._centre)) @ np.asarray(self.gravity)",
     ),
+    "pressure_varies_within_elements": Mutation(
+        "each integration point adds a tenth of its own pressure to the element's one",
+        "kernels/hex8.py",
+        "S = R(2.0) * G * strain",
+        "S = R(2.0) * G * strain + R(0.1) * K * inverse * trace * wp.identity(n=3, dtype=R)",
+    ),
 }
