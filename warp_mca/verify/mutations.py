@@ -92,4 +92,16 @@ MUTATIONS: dict[str, Mutation] = {
         "S = R(2.0) * G * strain",
         "S = R(2.0) * G * strain + R(0.1) * K * inverse * trace * wp.identity(n=3, dtype=R)",
     ),
+    "joint_impulse_halved": Mutation(
+        "the impulse of a joint is counted by half",
+        "kernels/constraint.py",
+        "impulse_out[k] + mass[i] * (v - v_out[i])",
+        "impulse_out[k] + wp.float64(0.5) * mass[i] * (v - v_out[i])",
+    ),
+    "shown_pressure_halved": Mutation(
+        "the pressure in the stress that is shown is halved",
+        "kernels/output.py",
+        "wp.float32(law[m, 0] * dilation / volume)",
+        "wp.float32(R(0.5) * law[m, 0] * dilation / volume)",
+    ),
 }
