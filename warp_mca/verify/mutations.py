@@ -104,4 +104,10 @@ MUTATIONS: dict[str, Mutation] = {
         "wp.float32(law[m, 0] * dilation / volume)",
         "wp.float32(R(0.5) * law[m, 0] * dilation / volume)",
     ),
+    "hinge_forgets_masses": Mutation(
+        "two tied nodes take their plain mean motion in place of the mass-weighted one",
+        "kernels/constraint.py",
+        "return (m_a * a + m_b * b) / (m_a + m_b)",
+        "return wp.float64(0.5) * (a + b)",
+    ),
 }

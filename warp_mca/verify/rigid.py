@@ -335,3 +335,77 @@ def spinning_rod(setup: Setup) -> list[Row]:
             why="higher modes, of which four periods of the lowest are not whole ones",
         ),
     ]
+
+
+@case(
+    group="rigid",
+    title="A stiff double pendulum of finite elements swings as the chain of rigid links does",
+    reference="The rigid chain, verified by itself above.",
+    catches=("hinge_forgets_masses", "rate_force_reversed"),
+)
+def fe_double_pendulum(setup: Setup) -> list[Row]:
+    """Links of 1 m x 0.2 m x 0.1 m, 1000 and 2000 kg/m^3, E = 200 MPa and four times that; 0.4 s under gravity."""
+    from scipy.integrate import simpson
+
+    from warp_mca.chain import Chain, mesh_link
+    from warp_mca.model import nodal_masses
+    from warp_mca.rigid import swing
+    from warp_mca.simulation import mesh
+
+    moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))
+    theta, theta_dot, span, length = np.array([1.2, 0.4]), np.array([-1.0, 3.0]), 0.4, 1.0
+    start = {"theta_OA": theta[0], "theta_AB": theta[1], "rate_OA": theta_dot[0], "rate_AB": theta_dot[1]}
+    scenes = [setup.scene("double_pendulum", E=E, length=length, duration=span, **start) for E in moduli]
+    meshes = mesh(scenes[0])
+    masses = nodal_masses(scenes[0], meshes)
+    links = [mesh_link(name, meshes[name].points, masses[name], hinge_out=(length, 0.0)) for name in ("OA", "AB")]
+    chain = Chain(tuple(links), gravity=(0.0, -9.8))
+    rigid = swing(chain, theta, theta_dot, lambda t, _: span - t, t_max=2.0 * span)
+
+    def travel(index: int) -> Array:
+        """Displacement of the far end of a link of the rigid chain [m], shape (2,), float64."""
+        end = chain.at(index, (length, 0.0), rigid.theta, rigid.theta_dot)[0]
+        return end - chain.at(index, (length, 0.0), theta, theta_dot)[0]
+
+    tip, hinge, kinetic = [], [], []
+    for scene in scenes:
+        result = setup.run(scene, meshes)
+        moved = {key: float(simpson(result[key], x=result.time)) for key in ("tip_vx", "tip_vy", "plate_vx")}
+        tip.append(math.hypot(*(np.array([moved["tip_vx"], moved["tip_vy"]]) - travel(1))))
+        hinge.append(moved["plate_vx"])
+        kinetic.append(float(result["E_kinetic"][-1]))
+    share = moduli[1] / moduli[-1]
+    sizes = tuple(1.0 / math.sqrt(E) for E in moduli)
+    why = "the links bend and stretch in proportion to 1 / E, and so by order 2 in the inverse of the speed of waves"
+    return [
+        Row(
+            quantity="distance of the tip from that of the rigid chain",
+            exact=0.0,
+            measured=tuple(tip),
+            unit="m",
+            scale=length,
+            tolerance=3e-4 * share,
+            why=why,
+            sizes=sizes,
+            least_order=1.7,
+        ),
+        Row(
+            quantity="displacement of hinge A along x",
+            exact=float(travel(0)[0]),
+            measured=tuple(hinge),
+            unit="m",
+            tolerance=3e-4 * share,
+            why=why,
+            sizes=sizes,
+        ),
+        Row(
+            quantity="kinetic energy at the end",
+            exact=chain.kinetic_energy(rigid.theta, rigid.theta_dot),
+            measured=tuple(kinetic),
+            unit="J",
+            tolerance=3e-4 * share,
+            why=why,
+            sizes=sizes,
+            least_order=1.7,
+        ),
+    ]
