@@ -201,7 +201,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
             jz = i + 2 * j
             det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             strain, N, d = deviator(grad)
-            S = R(2.0) * G * strain
+            S = (R(2.0) * G) * strain
             if wp.static(plastic):
                 eps_p = mat33()
                 p = R(0.0)
@@ -222,7 +222,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
         f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz))
         count = conn.shape[1]
         for a in range(8):
-            force_out[slot + a * count + e] = f[a] + W * f[a]
+            force_out[slot + a * count + e] = W * f[a] + f[a]
 
     return hex8_finite_force
 

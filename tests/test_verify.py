@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from warp_mca.verify import Setup, cases
 from warp_mca.verify.case import Row
 from warp_mca.verify.mutations import MUTATIONS
 from warp_mca.verify.report import lines
-from warp_mca.verify.runner import outcome
+from warp_mca.verify.runner import outcome, verify
 
 ROOT = Path(__file__).parent.parent
 
@@ -18,7 +19,18 @@ ROOT = Path(__file__).parent.parent
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
 def test_case_is_met(case):
     found = outcome(case, Setup())
+    if found.skipped:
+        pytest.skip(found.skipped)
     assert found.met, "\n".join(lines(found))
+
+
+def test_case_without_the_module_it_needs_is_skipped_not_failed(tmp_path, capsys, monkeypatch):
+    lacking = dataclasses.replace(cases(["chain_energy"])[0], needs="no_such_module")
+    monkeypatch.setattr("warp_mca.verify.runner.cases", lambda names: [lacking])
+    assert verify(out=tmp_path)[0].skipped
+    said, page = capsys.readouterr().out, (tmp_path / "verification.md").read_text()
+    assert "skipped, it needs no_such_module (pip install no_such_module)" in said
+    assert "0 of 0 cases met, 1 skipped" in said and "Skipped, it needs no_such_module" in page
 
 
 def test_deliberate_errors_can_be_made():

@@ -110,6 +110,7 @@ class Case:
         reference: where the known answer comes from.
         measure: runs it.
         catches: deliberate errors in the engine that it was seen to catch, names out of `mutations.MUTATIONS`.
+        needs: a module that it compares with and that may be missing; the case is skipped then.
     """
 
     name: str
@@ -118,6 +119,7 @@ class Case:
     reference: str
     measure: Callable[[Setup], list[Row]]
     catches: tuple[str, ...] = ()
+    needs: str | None = None
 
 
 CASES: dict[str, Case] = {}
@@ -132,14 +134,16 @@ def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: floa
 
 
 def case(
-    *, group: str, title: str, reference: str, catches: tuple[str, ...] = ()
+    *, group: str, title: str, reference: str, catches: tuple[str, ...] = (), needs: str | None = None
 ) -> Callable[[Callable[[Setup], list[Row]]], Callable[[Setup], list[Row]]]:
     """Register the function below as the case of its name."""
 
     def register(measure: Callable[[Setup], list[Row]]) -> Callable[[Setup], list[Row]]:
         name: str = measure.__name__  # type: ignore[attr-defined]
         assert name not in CASES, name
-        CASES[name] = Case(name=name, group=group, title=title, reference=reference, measure=measure, catches=catches)
+        CASES[name] = Case(
+            name=name, group=group, title=title, reference=reference, measure=measure, catches=catches, needs=needs
+        )
         return measure
 
     return register

@@ -19,6 +19,7 @@ class Outcome:
         rows: what it gave; empty when it failed.
         failure: why it gave nothing, or None.
         wall: seconds it took.
+        skipped: why it was not run after all, or None.
     """
 
     case: Case
@@ -26,6 +27,7 @@ class Outcome:
     rows: tuple[Row, ...]
     failure: str | None
     wall: float
+    skipped: str | None = None
 
     @property
     def met(self) -> bool:
@@ -57,6 +59,8 @@ HEAD = ["quantity", "exact", "measured, coarse to fine", "error", "order", "tole
 def lines(outcome: Outcome) -> list[str]:
     """What the console shows of one case."""
     case, setup = outcome.case, outcome.setup
+    if outcome.skipped:
+        return [f"{case.group}/{case.name}: {case.title}: {outcome.skipped}"]
     verdict = "met" if outcome.met else "NOT MET"
     shown = [
         f"{case.group}/{case.name} ({setup.element}, {setup.precision}): {case.title}: {verdict}, {outcome.wall:.1f} s"
@@ -92,6 +96,8 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
 
     case = outcomes[0].case
     text = [f"### {case.name}", "", f"{case.title}. {case.reference}", ""]
+    if all(outcome.skipped for outcome in outcomes):
+        return [*text, f"{outcomes[0].skipped}.".capitalize(), ""]
     text += ["| element | precision | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 2) + "|"]
     reasons: dict[str, str] = {}
     for outcome in outcomes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 from warp_mca.elements import ELEMENTS
@@ -15,7 +16,10 @@ from warp_mca.verify.report import Outcome, lines, write
 
 
 def outcome(case: Case, setup: Setup) -> Outcome:
-    """Run one case; what it raises is its failure."""
+    """Run one case; what it raises is its failure. One that needs a module which is not installed is skipped."""
+    if case.needs and find_spec(case.needs) is None:
+        skipped = f"skipped, it needs {case.needs} (pip install {case.needs})"
+        return Outcome(case=case, setup=setup, rows=(), failure=None, wall=0.0, skipped=skipped)
     begun = time.perf_counter()
     failure, rows = None, ()
     try:
@@ -56,10 +60,12 @@ def verify(
             found = outcome(case, Setup(device=device, precision=precision, element=item, level=level))
             print("\n".join(lines(found)), flush=True)
             outcomes.append(found)
-    failed = [f"{o.case.name} ({o.setup.element})" for o in outcomes if not o.met]
+    failed = [f"{o.case.name} ({o.setup.element})" for o in outcomes if not o.met and not o.skipped]
+    done = [o for o in outcomes if not o.skipped]
     rows = sum(len(o.rows) for o in outcomes)
     wall = sum(o.wall for o in outcomes)
-    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} cases met, {rows} quantities, {wall:.0f} s")
+    left_out = f", {len(outcomes) - len(done)} skipped" if len(done) < len(outcomes) else ""
+    print(f"{len(done) - len(failed)} of {len(done)} cases met{left_out}, {rows} quantities, {wall:.0f} s")
     if out is not None:
         command = f"warp-mca verify --level {level} --device {device} --precision {precision}"
         for file in write(out, outcomes, f"Written by `{command}`."):

@@ -1,0 +1,69 @@
+"""Two elastic links on hinges swing under gravity, already in motion: nearly as rigid ones do, if they are stiff."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+import warp_mca as mca
+from warp_mca import Param
+from warp_mca.chain import link_axes, perpendicular
+
+PRESETS: dict[str, dict[str, object]] = {"quick": {}, "stiff": {"E": 2e9}}
+
+
+def build(
+    *,
+    theta_OA: Annotated[float, Param("initial angle of OA from the downward vertical", unit="rad")] = 1.2,
+    theta_AB: Annotated[float, Param("initial angle of AB from the downward vertical", unit="rad")] = 0.4,
+    rate_OA: Annotated[float, Param("initial rate of that angle of OA", unit="rad/s")] = -1.0,
+    rate_AB: Annotated[float, Param("initial rate of that angle of AB", unit="rad/s")] = 3.0,
+    gravity: Annotated[float, Param("acceleration of gravity, along -y", unit="m/s^2")] = 9.8,
+    length: Annotated[float, Param("length of each link", unit="m", low=0.0, exclusive=True)] = 1.0,
+    depth: Annotated[float, Param("depth of the links, along y", unit="m", low=0.0, exclusive=True)] = 0.2,
+    width: Annotated[float, Param("width of the links, along z", unit="m", low=0.0, exclusive=True)] = 0.1,
+    E: Annotated[float, Param("Young's modulus", unit="Pa", low=0.0, exclusive=True)] = 200e6,
+    nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.3,
+    rho_OA: Annotated[float, Param("density of OA", unit="kg/m^3", low=0.0, exclusive=True)] = 1000.0,
+    rho_AB: Annotated[float, Param("density of AB", unit="kg/m^3", low=0.0, exclusive=True)] = 2000.0,
+    duration: Annotated[float, Param("simulated time", unit="s", low=0.0, exclusive=True)] = 0.4,
+    samples: Annotated[int, Param("rows of the history", low=1)] = 1000,
+    axial: Annotated[int, Param("cells along each link", low=1)] = 10,
+    deep: Annotated[int, Param("cells along the depth, even", low=2)] = 2,
+    wide: Annotated[int, Param("cells along the width", low=1)] = 1,
+) -> mca.Scene:
+    """Angles as in `RigidPhase`; hinges lie in the middle of the links' end faces. plate_vx is that of hinge A."""
+    box = mca.Box(size=(length, depth, width), divisions=(axial, deep, wide), origin=(0.0, -0.5 * depth, -0.5 * width))
+    rates = (rate_OA, rate_AB)
+    arm = length * link_axes(np.array(theta_OA))[0]
+    vx, vy = -rate_OA * perpendicular(arm)
+    places = ((0.0, 0.0, 0.0), (float(arm[0]), float(arm[1]), 0.0))
+    speeds = ((0.0, 0.0, 0.0), (float(vx), float(vy), 0.0))
+    bodies = tuple(
+        mca.Body(
+            name=name,
+            geometry=box,
+            material=mca.Elastic(E=E, nu=nu, rho=rho),
+            position=place,
+            rotation=(0.0, 0.0, -theta - 0.5 * math.pi),
+            velocity=speed,
+            angular_velocity=(0.0, 0.0, -rate),
+        )
+        for name, rho, place, theta, speed, rate in zip(
+            ("OA", "AB"), (rho_OA, rho_AB), places, (theta_OA, theta_AB), speeds, rates, strict=True
+        )
+    )
+    return mca.Scene(
+        name="double_pendulum",
+        bodies=bodies,
+        joints=(
+            mca.Revolute(name="O", body="OA", at=(0.0, 0.0, 0.0)),
+            mca.Revolute(name="A", body="OA", at=(length, 0.0, 0.0), other="AB"),
+        ),
+        gravity=(0.0, -gravity, 0.0),
+        impact=mca.ImpactPhase(duration=duration, output_interval=duration / samples),
+        tip=mca.Point(body="AB", at=(length, 0.0, 0.0)),
+        target=mca.Point(body="OA", at=(length, 0.0, 0.0)),
+    )
