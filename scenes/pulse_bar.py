@@ -10,7 +10,7 @@ from warp_mca import Param
 
 PRESETS: dict[str, dict[str, object]] = {"quick": {}, "fine": {"axial": 800, "section": 2}}
 
-_TABLE = 200  # entries of the table of the driven end's velocity
+_TABLE = 800  # entries of the table of the driven end's velocity
 
 
 def build(

@@ -35,13 +35,13 @@ def _peak(curve: Array) -> float:
     catches=("bulk_modulus_low", "elastic_shear_soft"),
 )
 def bar_wave(setup: Setup) -> list[Row]:
-    """Square bar, 4 mm wide, nu = 0.3; pulse of 80 us, 0.4 m; probes 0.4 m apart."""
+    """Square bar, 2 mm wide, nu = 0.3; pulse of 80 us, 0.4 m; probes 0.4 m apart."""
     counts = setup.choose((50, 100, 200), (50, 100, 200, 400))
     c, v, near, far = math.sqrt(200e9 / 7800.0), 1.0, 0.2, 0.6
     exact = 7800.0 * c * v
     centroid, half, peak = [], [], []
     for count in counts:
-        result = setup.run(setup.scene("pulse_bar", axial=count, v=v))
+        result = setup.run(setup.scene("pulse_bar", axial=count, v=v, side=0.002))
         curves = [-_stress(result, x) for x in (near, far)]
         mean = [float((result.time * s).sum() / s.sum()) for s in curves]
         rise = [float(crossings(result.time, s, 0.5 * exact)[0]) for s in curves]
@@ -64,7 +64,7 @@ def bar_wave(setup: Setup) -> list[Row]:
             measured=tuple(half),
             unit="m/s",
             tolerance=5e-4,
-            why="dispersion of the mesh with 80 cells in the pulse; that of lateral inertia is 5e-5",
+            why="dispersion of the mesh with 80 cells in the pulse; that of lateral inertia is 1e-5",
             sizes=sizes,
             least_order=1.8,
         ),
@@ -88,7 +88,7 @@ def bar_wave(setup: Setup) -> list[Row]:
     catches=("hardening_is_tangent",),
 )
 def plastic_wave(setup: Setup) -> list[Row]:
-    """Square bar, 4 mm wide, nu = 0.3, sigma_y = 400 MPa, E_t = E / 9, driven at three times the yield velocity."""
+    """Square bar, 2 mm wide, nu = 0.3, sigma_y = 400 MPa, E_t = E / 9, driven at three times the yield velocity."""
     counts = setup.choose((160, 320), (160, 320, 640))
     E, rho, sigma_y, E_t, length, rise = 200e9, 7800.0, 400e6, 200e9 / 9.0, 0.4, 40e-6
     c, c_p = math.sqrt(E / rho), math.sqrt(E_t / rho)
@@ -100,14 +100,16 @@ def plastic_wave(setup: Setup) -> list[Row]:
         scene = setup.scene(
             "pulse_bar",
             **{"drive": "kept", "rise": rise, "v": 3.0 * v_y, "sigma_y": sigma_y, "E_t": E_t},
-            **{"length": length, "axial": count, "duration": 125e-6},
+            **{"side": 0.002, "length": length, "axial": count, "duration": 125e-6},
         )
         result = setup.run(scene)
         time = result.time
         between = (time > middle / c + 0.75 * rise) & (time < middle / c_p + 0.125 * rise)
         precursor.append(float(-_stress(result, middle)[between].mean()))
         behind.append(float(-_stress(result, near)[time > near / c_p + 1.25 * rise].mean()))
-        arrival = [float(crossings(time, -_stress(result, x), 0.5 * (sigma_y + plateau))[0]) for x in (near, far)]
+        levels = [sigma_y + share * (plateau - sigma_y) for share in (0.3, 0.5, 0.7)]  # ripples shift each a little
+        curves = [-_stress(result, x) for x in (near, far)]
+        arrival = [float(np.mean([crossings(time, s, level)[0] for level in levels])) for s in curves]
         front.append((far - near) / (arrival[1] - arrival[0]))
     sizes = tuple(length / count for count in counts)
     return [
@@ -116,7 +118,7 @@ def plastic_wave(setup: Setup) -> list[Row]:
             exact=sigma_y,
             measured=tuple(precursor),
             unit="Pa",
-            tolerance=1e-3,
+            tolerance=4e-4,
             why="the foot of the plastic wave, smeared by lateral inertia, begins within the mean",
             sizes=sizes,
         ),
@@ -125,8 +127,8 @@ def plastic_wave(setup: Setup) -> list[Row]:
             exact=plateau,
             measured=tuple(behind),
             unit="Pa",
-            tolerance=1e-3,
-            why="lateral inertia of the bar, 4 mm wide: a bar of 2 mm leaves a quarter of it",
+            tolerance=3e-4,
+            why="lateral inertia of the bar, 2 mm wide: one of 4 mm has three times as much",
             sizes=sizes,
         ),
         Row(
@@ -134,8 +136,8 @@ def plastic_wave(setup: Setup) -> list[Row]:
             exact=c_p,
             measured=tuple(front),
             unit="m/s",
-            tolerance=5e-3,
-            why="the front, 70 mm long, is smeared over a few cells and bar widths between the probes, 100 mm apart",
+            tolerance=2e-3,
+            why="the front is smeared over cells that it crosses, 80 between the probes",
             sizes=sizes,
         ),
     ]
