@@ -1,9 +1,6 @@
-"""Owns the cases of group elements: single elements and small patches, then the vibration of bars and beams."""
+"""Owns the cases of elements by themselves: single ones and small patches, displaced at will."""
 
 from __future__ import annotations
-
-import dataclasses
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +8,6 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.verify.case import Row, Setup, case
-from warp_mca.verify.vibration import fitted_frequencies, timoshenko_frequencies
 
 Array = NDArray[np.float64]
 
@@ -32,7 +28,6 @@ PATCH = np.array(
     dtype=np.int32,
 )  # fmt: skip
 MATERIAL = mca.Elastic(E=1e6, nu=0.25, rho=1000.0)  # of the patch test in its source, with a density besides
-ALUMINIUM = mca.Elastic(E=70e9, nu=0.0, rho=2700.0)  # of the bars
 EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}
 
 
@@ -231,112 +226,3 @@ def simple_shear(setup: Setup) -> list[Row]:
             for name, measured, exact, unit, limit, reason in values
         ]
     return rows
-
-
-@case(
-    group="elements",
-    title="A bar clamped at one end vibrates along its axis at c / 4 L",
-    reference="One-dimensional theory, exact without Poisson effect: f = sqrt(E / rho) / (4 L).",
-    catches=("pressure_halved",),
-)
-def bar_vibration(setup: Setup) -> list[Row]:
-    """L = 1 m, 20 mm x 20 mm, E = 70 GPa, rho = 2700 kg/m^3, nu = 0; sudden acceleration along x, four periods."""
-    counts = setup.choose((8, 16), (8, 16, 32))
-    c = ALUMINIUM.wave_speeds["bar"]
-    exact = c / 4.0
-    bar = {"length": 1.0, "depth": 0.02, "width": 0.01, "deep": 2, "sag": 0.0, "samples": 400}
-    bar |= {"push": 1e-4 * c**2, "duration": 4.0 / exact}  # a strain of 1e-4 at the root
-    measured = []
-    for count in counts:
-        result = setup.run(setup.scene("cantilever", axial=count, **bar))
-        modes = tuple((2 * k + 1) * exact for k in range(5))
-        measured.append(float(fitted_frequencies(result.time, result["tip_vx"], modes)[0]))
-    return [
-        Row(
-            quantity="lowest frequency",
-            exact=exact,
-            measured=tuple(measured),
-            unit="Hz",
-            tolerance=1.1 * (0.5 * np.pi / counts[-1]) ** 2 / 24.0,
-            why="lumped mass lowers it by (k h)^2 / 24 with k = pi / (2 L), and a tenth of that for the reading",
-            sizes=tuple(1.0 / count for count in counts),
-            least_order=1.8,
-        )
-    ]
-
-
-def _bending(setup: Setup, mesh: tuple[int, int], nu: float, periods: float, **more: Any) -> tuple[float, float]:
-    """Measured and exact lowest bending frequency [Hz] of a bar of 1 m with `mesh` cells along length and depth."""
-    length, depth = 1.0, more.pop("depth")
-    bar = dataclasses.replace(ALUMINIUM, nu=nu)
-    exact = timoshenko_frequencies(
-        length=length,
-        depth=depth,
-        E=bar.E,
-        G=bar.shear_modulus,
-        rho=bar.rho,
-        shear=5.0 * (1.0 + nu) / (6.0 + 5.0 * nu),
-        count=3,
-    )
-    sag = 1e-3 * 8.0 * bar.E * depth**2 / (12.0 * bar.rho * length**3)  # a static deflection of L / 1000
-    shape = {"length": length, "depth": depth, "width": 0.25 * depth, "axial": mesh[0], "deep": mesh[1], "nu": nu}
-    scene = setup.scene("cantilever", sag=sag, duration=periods / exact[0], samples=400, **shape, **more)
-    result = setup.run(scene)
-    return float(fitted_frequencies(result.time, result["tip_vy"], exact)[0]), exact[0]
-
-
-@case(
-    group="elements",
-    title="A cantilever vibrates in bending as Timoshenko's beam",
-    reference="Timoshenko, Phil. Mag. 41 (1921) 744, with shear coefficient 5 / 6, exact for nu = 0.",
-    catches=("pressure_halved",),
-)
-def cantilever_vibration(setup: Setup) -> list[Row]:
-    """L = 1 m, depth 0.1 m, half width 25 mm, E = 70 GPa, rho = 2700 kg/m^3, nu = 0; sudden weight, two periods."""
-    meshes = setup.choose(((20, 2), (40, 4)), ((20, 2), (40, 4), (80, 8)))
-    found = [_bending(setup, mesh, 0.0, 2.0, depth=0.1) for mesh in meshes]
-    measured, exact = tuple(f for f, _ in found), found[0][1]
-    coarse, fine = measured[-2:]
-    return [
-        Row(
-            quantity="lowest frequency",
-            exact=exact,
-            measured=measured,
-            unit="Hz",
-            tolerance=1.1 * 0.0052 * (40.0 / meshes[-1][0]) ** 2,
-            why="shear locking adds (G / E) (a / d)^2 / 2 for cells of length a in a depth d, one mean dilatation in "
-            "each of n cells takes 1 / (6 n^2): 1.56 - 1.04 = 0.52 % with 40 x 4 cells; and a tenth of that",
-            sizes=tuple(1.0 / mesh[0] for mesh in meshes),
-            least_order=1.7,
-        ),
-        Row(
-            quantity="lowest frequency, extrapolated from the two finest meshes with order 2",
-            exact=exact,
-            measured=((4.0 * fine - coarse) / 3.0,),
-            unit="Hz",
-            tolerance=0.001 if setup.level == "quick" else 0.0003,
-            why="terms of order 4, which fall to a sixteenth with the mesh, and the root, which beam theory simplifies",
-        ),
-    ]
-
-
-@case(
-    group="elements",
-    title="A nearly incompressible cantilever does not lock",
-    reference="Timoshenko's beam with shear coefficient 5 (1 + nu) / (6 + 5 nu) (Kaneko, J. Phys. D 8 (1975) 1927).",
-    catches=("pressure_varies_within_elements",),
-)
-def near_incompressible_bending(setup: Setup) -> list[Row]:
-    """L = 1 m, depth 0.2 m, half width 50 mm, nu = 0.499; the root may contract: its midline alone is held along y."""
-    meshes = setup.choose(((10, 2), (20, 4)), ((10, 2), (20, 4), (40, 8)))
-    found = [_bending(setup, mesh, 0.499, 1.25, depth=0.2, clamp="midline") for mesh in meshes]
-    return [
-        Row(
-            quantity="lowest frequency, nu = 0.499",
-            exact=found[0][1],
-            measured=tuple(f for f, _ in found),
-            unit="Hz",
-            tolerance=0.005,
-            why="a root held on its midline alone yields, more on finer meshes; locking would add tens of per cent",
-        )
-    ]

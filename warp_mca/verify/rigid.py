@@ -1,4 +1,4 @@
-"""Owns the cases of group rigid: the chain of rigid links, its hand-off to finite elements, and spinning rods."""
+"""Owns the cases of the rigid phase: the chain of rigid links, and its hand-off to finite elements and back."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import warp_mca as mca
 from warp_mca.verify.case import Row, Setup, case
-from warp_mca.verify.vibration import fitted_frequencies
 
 if TYPE_CHECKING:
     from warp_mca.chain import Chain
@@ -100,7 +98,7 @@ def chain_mujoco(setup: Setup) -> list[Row]:
         2: (slender_chain(2, 9.8), np.array([0.5, 0.5]) * math.pi, np.zeros(2)),
         5: (crooked_chain(5, 9.8), np.array([1.2, 0.9, 0.3, -0.4, 0.8]), np.array([1.0, -2.0, 3.0, 0.0, -4.0])),
     }
-    substeps = setup.choose((4, 8, 16), (4, 8, 16, 32))
+    substeps = setup.choose((4, 8, 16), (2, 4, 8, 16))
     rows = []
     for count, (chain, theta, theta_dot) in chains.items():
         mine = free_swing(chain, theta, theta_dot)
@@ -112,7 +110,7 @@ def chain_mujoco(setup: Setup) -> list[Row]:
                 measured=tuple(float(np.abs(angles - mine.theta_t).max()) for angles in other),
                 unit="rad",
                 scale=1.0,
-                tolerance=1e-8,
+                tolerance=2e-9,
                 why="the other code's error, which falls with the fourth power of its time step",
                 sizes=tuple(1.0 / n for n in substeps),
                 least_order=3.7,
@@ -247,165 +245,3 @@ def vibration(points: Array) -> Array:
 def cross_z(r: Array, v: Array) -> Array:
     """z component of r x v for rows of r and v, shape (count,), float64."""
     return r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0]
-
-
-def along_rod(result: mca.Result, omega: float) -> tuple[Array, Array]:
-    """Positions of the probes [m], shape (probe_count,), and the Hann-weighted mean over the run of the stress along a
-    rod that turns with omega [rad/s] from the x axis [Pa], shape (probe_count,), both float64."""
-    path = result.paths[0]
-    return path.position, np.hanning(len(result.time)) @ turned_stress(result, omega) / (0.5 * (len(result.time) - 1))
-
-
-def turned_stress(result: mca.Result, omega: float) -> Array:
-    """Stress along the rod at its probes [Pa], shape (row_count, probe_count), float64."""
-    stress = result.paths[0].stress.astype(np.float64)
-    c, s = np.cos(omega * result.time)[:, None], np.sin(omega * result.time)[:, None]
-    return c**2 * stress[..., 0] + s**2 * stress[..., 1] + 2.0 * c * s * stress[..., 3]
-
-
-@case(
-    group="rigid",
-    title="A spinning rod: stress by its centrifugal load, free and on a hinge, and the hinge's reaction",
-    reference="One-dimensional theory: stress rho omega^2 (L^2 - x^2) / 2 from the pivot, twice that at most after a "
-    "start free of stress; reaction m omega^2 L / 2.",
-    catches=("joint_impulse_halved", "shown_pressure_halved"),
-)
-def spinning_rod(setup: Setup) -> list[Row]:
-    """L = 1 m, 10 mm x 10 mm, E = 70 GPa, rho = 2700 kg/m^3, nu = 0, omega = c / (200 L); four axial periods.
-
-    A Hann window over four periods leaves out the lasting oscillation to some 1e-5. The reaction is a plain mean, over
-    whole periods.
-    """
-    E, rho, length, side = 70e9, 2700.0, 1.0, 0.01
-    omega = 0.005 * math.sqrt(E / rho) / length
-    load = rho * omega**2 * length**2
-    counts = setup.choose((20, 40), (20, 40, 80))
-    centre, greatest, quarter, reaction = [], [], [], []
-    rod = {"E": E, "rho": rho, "length": length, "side": side, "omega": omega, "periods": 4.0}
-    for count in counts:
-        free = setup.run(setup.scene("spinning_rod", hinged=False, axial=count, **rod))
-        middle = len(free.paths[0].position) // 2
-        centre.append(float(along_rod(free, omega)[1][middle]))
-        greatest.append(float(turned_stress(free, omega)[:, middle].max()))
-        hinged = setup.run(setup.scene("spinning_rod", hinged=True, axial=count, **rod))
-        # the hinge holds one line of nodes, so it yields and lengthens the periods: take whole ones of what is there
-        lowest = 0.25 * math.sqrt(E / rho) / length
-        wave = turned_stress(hinged, omega)[:, count // 4]
-        found = fitted_frequencies(hinged.time, wave, (lowest, 3.0 * lowest, 5.0 * lowest))
-        whole = {**rod, "periods": 4.0 * lowest / float(found[0])}
-        hinged = setup.run(setup.scene("spinning_rod", hinged=True, axial=count, **whole))
-        position, stress = along_rod(hinged, omega)
-        quarter.append(float(np.interp(0.25 * length, position, stress)))
-        turn = omega * hinged.summary["simulated_time"]
-        inward = -np.array([math.cos(0.5 * turn), math.sin(0.5 * turn), 0.0])
-        # a force that turns by `turn` gives an impulse along its middle direction, shorter by the chord over the arc
-        chord = 2.0 * math.sin(0.5 * turn) / omega
-        reaction.append(float(inward @ hinged.summary["joint_impulse"]["O"] / chord))
-    return [
-        Row(
-            quantity="free: mean stress at the centre",
-            exact=load / 8.0,
-            measured=tuple(centre),
-            unit="Pa",
-            tolerance=1e-4,
-            why="what the window leaves of the oscillation",
-        ),
-        Row(
-            quantity="free: greatest stress at the centre",
-            exact=load / 4.0,
-            measured=tuple(greatest),
-            unit="Pa",
-            tolerance=0.003,
-            why="ripples where waves meet, shorter than a few elements",
-        ),
-        Row(
-            quantity="hinged: mean stress at L / 4",
-            exact=load * 15.0 / 32.0,
-            measured=tuple(quarter),
-            unit="Pa",
-            tolerance=0.0005,
-            why="what the window leaves of the oscillation, and the hinge's disturbance of the stress at 25 widths",
-        ),
-        Row(
-            quantity="hinged: mean reaction",
-            exact=rho * side**2 * length * omega**2 * length / 2.0,
-            measured=tuple(reaction),
-            unit="N",
-            tolerance=0.0002,
-            why="higher modes, of which four periods of the lowest are not whole ones",
-        ),
-    ]
-
-
-@case(
-    group="rigid",
-    title="A stiff double pendulum of finite elements swings as the chain of rigid links does",
-    reference="The rigid chain, verified by itself above.",
-    catches=("hinge_forgets_masses", "rate_force_reversed"),
-)
-def fe_double_pendulum(setup: Setup) -> list[Row]:
-    """Links of 1 m x 0.2 m x 0.1 m, 1000 and 2000 kg/m^3, E = 200 MPa and four times that; 0.4 s under gravity."""
-    from scipy.integrate import simpson
-
-    from warp_mca.chain import Chain, mesh_link
-    from warp_mca.model import nodal_masses
-    from warp_mca.rigid import swing
-    from warp_mca.simulation import mesh
-
-    moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))
-    theta, theta_dot, span, length = np.array([1.2, 0.4]), np.array([-1.0, 3.0]), 0.4, 1.0
-    start = {"theta_OA": theta[0], "theta_AB": theta[1], "rate_OA": theta_dot[0], "rate_AB": theta_dot[1]}
-    scenes = [setup.scene("double_pendulum", E=E, length=length, duration=span, **start) for E in moduli]
-    meshes = mesh(scenes[0])
-    masses = nodal_masses(scenes[0], meshes)
-    links = [mesh_link(name, meshes[name].points, masses[name], hinge_out=(length, 0.0)) for name in ("OA", "AB")]
-    chain = Chain(tuple(links), gravity=(0.0, -9.8))
-    rigid = swing(chain, theta, theta_dot, lambda t, _: span - t, t_max=2.0 * span)
-
-    def travel(index: int) -> Array:
-        """Displacement of the far end of a link of the rigid chain [m], shape (2,), float64."""
-        end = chain.at(index, (length, 0.0), rigid.theta, rigid.theta_dot)[0]
-        return end - chain.at(index, (length, 0.0), theta, theta_dot)[0]
-
-    tip, hinge, kinetic = [], [], []
-    for scene in scenes:
-        result = setup.run(scene, meshes)
-        moved = {key: float(simpson(result[key], x=result.time)) for key in ("tip_vx", "tip_vy", "plate_vx")}
-        tip.append(math.hypot(*(np.array([moved["tip_vx"], moved["tip_vy"]]) - travel(1))))
-        hinge.append(moved["plate_vx"])
-        kinetic.append(float(result["E_kinetic"][-1]))
-    share = moduli[1] / moduli[-1]
-    sizes = tuple(1.0 / math.sqrt(E) for E in moduli)
-    why = "the links bend and stretch in proportion to 1 / E, and so by order 2 in the inverse of the speed of waves"
-    return [
-        Row(
-            quantity="distance of the tip from that of the rigid chain",
-            exact=0.0,
-            measured=tuple(tip),
-            unit="m",
-            scale=length,
-            tolerance=3e-4 * share,
-            why=why,
-            sizes=sizes,
-            least_order=1.7,
-        ),
-        Row(
-            quantity="displacement of hinge A along x",
-            exact=float(travel(0)[0]),
-            measured=tuple(hinge),
-            unit="m",
-            tolerance=3e-4 * share,
-            why=why,
-            sizes=sizes,
-        ),
-        Row(
-            quantity="kinetic energy at the end",
-            exact=chain.kinetic_energy(rigid.theta, rigid.theta_dot),
-            measured=tuple(kinetic),
-            unit="J",
-            tolerance=3e-4 * share,
-            why=why,
-            sizes=sizes,
-            least_order=1.7,
-        ),
-    ]

@@ -1,0 +1,195 @@
+"""Owns the cases of finite elements on hinges: spinning rods, and a double pendulum beside the rigid chain."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warp_mca as mca
+from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.vibration import fitted_frequencies
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+E, RHO, LENGTH, SIDE = 70e9, 2700.0, 1.0, 0.01  # of the spinning rod [Pa], [kg/m^3], [m], [m]
+PACE = math.sqrt(E / RHO) / LENGTH  # of waves along it [1/s]
+OMEGA = 0.005 * PACE  # [rad/s]
+
+
+def spin(setup: Setup, count: int, hinged: bool, periods: float) -> tuple[mca.Result, Array]:
+    """The run of a rod of `count` cells, and the stress along it at its probes [Pa], shape (row_count, count + 1)."""
+    rod = {"E": E, "rho": RHO, "length": LENGTH, "side": SIDE, "omega": OMEGA}
+    result = setup.run(setup.scene("spinning_rod", axial=count, hinged=hinged, periods=periods, **rod))
+    stress = result.paths[0].stress.astype(np.float64)
+    c, s = np.cos(OMEGA * result.time)[:, None], np.sin(OMEGA * result.time)[:, None]
+    return result, c**2 * stress[..., 0] + s**2 * stress[..., 1] + 2.0 * c * s * stress[..., 3]
+
+
+def windowed_mean(curve: Array) -> float:
+    """Mean with the weights of a Hann window, which leaves out what oscillates a few times."""
+    weight = np.hanning(len(curve))
+    return float(weight @ curve / weight.sum())
+
+
+def _free_spin(setup: Setup, count: int) -> tuple[float, float]:
+    """Mean and greatest stress at the centre of a rod that spins freely [Pa]."""
+    _, stress = spin(setup, count, hinged=False, periods=4.0)
+    middle = stress[:, count // 2]
+    return windowed_mean(middle), float(middle.max())
+
+
+def _hinged_spin(setup: Setup, count: int) -> tuple[float, float]:
+    """Mean stress at a quarter of the length from the hinge [Pa], and mean reaction of the hinge [N]."""
+    result, stress = spin(setup, count, hinged=True, periods=4.0)
+    # the hinge holds one line of nodes, so it yields and lengthens the periods: take whole ones of what is there
+    lowest = 0.25 * PACE
+    found = fitted_frequencies(result.time, stress[:, count // 4], (lowest, 3.0 * lowest, 5.0 * lowest))
+    result, stress = spin(setup, count, hinged=True, periods=4.0 * lowest / float(found[0]))
+    turn = OMEGA * result.summary["simulated_time"]
+    inward = -np.array([math.cos(0.5 * turn), math.sin(0.5 * turn), 0.0])
+    # a force that turns by `turn` gives an impulse along its middle direction, shorter by the chord over the arc
+    chord = 2.0 * math.sin(0.5 * turn) / OMEGA
+    reaction = float(inward @ result.summary["joint_impulse"]["O"] / chord)
+    return windowed_mean(stress[:, count // 4]), reaction
+
+
+@case(
+    group="rigid",
+    title="A spinning rod: stress by its centrifugal load, free and on a hinge, and the hinge's reaction",
+    reference="One-dimensional theory: stress rho omega^2 (L^2 - x^2) / 2 from the pivot, twice that at most after a "
+    "start free of stress; reaction m omega^2 L / 2.",
+    catches=("joint_impulse_halved", "shown_pressure_halved"),
+)
+def spinning_rod(setup: Setup) -> list[Row]:
+    """L = 1 m, 10 mm x 10 mm, E = 70 GPa, rho = 2700 kg/m^3, nu = 0, omega = c / (200 L); four axial periods.
+
+    A Hann window over four periods leaves out the lasting oscillation to some 1e-5. The reaction is a plain mean, over
+    whole periods.
+    """
+    load = RHO * OMEGA**2 * LENGTH**2
+    counts = setup.choose((20, 40), (20, 40, 80))
+    centre, greatest = zip(*(_free_spin(setup, count) for count in counts), strict=True)
+    quarter, reaction = zip(*(_hinged_spin(setup, count) for count in counts), strict=True)
+    return [
+        Row(
+            quantity="free: mean stress at the centre",
+            exact=load / 8.0,
+            measured=centre,
+            unit="Pa",
+            tolerance=1e-4,
+            why="what the window leaves of the oscillation",
+        ),
+        Row(
+            quantity="free: greatest stress at the centre",
+            exact=load / 4.0,
+            measured=greatest,
+            unit="Pa",
+            tolerance=0.003,
+            why="ripples where waves meet, shorter than a few elements",
+        ),
+        Row(
+            quantity="hinged: mean stress at L / 4",
+            exact=load * 15.0 / 32.0,
+            measured=quarter,
+            unit="Pa",
+            tolerance=0.0005,
+            why="what the window leaves of the oscillation, and the hinge's disturbance of the stress at 25 widths",
+        ),
+        Row(
+            quantity="hinged: mean reaction",
+            exact=0.5 * load * SIDE**2,
+            measured=reaction,
+            unit="N",
+            tolerance=0.0002,
+            why="higher modes, of which four periods of the lowest are not whole ones",
+        ),
+    ]
+
+
+THETA, THETA_DOT = (1.2, 0.4), (-1.0, 3.0)  # of the double pendulum at first [rad], [rad/s]
+SPAN = 0.4  # of its motion [s]
+
+
+def _rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[Array, Array, float]:
+    """Displacement of tip and of hinge A [m], each shape (2,), float64, and kinetic energy [J] after SPAN."""
+    from warp_mca.chain import Chain, mesh_link
+    from warp_mca.rigid import swing
+
+    links = [mesh_link(name, meshes[name].points, masses[name], hinge_out=(LENGTH, 0.0)) for name in ("OA", "AB")]
+    chain = Chain(tuple(links), gravity=(0.0, -9.8))
+    end = swing(chain, THETA, THETA_DOT, lambda t, _: SPAN - t, t_max=2.0 * SPAN)
+    start = np.array(THETA), np.array(THETA_DOT)
+
+    def travel(link: int) -> Array:
+        far = (LENGTH, 0.0)
+        return chain.at(link, far, end.theta, end.theta_dot)[0] - chain.at(link, far, *start)[0]
+
+    return travel(1), travel(0), chain.kinetic_energy(end.theta, end.theta_dot)
+
+
+@case(
+    group="rigid",
+    title="A stiff double pendulum of finite elements swings as the chain of rigid links does",
+    reference="The rigid chain, verified by itself above.",
+    catches=("hinge_forgets_masses", "rate_force_reversed"),
+)
+def fe_double_pendulum(setup: Setup) -> list[Row]:
+    """Links of 1 m x 0.2 m x 0.1 m, 1000 and 2000 kg/m^3, E = 200 MPa and four times that; 0.4 s under gravity."""
+    from scipy.integrate import simpson
+
+    from warp_mca.model import nodal_masses
+    from warp_mca.simulation import mesh
+
+    moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))
+    start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}
+    scenes = [setup.scene("double_pendulum", E=E, length=LENGTH, duration=SPAN, **start) for E in moduli]
+    meshes = mesh(scenes[0])
+    tip_exact, hinge_exact, kinetic_exact = _rigid_pendulum(meshes, nodal_masses(scenes[0], meshes))
+    tip, hinge, kinetic = [], [], []
+    for scene in scenes:
+        result = setup.run(scene, meshes)
+        x, y, hinge_x = (float(simpson(result[key], x=result.time)) for key in ("tip_vx", "tip_vy", "plate_vx"))
+        tip.append(math.hypot(x - tip_exact[0], y - tip_exact[1]))
+        hinge.append(hinge_x)
+        kinetic.append(float(result["E_kinetic"][-1]))
+    share = moduli[1] / moduli[-1]
+    sizes = tuple(1.0 / math.sqrt(E) for E in moduli)
+    why = "the links bend and stretch in proportion to 1 / E, and so by order 2 in the inverse of the speed of waves"
+    return [
+        Row(
+            quantity="distance of the tip from that of the rigid chain",
+            exact=0.0,
+            measured=tuple(tip),
+            unit="m",
+            scale=LENGTH,
+            tolerance=3e-4 * share,
+            why=why,
+            sizes=sizes,
+            least_order=1.7,
+        ),
+        Row(
+            quantity="displacement of hinge A along x",
+            exact=float(hinge_exact[0]),
+            measured=tuple(hinge),
+            unit="m",
+            tolerance=3e-4 * share,
+            why=why,
+            sizes=sizes,
+        ),
+        Row(
+            quantity="kinetic energy at the end",
+            exact=kinetic_exact,
+            measured=tuple(kinetic),
+            unit="J",
+            tolerance=3e-4 * share,
+            why=why,
+            sizes=sizes,
+            least_order=1.7,
+        ),
+    ]
