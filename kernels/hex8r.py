@@ -3,7 +3,8 @@
 Gradients are means over the element, so that it passes the patch test: Flanagan and Belytschko, Int. J. Numer. Meth.
 Engng 17 (1981) 679. The hourglass modes carry the elastic energy of a brick of the element's mean edges without its
 parasitic shear: Belytschko and Bindeman, Comput. Meth. Appl. Mech. Engng 105 (1993) 225; bending is then right with
-one element over the height. Their stiffness stays elastic where the element yields.
+one element over the height. Where the element yields, its hourglass strains flow with its plastic multiplier, as the
+points of the full element would about their mean.
 """
 
 from functools import cache
@@ -24,6 +25,11 @@ from warp_mca.kernels.kinematics import kinematics
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
+
+# Rows of the history beside those of the plastic strain: plastic hourglass amplitudes, and the energy they took [J].
+_AMPLITUDES = j2.HISTORY_SIZE
+_DISSIPATED = _AMPLITUDES + 12
+HISTORY_ROWS = _DISSIPATED + 1
 
 
 @cache
@@ -138,15 +144,39 @@ def hourglass_functions(precision: str) -> tuple[Any, Any, Any]:
 
 
 @cache
+def amplitude_functions(precision: str) -> tuple[Any, Any]:
+    """Functions that read and write the plastic hourglass amplitudes of an element."""
+    t = scalars(precision)
+    R, mat43 = t.real, t.mat43
+
+    @wp.func
+    def read_amplitudes(history: wp.array2d(dtype=R), e: int):
+        q = mat43()
+        for m in range(4):
+            for i in range(3):
+                q[m, i] = history[wp.static(_AMPLITUDES) + 3 * m + i, e]
+        return q
+
+    @wp.func
+    def write_amplitudes(history_out: wp.array2d(dtype=R), e: int, q: mat43):
+        for m in range(4):
+            for i in range(3):
+                history_out[wp.static(_AMPLITUDES) + 3 * m + i, e] = q[m, i]
+
+    return read_amplitudes, write_amplitudes
+
+
+@cache
 def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where `plastic`."""
     t = scalars(precision)
-    R, vec3, mat33, mat83 = t.real, t.vec3, t.mat33, t.mat83
+    R, vec3, mat33, mat43, mat83 = t.real, t.vec3, t.mat33, t.mat43, t.mat83
     element_rotation, local_displacement = frame_functions(precision, finite)
     load_element = load_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     hourglass_sums, brick, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
+    read_amplitudes, write_amplitudes = amplitude_functions(precision)
     j2_return = j2.return_map(precision)
     k = kinematics(precision, finite)
     dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
@@ -173,25 +203,38 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         m = material[e]
         K = law[m, 0]
         G = law[m, 1]
+        hx = hourglass_sums(Xl)
+        directions, lengths = brick(Xl)
+        eighth = R(0.125)
+        q = eighth * (hourglass_sums(ul) - hx * wp.transpose(H))
+        kept = R(1.0)
         strain, N, d = deviator(H)
         S = R(2.0) * G * strain
         if wp.static(plastic):
             eps_p = mat33()
             p = R(0.0)
+            q_p = mat43()
             flag = yielded_out[e]
             if flag != 0:
                 eps_p, p = read_plastic_strain(history_out, 0, e)
+                q_p = read_amplitudes(history_out, e)
+                q = q - q_p
             S, eps_new, p_new = j2_return(strain, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
             if p_new > p:
                 write_plastic_strain(history_out, 0, e, eps_new, p_new)
+                # the flow rule at a point is linear in its stress: the part about the mean relaxes by 3 G dp / S_eq
+                S_eq = wp.sqrt(R(1.5) * wp.ddot(S, S))
+                kept = S_eq / (S_eq + R(3.0) * G * (p_new - p))
+                write_amplitudes(history_out, e, q_p + (R(1.0) - kept) * q)
                 if flag == 0:
                     yielded_out[e] = int(1)
         P = nominal(H, S, N, d) + pressure_of(K, dilation_of(H)) * cofactor(H)
-        hx = hourglass_sums(Xl)
-        directions, lengths = brick(Xl)
-        eighth = R(0.125)
-        q = eighth * (hourglass_sums(ul) - hx * wp.transpose(H))
-        Q, _stored = hourglass(q, directions, lengths, volume, K, G)
+        Q, stored = hourglass(q, directions, lengths, volume, K, G)
+        if wp.static(plastic):
+            if kept < R(1.0):
+                row = wp.static(_DISSIPATED)
+                history_out[row, e] = history_out[row, e] + (R(1.0) - kept * kept) * stored
+                Q = kept * Q
         P = P - (eighth / volume) * (wp.transpose(Q) * hx)
         Q = eighth * Q
         f = mat83()
@@ -223,6 +266,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     mean_gradients, mean_gradient_of = mean_functions(precision)
     hourglass_sums, brick, hourglass = hourglass_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
+    read_amplitudes, _ = amplitude_functions(precision)
     plastic_energy = j2.plastic_energy(precision)
     k = kinematics(precision, finite)
     dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
@@ -256,8 +300,12 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
                 dissipated = volume * plastic_energy(eps_p, p, law[m, 2], law[m, 3], law[m, 4])
+                dissipated += history[wp.static(_DISSIPATED), e]
         directions, lengths = brick(Xl)
         q = R(0.125) * (hourglass_sums(ul) - hourglass_sums(Xl) * wp.transpose(H))
+        if wp.static(plastic):
+            if yielded[e] != 0:
+                q = q - read_amplitudes(history, e)
         _Q, stored = hourglass(q, directions, lengths, volume, K, G)
         identity = wp.identity(n=3, dtype=R)
         elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))

@@ -29,42 +29,67 @@ def eigen_function(precision: str) -> Any:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
 
+    small = R(1e-16 if precision == "mixed" else 1e-33)  # square of what is lost beside 1
+
+    @wp.func
+    def turn(p: R, q: R, pq: R):
+        """Cosine, sine and tangent of the rotation that takes the entry pq of a 2 x 2 matrix away."""
+        one = R(1.0)
+        if pq == R(0.0):
+            return one, R(0.0), R(0.0)
+        tau = (q - p) / (R(2.0) * pq)
+        tangent = one / (wp.abs(tau) + wp.sqrt(one + tau * tau))
+        if tau < R(0.0):
+            tangent = -tangent
+        cosine = one / wp.sqrt(one + tangent * tangent)
+        return cosine, cosine * tangent, tangent
+
     @wp.func
     def jacobi_eigen(C: mat33):
-        A = C
-        N = wp.identity(n=3, dtype=R)
+        xx = C[0, 0]
+        yy = C[1, 1]
+        zz = C[2, 2]
+        xy = C[0, 1]
+        yz = C[1, 2]
+        xz = C[0, 2]
+        n0 = vec3(R(1.0), R(0.0), R(0.0))
+        n1 = vec3(R(0.0), R(1.0), R(0.0))
+        n2 = vec3(R(0.0), R(0.0), R(1.0))
         for _ in range(wp.static(SWEEPS)):
-            for k in range(3):
-                i = int(0)
-                j = int(1)
-                if k == 1:
-                    j = 2
-                if k == 2:
-                    i = 1
-                    j = 2
-                if A[i, j] != R(0.0):
-                    tau = (A[j, j] - A[i, i]) / (R(2.0) * A[i, j])
-                    slope = R(1.0) / (wp.abs(tau) + wp.sqrt(R(1.0) + tau * tau))
-                    if tau < R(0.0):
-                        slope = -slope
-                    c = R(1.0) / wp.sqrt(R(1.0) + slope * slope)
-                    s = c * slope
-                    for m in range(3):
-                        a = A[m, i]
-                        b = A[m, j]
-                        A[m, i] = c * a - s * b
-                        A[m, j] = s * a + c * b
-                    for m in range(3):
-                        a = A[i, m]
-                        b = A[j, m]
-                        A[i, m] = c * a - s * b
-                        A[j, m] = s * a + c * b
-                    for m in range(3):
-                        a = N[m, i]
-                        b = N[m, j]
-                        N[m, i] = c * a - s * b
-                        N[m, j] = s * a + c * b
-        return N, vec3(A[0, 0], A[1, 1], A[2, 2])
+            size = xx * xx + yy * yy + zz * zz
+            if xy * xy + yz * yz + xz * xz <= small * size:
+                break
+            c, s, t = turn(xx, yy, xy)
+            xx = xx - t * xy
+            yy = yy + t * xy
+            xy = R(0.0)
+            a = xz
+            xz = c * a - s * yz
+            yz = s * a + c * yz
+            n = n0
+            n0 = c * n - s * n1
+            n1 = s * n + c * n1
+            c, s, t = turn(xx, zz, xz)
+            xx = xx - t * xz
+            zz = zz + t * xz
+            xz = R(0.0)
+            a = xy
+            xy = c * a - s * yz
+            yz = s * a + c * yz
+            n = n0
+            n0 = c * n - s * n2
+            n2 = s * n + c * n2
+            c, s, t = turn(yy, zz, yz)
+            yy = yy - t * yz
+            zz = zz + t * yz
+            yz = R(0.0)
+            a = xy
+            xy = c * a - s * xz
+            xz = s * a + c * xz
+            n = n1
+            n1 = c * n - s * n2
+            n2 = s * n + c * n2
+        return wp.matrix_from_cols(n0, n1, n2), vec3(xx, yy, zz)
 
     return jacobi_eigen
 
@@ -170,12 +195,15 @@ def _logarithmic(precision: str) -> Kinematics:
     @wp.func
     def log_nominal(H: mat33, S: mat33, N: mat33, d: vec3):
         T = wp.transpose(N) * S * N
-        for i in range(3):
-            for j in range(3):
-                c = R(1.0) + d[j]
-                # divided difference of ln at the squared stretches
-                T[i, j] = T[i, j] * log_over((d[i] - d[j]) / c) / c
-        P = N * T * wp.transpose(N)
+        one = R(1.0)
+        # divided differences of ln at the squared stretches
+        xy = T[0, 1] * log_over((d[0] - d[1]) / (one + d[1])) / (one + d[1])
+        yz = T[1, 2] * log_over((d[1] - d[2]) / (one + d[2])) / (one + d[2])
+        xz = T[0, 2] * log_over((d[0] - d[2]) / (one + d[2])) / (one + d[2])
+        xx = T[0, 0] / (one + d[0])
+        yy = T[1, 1] / (one + d[1])
+        zz = T[2, 2] / (one + d[2])
+        P = N * mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz) * wp.transpose(N)
         return P + H * P
 
     @wp.func

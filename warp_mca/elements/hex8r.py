@@ -95,4 +95,4 @@ class Hex8r:
         from warp_mca.elements.stage import ElementStage
         from warp_mca.kernels import hex8r
 
-        return ElementStage(block, precision, hex8r, points=1)
+        return ElementStage(block, precision, hex8r, points=1, rows=hex8r.HISTORY_ROWS)

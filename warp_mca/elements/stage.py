@@ -22,17 +22,19 @@ class ElementStage:
         block: the host side.
         conn, material: as in `Block`.
         yielded: 1 where an element has yielded, shape (element_count,), int32; empty where elastic.
-        history: plastic strain and equivalent plastic strain of each point in turn; empty where elastic.
+        history: plastic strain and equivalent plastic strain of each point in turn, then what the element keeps more;
+            empty where elastic.
     """
 
-    def __init__(self, block: Block, precision: str, kernels: Any, points: int) -> None:
+    def __init__(self, block: Block, precision: str, kernels: Any, points: int, rows: int | None = None) -> None:
         """Allocate.
 
         Args:
             block: the elements.
             precision: as in `warp_mca.run`.
             kernels: module that makes force_kernel, energy_kernel and stress_kernel.
-            points: integration points that keep a history.
+            points: integration points that keep a plastic strain.
+            rows: of the history, where an element keeps more.
         """
         self.block, self.corners = block, block.conn.shape[0]
         self.conn = wp.array(block.conn, dtype=wp.int32)
@@ -40,7 +42,8 @@ class ElementStage:
         self.count = block.conn.shape[1]
         kept = self.count if block.plastic else 0
         self.yielded = wp.zeros(kept, dtype=wp.int32)
-        self.history = wp.zeros((points * j2.HISTORY_SIZE, kept), dtype=scalars(precision).real)
+        self.points = points
+        self.history = wp.zeros((rows or points * j2.HISTORY_SIZE, kept), dtype=scalars(precision).real)
         kind = (precision, block.plastic, block.finite)
         self.force_kernel = kernels.force_kernel(*kind)
         self.energy_kernel = kernels.energy_kernel(*kind)
@@ -74,5 +77,5 @@ class ElementStage:
 
     def max_plastic_strain(self) -> float:
         """Greatest equivalent plastic strain of any point [-]."""
-        last = self.history.numpy()[j2.HISTORY_SIZE - 1 :: j2.HISTORY_SIZE]
+        last = self.history.numpy()[: self.points * j2.HISTORY_SIZE][j2.HISTORY_SIZE - 1 :: j2.HISTORY_SIZE]
         return float(last.max(initial=0.0))
