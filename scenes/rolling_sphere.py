@@ -8,7 +8,7 @@ from typing import Annotated
 import warp_mca as mca
 from warp_mca import Param
 
-PRESETS: dict[str, dict[str, object]] = {"quick": {}, "fine": {"section": 12}}
+PRESETS: dict[str, dict[str, object]] = {"quick": {}, "fine": {"section": 12, "pole_size": 2e-4}}
 
 
 def build(
