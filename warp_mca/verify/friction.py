@@ -17,7 +17,7 @@ MASS, MU, GRAVITY, SPEED = 0.2, 0.3, 300.0, 1.0  # of sliding_block and block_on
 
 def impulse(result: mca.Result) -> NDArray[np.float64]:
     """Impulse of the tangential force up to each row [N s], shape (row_count,), float64."""
-    return np.cumsum(result.F_t) * (result.time[1] - result.time[0])  # the first row's mean force is 0
+    return np.cumsum(result.F_t) * (result.time[1] - result.time[0])  # row 0 holds the first step alone
 
 
 @case(
@@ -51,8 +51,8 @@ def sliding_block(setup: Setup) -> list[Row]:
             exact=SPEED / (MU * GRAVITY),
             measured=tuple(time),
             unit="s",
-            tolerance=0.0005,
-            why="the block bounces on its contact springs by 2 % of its weight",
+            tolerance=0.002,
+            why="the block swings on its contact springs as it stops, at 0.5 % of its speed",
         ),
         Row(
             quantity="heat",
@@ -88,7 +88,7 @@ def block_on_belt(setup: Setup) -> list[Row]:
         work.append(float(result.summary["energy"]["external_work"]))
     swing = "the block swings on its contact springs"
     return [
-        Row(quantity="time", exact=exact, measured=tuple(time), unit="s", tolerance=0.0005, why=swing),
+        Row(quantity="time", exact=exact, measured=tuple(time), unit="s", tolerance=0.002, why=swing),
         Row(quantity="speed then", exact=SPEED, measured=tuple(speed), unit="m/s", tolerance=0.0005, why=swing),
         Row(
             quantity="friction F_t then",
@@ -216,7 +216,7 @@ def stick_slip(setup: Setup) -> list[Row]:
     cells = setup.choose((4, 8), (4, 8, 16))
     force, stiffness, v = 1.0, 2e4, 0.1
     omega = math.sqrt(stiffness / (2e-3 * (1.0 + 0.004 / 3.0)))
-    slowed = 6.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
+    slowed = 20.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
     stuck, period, amplitude, heat = [], [], [], []
     for count in cells:
         result = setup.run(setup.scene("stick_slip", cells=count))
@@ -234,9 +234,9 @@ def stick_slip(setup: Setup) -> list[Row]:
         heat.append(float(warmed[1] - warmed[0]))
     rows = (
         ("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
-        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0005, "the block yields"),
-        ("amplitude", v / omega, amplitude, "m", 0.002, "contact stretches by 0.01 %, waves stay in the spring"),
-        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.001, "the start is read to 0.1 %"),
+        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0001, "rows are 0.1 % of it apart, and the speed is straight between them"),
+        ("amplitude", v / omega, amplitude, "m", 0.0005, "contact stretches by 0.01 %, few waves stay in the spring"),
+        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.0002, "the spring's mass counts as a third, to first order"),
     )
     return [
         Row(quantity=quantity, exact=exact, measured=tuple(measured), unit=unit, tolerance=tolerance, why=why)
