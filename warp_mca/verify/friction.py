@@ -234,9 +234,9 @@ def stick_slip(setup: Setup) -> list[Row]:
         heat.append(float(warmed[1] - warmed[0]))
     rows = (
         ("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
-        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0001, "the speed is taken as straight between rows"),
+        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0001, "speed is straight between rows"),
         ("amplitude", v / omega, amplitude, "m", 0.0005, "contact stretches by 0.01 %, few waves stay in the spring"),
-        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.0002, "the start is read to one row"),
+        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.0002, "its start is read to a row"),
     )
     return [
         Row(quantity=quantity, exact=exact, measured=tuple(measured), unit=unit, tolerance=tolerance, why=why)
