@@ -22,14 +22,15 @@ def build(
     stiffness: Annotated[float, Param("of the spring", unit="N/m", low=0.0, exclusive=True)] = 2e4,
     mass: Annotated[float, Param("of the block", unit="kg", low=0.0, exclusive=True)] = 2e-3,
     light: Annotated[float, Param("mass of the spring over that of the block", low=0.0, exclusive=True)] = 0.004,
-    E: Annotated[float, Param("Young's modulus of the block", unit="Pa", low=0.0, exclusive=True)] = 10e9,
+    E: Annotated[float, Param("Young's modulus of the block", unit="Pa", low=0.0, exclusive=True)] = 100e9,
     edge: Annotated[float, Param("of the square section", unit="m", low=0.0, exclusive=True)] = 0.01,
     cells: Annotated[int, Param("cells along the spring; the block has a quarter of them", low=4)] = 8,
 ) -> mca.Scene:
     """A bar along x: a soft, light spring from x = 0, then the block. Only motion along x is free.
 
-    All of it moves with the belt until the spring's far end is slowed down to rest, over six passages of the spring's
-    waves to and fro, which leaves none of them. The block is pressed to the depth at which friction's limit is `force`.
+    All of it moves with the belt until the spring's far end is slowed down to rest, over twenty passages of waves to
+    and fro in the spring, which leaves few of them. The block is pressed to the depth at which friction's limit is
+    `force`; it is stiff, because waves in it would tear it off too early.
     """
     count = cells // 4
     cube = edge**3
@@ -45,7 +46,7 @@ def build(
     mesh = Mesh(bar.points, bar.hexahedra, {**bar.node_sets, "sole": sole}, cell_sets)
     depth = force / mu / (block.bulk_modulus * edge * len(sole))
     period = 2.0 * math.pi * math.sqrt(mass / stiffness)
-    slowing = 12.0 * math.sqrt(light * mass / stiffness)  # a wave passes in the square root
+    slowing = 40.0 * math.sqrt(light * mass / stiffness)  # a wave passes in the square root
     duration = 0.5 * slowing + force / (stiffness * v) + 1.5 * period
     return mca.Scene(
         name="stick_slip",

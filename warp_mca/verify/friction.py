@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.geometry.quality import volumes
 from warp_mca.verify.case import Row, Setup, case, crossings
 
 COULOMB = "Coulomb's law and the motion of a rigid body."
@@ -16,7 +17,7 @@ MASS, MU, GRAVITY, SPEED = 0.2, 0.3, 300.0, 1.0  # of sliding_block and block_on
 
 def impulse(result: mca.Result) -> NDArray[np.float64]:
     """Impulse of the tangential force up to each row [N s], shape (row_count,), float64."""
-    return np.cumsum(result.F_t) * (result.time[1] - result.time[0])  # the first row's mean force is 0
+    return np.cumsum(result.F_t) * (result.time[1] - result.time[0])  # row 0 holds the first step alone
 
 
 @case(
@@ -50,8 +51,8 @@ def sliding_block(setup: Setup) -> list[Row]:
             exact=SPEED / (MU * GRAVITY),
             measured=tuple(time),
             unit="s",
-            tolerance=0.0005,
-            why="the block bounces on its contact springs by 2 % of its weight",
+            tolerance=0.002,
+            why="the block swings on its contact springs as it stops, at 0.5 % of its speed",
         ),
         Row(
             quantity="heat",
@@ -87,7 +88,7 @@ def block_on_belt(setup: Setup) -> list[Row]:
         work.append(float(result.summary["energy"]["external_work"]))
     swing = "the block swings on its contact springs"
     return [
-        Row(quantity="time", exact=exact, measured=tuple(time), unit="s", tolerance=0.0005, why=swing),
+        Row(quantity="time", exact=exact, measured=tuple(time), unit="s", tolerance=0.002, why=swing),
         Row(quantity="speed then", exact=SPEED, measured=tuple(speed), unit="m/s", tolerance=0.0005, why=swing),
         Row(
             quantity="friction F_t then",
@@ -215,7 +216,7 @@ def stick_slip(setup: Setup) -> list[Row]:
     cells = setup.choose((4, 8), (4, 8, 16))
     force, stiffness, v = 1.0, 2e4, 0.1
     omega = math.sqrt(stiffness / (2e-3 * (1.0 + 0.004 / 3.0)))
-    slowed = 6.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
+    slowed = 20.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
     stuck, period, amplitude, heat = [], [], [], []
     for count in cells:
         result = setup.run(setup.scene("stick_slip", cells=count))
@@ -233,11 +234,58 @@ def stick_slip(setup: Setup) -> list[Row]:
         heat.append(float(warmed[1] - warmed[0]))
     rows = (
         ("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
-        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0005, "the block yields"),
-        ("amplitude", v / omega, amplitude, "m", 0.002, "contact stretches by 0.01 %, waves stay in the spring"),
-        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.001, "the start is read to 0.1 %"),
+        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0001, "speed is straight between rows"),
+        ("amplitude", v / omega, amplitude, "m", 0.0005, "contact stretches by 0.01 %, few waves stay in the spring"),
+        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.0002, "its start is read to a row"),
     )
     return [
         Row(quantity=quantity, exact=exact, measured=tuple(measured), unit=unit, tolerance=tolerance, why=why)
         for quantity, exact, measured, unit, tolerance, why in rows
+    ]
+
+
+@case(
+    group="friction",
+    title="A sphere that slides at first ends up rolling, at 5 v / 7 from 2 v / (7 mu g) on",
+    reference=COULOMB + " Its moment of inertia is 2 m R^2 / 5.",
+    catches=("friction_limit_doubled",),
+)
+def rolling_sphere(setup: Setup) -> list[Row]:
+    """v = 10 m/s, mu = 0.3, g = 12000 m/s^2, R = 10 mm; half of the sphere is run, on a contact radius of 0.055 R.
+
+    The sphere bounces a little, so time is counted by the normal impulse it has had, over its weight. How fast it
+    slows down is taken from the first 60 % of sliding: towards its end a growing part of the contact sticks.
+    """
+    sections = setup.choose((4, 6), (6, 8, 12))
+    v, mu, g, rho = 10.0, 0.3, 12000.0, 1000.0
+    exact = 2.0 * v / (7.0 * mu * g)
+    speed, time = [], []
+    for section in sections:
+        scene = setup.scene("rolling_sphere", section=section, pole_size=2.4e-3 / section)
+        meshes = mca.mesh(scene)
+        mass = rho * float(volumes(meshes["ball"]).sum())
+        result = setup.run(scene, meshes=meshes)
+        clock = np.cumsum(result.F_n) * (result.time[1] - result.time[0]) / (mass * g)
+        of_ball = v + impulse(result) / mass
+        speed.append(float(of_ball[clock > 1.15 * exact].mean()))
+        sliding = clock < 0.6 * exact
+        slope = np.polyfit(clock[sliding], of_ball[sliding], 1)[0]
+        time.append((speed[-1] - v) / float(slope))
+    return [
+        Row(
+            quantity="speed in the end",
+            exact=5.0 / 7.0 * v,
+            measured=tuple(speed),
+            unit="m/s",
+            tolerance=0.01,
+            why="lumped masses raise the moment of inertia by 1.2 % (mesh of 6), the contact sinks by 0.3 % of R",
+        ),
+        Row(
+            quantity="time of sliding",
+            exact=exact,
+            measured=tuple(time),
+            unit="s",
+            tolerance=0.03,
+            why="follows from the change of speed, of which the error of the speed in the end is 2.5 times the share",
+        ),
     ]
