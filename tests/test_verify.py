@@ -27,7 +27,7 @@ def test_case_is_met(case):
 def test_case_without_the_module_it_needs_is_skipped_not_failed(tmp_path, capsys, monkeypatch):
     lacking = dataclasses.replace(cases(["chain_energy"])[0], needs="no_such_module")
     monkeypatch.setattr("warp_mca.verify.runner.cases", lambda names: [lacking])
-    assert verify(out=tmp_path)[0].skipped
+    assert verify(element="hex8", out=tmp_path)[0].skipped
     said, page = capsys.readouterr().out, (tmp_path / "verification.md").read_text()
     assert "skipped, it needs no_such_module (pip install no_such_module)" in said
     assert "0 of 0 cases met, 1 skipped" in said and "Skipped, it needs no_such_module" in page
