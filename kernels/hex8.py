@@ -13,10 +13,12 @@ import warp as wp
 
 from warp_mca.kernels import j2
 from warp_mca.kernels.hexahedron import (
+    LINE_SCALE,
     edge_functions,
     frame_functions,
     gradient_function,
     history_functions,
+    line_functions,
     load_function,
     node_force_function,
     stress_function,
@@ -30,20 +32,57 @@ _THIRD = 1.0 / 3.0
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
-    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`."""
+def stress_functions(precision: str) -> tuple[Any, Any]:
+    """Functions of the symmetric stress (xx, yy, zz, xy, yz, xz): (S b + c; six sums of products l b, as strains)."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+
+    @wp.func
+    def add_traction(xx: R, yy: R, zz: R, xy: R, yz: R, xz: R, b: vec3, c: vec3):
+        # nested so that every product fuses with a sum
+        return vec3(
+            xx * b[0] + (xy * b[1] + (xz * b[2] + c[0])),
+            xy * b[0] + (yy * b[1] + (yz * b[2] + c[1])),
+            xz * b[0] + (yz * b[1] + (zz * b[2] + c[2])),
+        )
+
+    @wp.func
+    def symmetric_gradient(l0: vec3, l1: vec3, l2: vec3, b0: vec3, b1: vec3, b2: vec3):
+        """Direct components, and twice the shear ones, of the sum of l b."""
+        xx = l0[0] * b0[0] + l1[0] * b1[0] + l2[0] * b2[0]
+        yy = l0[1] * b0[1] + l1[1] * b1[1] + l2[1] * b2[1]
+        zz = l0[2] * b0[2] + l1[2] * b1[2] + l2[2] * b2[2]
+        xy = l0[0] * b0[1] + l1[0] * b1[1] + l2[0] * b2[1] + l0[1] * b0[0] + l1[1] * b1[0] + l2[1] * b2[0]
+        yz = l0[1] * b0[2] + l1[1] * b1[2] + l2[1] * b2[2] + l0[2] * b0[1] + l1[2] * b1[1] + l2[2] * b2[1]
+        xz = l0[0] * b0[2] + l1[0] * b1[2] + l2[0] * b2[2] + l0[2] * b0[0] + l1[2] * b1[0] + l2[2] * b2[0]
+        return xx, yy, zz, xy, yz, xz
+
+    return add_traction, symmetric_gradient
+
+
+@cache
+def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`.
+
+    An element that has never yielded takes the elastic pass, which also finds out whether it yields now; then, and
+    ever after, it takes the plastic pass. On a GPU, threads of one warp would wait for both: with `listed`, launched
+    for twice as many threads as elements, the first half works through the list of those that yielded in earlier
+    launches, the second half passes these over. `yielded` holds the stamp of the launch in which an element yielded.
+    """
     if finite:
         return _finite_force_kernel(precision, plastic)
     t = scalars(precision)
     R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
-    half_edges, to_gauss = edge_functions(precision)
+    edges, to_lines = line_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
+    add_traction, symmetric_gradient = stress_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
+    scale = LINE_SCALE**3
 
-    @wp.kernel(enable_backward=False, module="unique")
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
     def hex8_force(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
@@ -51,28 +90,46 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        stamp: wp.array(dtype=wp.int32),
         yielded_out: wp.array(dtype=wp.int32),
+        list_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
+        count = conn.shape[1]
+        flag = int(0)
+        if wp.static(plastic and listed):
+            if e < count:
+                if e >= list_out[count]:
+                    return
+                e = list_out[e]
+                if e < 0:  # counted, but not yet written by a thread of this launch
+                    return
+                flag = yielded_out[e]
+                if flag == 0 or flag == stamp[0]:
+                    return
+            else:
+                e = e - count
+                flag = yielded_out[e]
+                if flag != 0 and flag != stamp[0]:
+                    return
+        if wp.static(plastic and not listed):
+            flag = yielded_out[e]
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
         W = element_rotation(Xl, ul)
         ul = local_displacement(Xl, ul, W)
-        gx = to_gauss(half_edges(Xl, 0))
-        gy = to_gauss(half_edges(Xl, 1))
-        gz = to_gauss(half_edges(Xl, 2))
-        lx = to_gauss(half_edges(ul, 0))
-        ly = to_gauss(half_edges(ul, 1))
-        lz = to_gauss(half_edges(ul, 2))
+        gx = to_lines(edges(Xl, 0))
+        gy = to_lines(edges(Xl, 1))
+        gz = to_lines(edges(Xl, 2))
+        lx = to_lines(edges(ul, 0))
+        ly = to_lines(edges(ul, 1))
+        lz = to_lines(edges(ul, 2))
         m = material[e]
-        K = law[m, 0]
-        G = law[m, 1]
-        flag = int(0)
-        if wp.static(plastic):
-            flag = yielded_out[e]
-        flag_new = flag
+        # Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli.
+        K = R(scale) * law[m, 0]
+        G = R(scale) * law[m, 1]
         Sx = mat43()  # stress times cofactor, summed over the two points of each Gauss line
         Sy = mat43()
         Sz = mat43()
@@ -81,57 +138,105 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         Bz = mat43()
         volume = R(0.0)
         dilation = R(0.0)
-        for g in range(8):
-            i = g & 1
-            j = (g >> 1) & 1
-            k = g >> 2
-            jx = j + 2 * k
-            jy = i + 2 * k
-            jz = i + 2 * j
-            b0 = wp.cross(gy[jy], gz[jz])
-            b1 = wp.cross(gz[jz], gx[jx])
-            b2 = wp.cross(gx[jx], gy[jy])
-            det = wp.dot(gx[jx], b0)
-            grad = wp.outer(lx[jx], b0) + wp.outer(ly[jy], b1) + wp.outer(lz[jz], b2)
-            trace = wp.trace(grad)
-            volume += det
-            dilation += trace
-            # written out: one division, and no product with the zeros of an identity (16 % of this kernel's time)
-            inverse = R(1.0) / det
-            mean = R(_THIRD) * inverse * trace
-            xy = R(0.5) * inverse * (grad[0, 1] + grad[1, 0])
-            yz = R(0.5) * inverse * (grad[1, 2] + grad[2, 1])
-            xz = R(0.5) * inverse * (grad[0, 2] + grad[2, 0])
-            xx = inverse * grad[0, 0] - mean
-            yy = inverse * grad[1, 1] - mean
-            zz = inverse * grad[2, 2] - mean
-            strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-            S = R(2.0) * G * strain
-            if wp.static(plastic):
-                eps_p = mat33()
-                p = R(0.0)
-                if flag != 0:
-                    eps_p, p = read_plastic_strain(history_out, g, e)
-                S, eps_new, p_new = j2_return(strain, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
-                if p_new > p:
-                    write_plastic_strain(history_out, g, e, eps_new, p_new)
-                    flag_new = int(1)
-            Sx[jx] = Sx[jx] + S * b0
-            Sy[jy] = Sy[jy] + S * b1
-            Sz[jz] = Sz[jz] + S * b2
-            Bx[jx] = Bx[jx] + b0
-            By[jy] = By[jy] + b1
-            Bz[jz] = Bz[jz] + b2
+        largest = R(0.0)
+        if flag == 0:
+            for g in range(8):
+                i = g & 1
+                j = (g >> 1) & 1
+                k = g >> 2
+                jx = j + 2 * k
+                jy = i + 2 * k
+                jz = i + 2 * j
+                b0 = wp.cross(gy[jy], gz[jz])
+                b1 = wp.cross(gz[jz], gx[jx])
+                b2 = wp.cross(gx[jx], gy[jy])
+                det = wp.dot(gx[jx], b0)
+                xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
+                trace = xx + yy + zz
+                volume += det
+                dilation += trace
+                shear = G / det
+                direct = shear + shear
+                mean = R(_THIRD) * trace
+                xx = direct * (xx - mean)
+                yy = direct * (yy - mean)
+                zz = direct * (zz - mean)
+                xy = shear * xy
+                yz = shear * yz
+                xz = shear * xz
+                if wp.static(plastic):
+                    size = xx * xx + yy * yy + zz * zz + R(2.0) * (xy * xy + yz * yz + xz * xz)
+                    largest = wp.max(largest, size)
+                Sx[jx] = add_traction(xx, yy, zz, xy, yz, xz, b0, Sx[jx])
+                Sy[jy] = add_traction(xx, yy, zz, xy, yz, xz, b1, Sy[jy])
+                Sz[jz] = add_traction(xx, yy, zz, xy, yz, xz, b2, Sz[jz])
+                Bx[jx] = Bx[jx] + b0
+                By[jy] = By[jy] + b1
+                Bz[jz] = Bz[jz] + b2
         if wp.static(plastic):
-            if flag_new != flag:
-                yielded_out[e] = flag_new
+            limit = R(scale) * law[m, 2]
+            first = int(0)
+            if flag == 0 and R(1.5) * largest > limit * limit:
+                first = int(1)
+                flag = int(1)
+                if wp.static(listed):
+                    flag = stamp[0]
+                    list_out[wp.atomic_add(list_out, count, 1)] = e
+                yielded_out[e] = flag
+                volume = R(0.0)
+                dilation = R(0.0)
+                Sx = mat43()
+                Sy = mat43()
+                Sz = mat43()
+                Bx = mat43()
+                By = mat43()
+                Bz = mat43()
+            if flag != 0:
+                H = R(scale) * law[m, 3]
+                beta = law[m, 4]
+                for g in range(8):
+                    i = g & 1
+                    j = (g >> 1) & 1
+                    k = g >> 2
+                    jx = j + 2 * k
+                    jy = i + 2 * k
+                    jz = i + 2 * j
+                    eps_p = mat33()
+                    p = R(0.0)
+                    if first == 0:
+                        eps_p, p = read_plastic_strain(history_out, g, e)
+                    b0 = wp.cross(gy[jy], gz[jz])
+                    b1 = wp.cross(gz[jz], gx[jx])
+                    b2 = wp.cross(gx[jx], gy[jy])
+                    det = wp.dot(gx[jx], b0)
+                    xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
+                    trace = xx + yy + zz
+                    volume += det
+                    dilation += trace
+                    shear = R(0.5) / det
+                    direct = shear + shear
+                    mean = R(_THIRD) * trace
+                    xx = direct * (xx - mean)
+                    yy = direct * (yy - mean)
+                    zz = direct * (zz - mean)
+                    xy = shear * xy
+                    yz = shear * yz
+                    xz = shear * xz
+                    strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+                    S, eps_new, p_new = j2_return(strain, eps_p, p, G, limit, H, beta)
+                    if p_new > p:
+                        write_plastic_strain(history_out, g, e, eps_new, p_new)
+                    Sx[jx] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b0, Sx[jx])
+                    Sy[jy] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b1, Sy[jy])
+                    Sz[jz] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b2, Sz[jz])
+                    Bx[jx] = Bx[jx] + b0
+                    By[jy] = By[jy] + b1
+                    Bz[jz] = Bz[jz] + b2
         pressure = K * dilation / volume
-        half = R(0.5)
-        Fx = to_gauss(half * (Sx + pressure * Bx))
-        Fy = to_gauss(half * (Sy + pressure * By))
-        Fz = to_gauss(half * (Sz + pressure * Bz))
+        Fx = to_lines(Sx + pressure * Bx)
+        Fy = to_lines(Sy + pressure * By)
+        Fz = to_lines(Sz + pressure * Bz)
         f = edge_to_node(Fx, Fy, Fz)
-        count = conn.shape[1]
         for a in range(8):
             force_out[slot + a * count + e] = f[a] + W * f[a]
 

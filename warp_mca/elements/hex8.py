@@ -24,7 +24,8 @@ class Hex8:
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
+        from warp_mca.elements.hex8_stage import Hex8Stage
         from warp_mca.elements.stage import ElementStage
         from warp_mca.kernels import hex8
 
-        return ElementStage(block, precision, hex8, points=8)
+        return ElementStage(block, precision, hex8, points=8) if block.finite else Hex8Stage(block, precision)

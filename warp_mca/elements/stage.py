@@ -21,7 +21,7 @@ class ElementStage:
     Attributes:
         block: the host side.
         conn, material: as in `Block`.
-        yielded: 1 where an element has yielded, shape (element_count,), int32; empty where elastic.
+        yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
         history: plastic strain and equivalent plastic strain of each point in turn, then what the element keeps more;
             empty where elastic.
     """
@@ -57,8 +57,11 @@ class ElementStage:
         """What kernels of this formulation take beside what all take."""
         return []
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
-        """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, stamp: wp.array, force: wp.array) -> None:
+        """Forces of each element on its nodes [N], into the slots of this block; plastic flow.
+
+        `stamp` is a number that differs from step to step, and is never 0.
+        """
         inputs = [X, self.conn, self.material, law, u, self.block.slot, *self.more()]
         outputs = [self.yielded, self.history, force]
         wp.launch(self.force_kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
