@@ -61,13 +61,14 @@ def stress_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bool = False) -> Any:
+def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str = "every") -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where `plastic`.
 
-    An element that has never yielded takes the elastic pass, which also finds out whether it yields now; then, and
-    ever after, it takes the plastic pass. On a GPU, threads of one warp would wait for both: with `listed`, launched
-    for twice as many threads as elements, the first half works through the list of those that yielded in earlier
-    launches, the second half passes these over. `yielded` holds the stamp of the launch in which an element yielded.
+    With turn "every", every plastic element takes the return map. That suits a CPU, which computes several elements
+    side by side; on a GPU the others of a warp would wait for one that yields, and elements that never yielded need
+    neither history nor registers for it. There, two launches follow each other: "elastic" computes the elements that
+    have not yielded, and lists those that turn out to yield now; "plastic" works through the list. Forces go to
+    entries of their own, so that the order of the list does not matter.
     """
     if finite:
         return _finite_force_kernel(precision, plastic)
@@ -82,7 +83,10 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bo
     j2_return = j2.return_map(precision)
     scale = LINE_SCALE**3
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
+    # The list of the plastic turn is short as a rule: few blocks stride over all of its room.
+    strided = turn == "plastic"
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=strided, module_options={"fast_math": True})
     def hex8_force(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
@@ -90,7 +94,6 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bo
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
-        stamp: wp.array(dtype=wp.int32),
         yielded_out: wp.array(dtype=wp.int32),
         list_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
@@ -98,24 +101,13 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bo
     ):
         e = wp.tid()
         count = conn.shape[1]
-        flag = int(0)
-        if wp.static(plastic and listed):
-            if e < count:
-                if e >= list_out[count]:
-                    return
-                e = list_out[e]
-                if e < 0:  # counted, but not yet written by a thread of this launch
-                    return
-                flag = yielded_out[e]
-                if flag == 0 or flag == stamp[0]:
-                    return
-            else:
-                e = e - count
-                flag = yielded_out[e]
-                if flag != 0 and flag != stamp[0]:
-                    return
-        if wp.static(plastic and not listed):
-            flag = yielded_out[e]
+        if wp.static(plastic and turn == "elastic"):
+            if yielded_out[e] != 0:
+                return
+        if wp.static(turn == "plastic"):
+            if e >= list_out[count]:
+                return
+            e = list_out[e]
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
         W = element_rotation(Xl, ul)
@@ -139,7 +131,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bo
         volume = R(0.0)
         dilation = R(0.0)
         largest = R(0.0)
-        if flag == 0:
+        if wp.static(not plastic or turn == "elastic"):
             for g in range(8):
                 i = g & 1
                 j = (g >> 1) & 1
@@ -173,65 +165,61 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, listed: bo
                 Bx[jx] = Bx[jx] + b0
                 By[jy] = By[jy] + b1
                 Bz[jz] = Bz[jz] + b2
-        if wp.static(plastic):
+        if wp.static(plastic and turn == "elastic"):
+            if R(1.5) * largest > R(scale * scale) * law[m, 2] * law[m, 2]:
+                yielded_out[e] = 1
+                list_out[wp.atomic_add(list_out, count, 1)] = e
+                return
+        if wp.static(plastic and turn != "elastic"):
             limit = R(scale) * law[m, 2]
-            first = int(0)
-            if flag == 0 and R(1.5) * largest > limit * limit:
-                first = int(1)
-                flag = int(1)
-                if wp.static(listed):
-                    flag = stamp[0]
-                    list_out[wp.atomic_add(list_out, count, 1)] = e
-                yielded_out[e] = flag
-                volume = R(0.0)
-                dilation = R(0.0)
-                Sx = mat43()
-                Sy = mat43()
-                Sz = mat43()
-                Bx = mat43()
-                By = mat43()
-                Bz = mat43()
-            if flag != 0:
-                H = R(scale) * law[m, 3]
-                beta = law[m, 4]
-                for g in range(8):
-                    i = g & 1
-                    j = (g >> 1) & 1
-                    k = g >> 2
-                    jx = j + 2 * k
-                    jy = i + 2 * k
-                    jz = i + 2 * j
-                    eps_p = mat33()
-                    p = R(0.0)
-                    if first == 0:
-                        eps_p, p = read_plastic_strain(history_out, g, e)
-                    b0 = wp.cross(gy[jy], gz[jz])
-                    b1 = wp.cross(gz[jz], gx[jx])
-                    b2 = wp.cross(gx[jx], gy[jy])
-                    det = wp.dot(gx[jx], b0)
-                    xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
-                    trace = xx + yy + zz
-                    volume += det
-                    dilation += trace
-                    shear = R(0.5) / det
-                    direct = shear + shear
-                    mean = R(_THIRD) * trace
-                    xx = direct * (xx - mean)
-                    yy = direct * (yy - mean)
-                    zz = direct * (zz - mean)
-                    xy = shear * xy
-                    yz = shear * yz
-                    xz = shear * xz
-                    strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-                    S, eps_new, p_new = j2_return(strain, eps_p, p, G, limit, H, beta)
-                    if p_new > p:
-                        write_plastic_strain(history_out, g, e, eps_new, p_new)
-                    Sx[jx] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b0, Sx[jx])
-                    Sy[jy] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b1, Sy[jy])
-                    Sz[jz] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b2, Sz[jz])
-                    Bx[jx] = Bx[jx] + b0
-                    By[jy] = By[jy] + b1
-                    Bz[jz] = Bz[jz] + b2
+            H = R(scale) * law[m, 3]
+            beta = law[m, 4]
+            flag = int(1)
+            if wp.static(turn == "every"):
+                flag = yielded_out[e]
+            flag_new = flag
+            for g in range(8):
+                i = g & 1
+                j = (g >> 1) & 1
+                k = g >> 2
+                jx = j + 2 * k
+                jy = i + 2 * k
+                jz = i + 2 * j
+                eps_p = mat33()
+                p = R(0.0)
+                if flag != 0:
+                    eps_p, p = read_plastic_strain(history_out, g, e)
+                b0 = wp.cross(gy[jy], gz[jz])
+                b1 = wp.cross(gz[jz], gx[jx])
+                b2 = wp.cross(gx[jx], gy[jy])
+                det = wp.dot(gx[jx], b0)
+                xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
+                trace = xx + yy + zz
+                volume += det
+                dilation += trace
+                shear = R(0.5) / det
+                direct = shear + shear
+                mean = R(_THIRD) * trace
+                xx = direct * (xx - mean)
+                yy = direct * (yy - mean)
+                zz = direct * (zz - mean)
+                xy = shear * xy
+                yz = shear * yz
+                xz = shear * xz
+                strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+                S, eps_new, p_new = j2_return(strain, eps_p, p, G, limit, H, beta)
+                if p_new > p:
+                    write_plastic_strain(history_out, g, e, eps_new, p_new)
+                    flag_new = int(1)
+                Sx[jx] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b0, Sx[jx])
+                Sy[jy] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b1, Sy[jy])
+                Sz[jz] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b2, Sz[jz])
+                Bx[jx] = Bx[jx] + b0
+                By[jy] = By[jy] + b1
+                Bz[jz] = Bz[jz] + b2
+            if wp.static(turn == "every"):
+                if flag_new != flag:
+                    yielded_out[e] = flag_new
         pressure = K * dilation / volume
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)

@@ -31,11 +31,8 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
-        stamp_out: wp.array(dtype=wp.int32),
     ):
         i = wp.tid()
-        if i == 0:
-            stamp_out[0] = stamp_out[0] + 1
         total = wp.vec3d()
         for j in range(offset[i], offset[i + 1]):
             f = force[slot[j]]

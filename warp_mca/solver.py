@@ -169,7 +169,6 @@ class Solver:
         self.contacts = [ContactStage(p, model, PASS + PASS_COLUMNS * k) for k, p in enumerate(model.passes)]
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros(3, dtype=wp.int32)
-        self.stamp = wp.ones(1, dtype=wp.int32)
         self._allocate_constraints()
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.zeros(1, dtype=wp.int32)
@@ -196,14 +195,14 @@ class Solver:
 
     def _forces(self) -> None:
         for stage in self.elements:
-            stage.forces(self.X, self.law, self.u, self.stamp, self.force)
+            stage.forces(self.X, self.law, self.u, self.force)
         for stage in self.contacts:
             stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
 
     def _integrate(self, kick: float, drift: float) -> None:
         inputs = [self.inverse_mass, self.offset, self.slot, self.fixed_axes, self.force]
         inputs += [wp.vec3d(*self.model.gravity), kick, drift]
-        outputs = [self.contact_force, self.u, self.v, self.stamp]
+        outputs = [self.contact_force, self.u, self.v]
         wp.launch(self.integrate_kernel, self.model.node_count, inputs=inputs, outputs=outputs, block_dim=128)
 
     def _constrain(self) -> None:

@@ -57,11 +57,8 @@ class ElementStage:
         """What kernels of this formulation take beside what all take."""
         return []
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, stamp: wp.array, force: wp.array) -> None:
-        """Forces of each element on its nodes [N], into the slots of this block; plastic flow.
-
-        `stamp` is a number that differs from step to step, and is never 0.
-        """
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
+        """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
         inputs = [X, self.conn, self.material, law, u, self.block.slot, *self.more()]
         outputs = [self.yielded, self.history, force]
         wp.launch(self.force_kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

@@ -45,9 +45,9 @@ class Tet4Stage(ElementStage):
         """Pressure nodes of each element, and their dilatation."""
         return [self.group, self.dilation]
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, stamp: wp.array, force: wp.array) -> None:
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
         """Forces of each element on its nodes [N], after the dilatation at the pressure nodes."""
         wp.launch(self.dilation_kernel, self.count, inputs=[X, self.conn, u], outputs=[self.growth])
         inputs = [self.offset, self.element, self.inverse_volume, self.growth]
         wp.launch(self.average_kernel, len(self.dilation), inputs=inputs, outputs=[self.dilation])
-        super().forces(X, law, u, stamp, force)
+        super().forces(X, law, u, force)
