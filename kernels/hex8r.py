@@ -181,7 +181,8 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     k = kinematics(precision, finite)
     dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
 
-    @wp.kernel(enable_backward=False, module="unique")
+    # ln(1 + x) of small x needs the rounding that fast math gives away
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
     def hex8r_force(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
