@@ -183,10 +183,10 @@ MUTATIONS: dict[str, Mutation] = {
         "return perpendicular(self._turn(theta, self._mass[:, None] * self._centre)) @ np.asarray(self.gravity)",
     ),
     "pressure_varies_within_elements": Mutation(
-        "stress keeps a tenth of each integration point's own dilatation",
+        "each integration point adds a tenth of its own pressure to that of the element",
         "kernels/hex8.py",
         "shear = G / det\n                direct = shear + shear\n                mean = R(_THIRD) * trace",
-        "shear = G / det\n                direct = shear + shear\n                mean = R(0.3) * trace",
+        "shear = G / det\n                direct = shear + shear\n                mean = R(_THIRD) * trace - R(0.05) * K / G * trace",
     ),
     "joint_impulse_halved": Mutation(
         "the impulse of a joint is counted by half",
