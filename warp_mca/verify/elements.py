@@ -47,8 +47,7 @@ class Imposed:
         body = mca.Body(name="block", geometry=geometry, material=material)
         scene = mca.Scene(name="imposed", bodies=(body,), impact=mca.ImpactPhase(duration=1.0))
         scene = setup.with_element(scene)
-        # not checked as a run checks it: the standard patch has a corner that is slightly inverted
-        meshes = {"block": geometry}
+        meshes = mca.mesh(scene)
         start = hand_off(scene, meshes, nodal_masses(scene, meshes))
         self.model = build_model(scene, meshes, start.positions, start.velocities)
         self.solver = Solver(self.model, device=setup.device, precision=setup.precision, dt=self.model.stable.dt)
