@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
 
 Level = Literal["quick", "full"]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +34,10 @@ class Setup:
     precision: str = "mixed"
     element: str = "hex8"
     level: Level = "quick"
+
+    def by_element(self, value: T, **others: T) -> T:
+        """`value`, or the one that is named after this element."""
+        return others.get(self.element, value)
 
     def choose(self, quick: tuple, full: tuple) -> tuple:
         """What belongs to the level: meshes from coarse to fine, most often."""
@@ -111,6 +116,7 @@ class Case:
         measure: runs it.
         catches: deliberate errors in the engine that it was seen to catch, names out of `mutations.MUTATIONS`.
         needs: a module that it compares with and that may be missing; the case is skipped then.
+        uses_elements: whether finite elements take part; the case is run once, not for each of them, if not.
     """
 
     name: str
@@ -120,6 +126,7 @@ class Case:
     measure: Callable[[Setup], list[Row]]
     catches: tuple[str, ...] = ()
     needs: str | None = None
+    uses_elements: bool = True
 
 
 CASES: dict[str, Case] = {}
@@ -134,7 +141,13 @@ def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: floa
 
 
 def case(
-    *, group: str, title: str, reference: str, catches: tuple[str, ...] = (), needs: str | None = None
+    *,
+    group: str,
+    title: str,
+    reference: str,
+    catches: tuple[str, ...] = (),
+    needs: str | None = None,
+    uses_elements: bool = True,
 ) -> Callable[[Callable[[Setup], list[Row]]], Callable[[Setup], list[Row]]]:
     """Register the function below as the case of its name."""
 
@@ -142,7 +155,14 @@ def case(
         name: str = measure.__name__  # type: ignore[attr-defined]
         assert name not in CASES, name
         CASES[name] = Case(
-            name=name, group=group, title=title, reference=reference, measure=measure, catches=catches, needs=needs
+            name=name,
+            group=group,
+            title=title,
+            reference=reference,
+            measure=measure,
+            catches=catches,
+            needs=needs,
+            uses_elements=uses_elements,
         )
         return measure
 

@@ -30,6 +30,11 @@ class Outcome:
     skipped: str | None = None
 
     @property
+    def element(self) -> str:
+        """Formulation that was run, or "none" where none takes part."""
+        return self.setup.element if self.case.uses_elements else "none"
+
+    @property
     def met(self) -> bool:
         """Whether every row is."""
         return self.failure is None and bool(self.rows) and all(row.met for row in self.rows)
@@ -63,7 +68,7 @@ def lines(outcome: Outcome) -> list[str]:
         return [f"{case.group}/{case.name}: {case.title}: {outcome.skipped}"]
     verdict = "met" if outcome.met else "NOT MET"
     shown = [
-        f"{case.group}/{case.name} ({setup.element}, {setup.precision}): {case.title}: {verdict}, {outcome.wall:.1f} s"
+        f"{case.group}/{case.name} ({outcome.element}, {setup.precision}): {case.title}: {verdict}, {outcome.wall:.1f} s"
     ]
     if outcome.failure:
         shown.append(f"  {outcome.failure}")
@@ -101,7 +106,7 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
     text += ["| element | precision | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 2) + "|"]
     reasons: dict[str, str] = {}
     for outcome in outcomes:
-        who = f"| {outcome.setup.element} | {outcome.setup.precision} | "
+        who = f"| {outcome.element} | {outcome.setup.precision} | "
         for row in outcome.rows:
             text.append(who + " | ".join(cells(row)) + " |")
             reasons.setdefault(row.quantity, row.why)
@@ -125,7 +130,7 @@ def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
     figure = new_figure(7.0, 3.0 * len(groups))
     for axes, group in zip(figure.subplots(len(groups), 1, squeeze=False)[:, 0], groups, strict=True):
         for k, (outcome, row) in enumerate((o, r) for o, r in curves if o.case.group == group):
-            label = f"{outcome.case.name}, {outcome.setup.element}, {outcome.setup.precision}: {row.quantity}"
+            label = f"{outcome.case.name}, {outcome.element}, {outcome.setup.precision}: {row.quantity}"
             sizes = [size / max(row.sizes) for size in row.sizes]
             axes.loglog(sizes, row.errors, marker="osv^Dx"[k % 6], label=label, linewidth=1.0, markersize=4)
         axes.set_title(group, loc="left", fontsize=10)

@@ -56,11 +56,11 @@ def verify(
     elements = [element] if element else list(ELEMENTS)
     outcomes = []
     for case in chosen:
-        for item in elements:
+        for item in elements if case.uses_elements else elements[:1]:
             found = outcome(case, Setup(device=device, precision=precision, element=item, level=level))
             print("\n".join(lines(found)), flush=True)
             outcomes.append(found)
-    failed = [f"{o.case.name} ({o.setup.element})" for o in outcomes if not o.met and not o.skipped]
+    failed = [f"{o.case.name} ({o.element})" for o in outcomes if not o.met and not o.skipped]
     done = [o for o in outcomes if not o.skipped]
     rows = sum(len(o.rows) for o in outcomes)
     wall = sum(o.wall for o in outcomes)
