@@ -169,7 +169,7 @@ def friction_work(setup: Setup) -> list[Row]:
 @case(
     group="friction",
     title="Sticking contact gives all of its elastic energy back, at the frequency of its springs",
-    reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V for each node of a sole of equal faces.",
+    reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V a node, of equal faces.",
     catches=("tangential_spring_halved", "friction_limit_halved"),
 )
 def sticking_energy(setup: Setup) -> list[Row]:

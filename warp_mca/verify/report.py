@@ -63,13 +63,11 @@ HEAD = ["quantity", "exact", "measured, coarse to fine", "error", "order", "tole
 
 def lines(outcome: Outcome) -> list[str]:
     """What the console shows of one case."""
-    case, setup = outcome.case, outcome.setup
+    case, how = outcome.case, f"{outcome.element}, {outcome.setup.precision}"
     if outcome.skipped:
         return [f"{case.group}/{case.name}: {case.title}: {outcome.skipped}"]
     verdict = "met" if outcome.met else "NOT MET"
-    shown = [
-        f"{case.group}/{case.name} ({outcome.element}, {setup.precision}): {case.title}: {verdict}, {outcome.wall:.1f} s"
-    ]
+    shown = [f"{case.group}/{case.name} ({how}): {case.title}: {verdict}, {outcome.wall:.1f} s"]
     if outcome.failure:
         shown.append(f"  {outcome.failure}")
     for row in outcome.rows:
