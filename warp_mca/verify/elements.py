@@ -31,6 +31,7 @@ PATCH = np.array(
     dtype=np.int32,
 )  # fmt: skip
 MATERIAL = mca.Elastic(E=1e6, nu=0.25, rho=1000.0)  # of the patch test in its source, with a density besides
+Kinematics = Literal["corotational", "finite"]
 EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}
 
 
@@ -41,7 +42,7 @@ class Imposed:
         X: positions of the nodes before [m], shape (node_count, 3), float64.
     """
 
-    def __init__(self, setup: Setup, geometry: Mesh, kinematics: Literal["corotational", "finite"] = "corotational"):
+    def __init__(self, setup: Setup, geometry: Mesh, kinematics: Kinematics = "corotational"):
         from warp_mca.handoff import hand_off
         from warp_mca.model import build_model, nodal_masses
         from warp_mca.output import NodalStress
@@ -175,7 +176,11 @@ def mixed_patch(setup: Setup) -> list[Row]:
     strain, J = axes @ np.diag(0.5 * np.log(squared)) @ axes.T, float(np.linalg.det(F))
     large = (2.0 * G * (strain - np.log(J) / 3.0 * identity) + K * np.log(J) * identity) / J
     rows = []
-    for kinematics, H, exact in (("corotational", e, small), ("finite", F - identity, large)):
+    measures: tuple[tuple[Kinematics, Array, Array], ...] = (
+        ("corotational", e, small),
+        ("finite", F - identity, large),
+    )
+    for kinematics, H, exact in measures:
         body = Imposed(setup, mixed_cube(), kinematics)
         u = body.X @ H.T
         inside = ((body.X > 1e-9) & (body.X < 1.0 - 1e-9)).all(axis=1)
