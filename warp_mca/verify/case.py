@@ -72,6 +72,8 @@ class Row:
         sizes: element sizes of the meshes, in any one unit; needed for an order.
         scale: what errors are shares of; |exact| by default, so needed where that is 0.
         least_order: observed order that is demanded between the two finest meshes, or None.
+        open: what is known where the row is not met for reasons not yet found; it is shown as open then, and does not
+            fail its case.
     """
 
     quantity: str
@@ -83,6 +85,7 @@ class Row:
     sizes: tuple[float, ...] = ()
     scale: float | None = None
     least_order: float | None = None
+    open: str | None = None
 
     @property
     def errors(self) -> tuple[float, ...]:
@@ -96,6 +99,11 @@ class Row:
         if len(self.sizes) < 2 or len(self.measured) < 2 or min(self.errors[-2:]) == 0.0:
             return None
         return math.log(self.errors[-2] / self.errors[-1]) / math.log(self.sizes[-2] / self.sizes[-1])
+
+    @property
+    def verdict(self) -> str:
+        """In a word."""
+        return "met" if self.met else "OPEN" if self.open else "NOT MET"
 
     @property
     def met(self) -> bool:

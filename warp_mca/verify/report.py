@@ -36,8 +36,8 @@ class Outcome:
 
     @property
     def met(self) -> bool:
-        """Whether every row is."""
-        return self.failure is None and bool(self.rows) and all(row.met for row in self.rows)
+        """Whether every row is, or is known to be open."""
+        return self.failure is None and bool(self.rows) and all(row.met or row.open for row in self.rows)
 
 
 def _number(value: float) -> str:
@@ -54,7 +54,7 @@ def cells(row: Row) -> list[str]:
         f"{row.errors[-1]:.2g}",
         "" if order is None else f"{order:.1f}",
         f"{row.tolerance:.2g}",
-        "met" if row.met else "NOT MET",
+        row.verdict,
     ]
 
 
@@ -74,6 +74,8 @@ def lines(outcome: Outcome) -> list[str]:
         quantity, exact, measured, error, order, tolerance, met = cells(row)
         rate = f", order {order}" if order else ""
         shown.append(f"  {quantity}: {measured} for {exact}, error {error}{rate}, tolerance {tolerance}: {met}")
+        if row.verdict == "OPEN" and row.open:
+            shown.append(f"    {row.open}")
     return shown
 
 
@@ -107,7 +109,7 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
         who = f"| {outcome.element} | {outcome.setup.precision} | "
         for row in outcome.rows:
             text.append(who + " | ".join(cells(row)) + " |")
-            reasons.setdefault(row.quantity, row.why)
+            reasons.setdefault(row.quantity, row.why + (f"; open: {row.open}" if row.verdict == "OPEN" else ""))
         if outcome.failure:
             text.append(who + f"{outcome.failure} | | | | | | NOT MET |")
     text += ["", "Tolerances: " + "; ".join(f"{key}: {why}" for key, why in reasons.items()) + "."]

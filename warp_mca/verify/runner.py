@@ -65,6 +65,8 @@ def verify(
     rows = sum(len(o.rows) for o in outcomes)
     wall = sum(o.wall for o in outcomes)
     left_out = f", {len(outcomes) - len(done)} skipped" if len(done) < len(outcomes) else ""
+    unsettled = sum(row.verdict == "OPEN" for o in outcomes for row in o.rows)
+    left_out += f", {unsettled} quantities open" if unsettled else ""
     print(f"{len(done) - len(failed)} of {len(done)} cases met{left_out}, {rows} quantities, {wall:.0f} s")
     if out is not None:
         command = f"warp-mca verify --level {level} --device {device} --precision {precision}"
