@@ -222,8 +222,8 @@ MUTATIONS: dict[str, Mutation] = {
         "kept = R(1.0)",
         element="hex8r",
     ),
-    "hourglass_shear_like": Mutation(
-        "the hourglass strains of hex8r along an edge take the shear modulus in place of Young's",
+    "hourglass_modulus_low": Mutation(
+        "hourglass strains of hex8r along an edge take the modulus G in place of 2 G / (1 - nu)",
         "kernels/hex8r.py",
         "plane = R(2.0) * G / (one - nu)",
         "plane = G",
