@@ -276,7 +276,7 @@ class _Foot:
     reference="Taylor's impact test: Kamoulakos (1990); Zhu and Cescotto, Comput. "
     "Meth. Appl. Mech. Engng 123 (1995); Camacho and Ortiz, Comput. Meth. Appl. Mech. Engng 142 (1997) 269: length "
     "21.4 to 21.5 mm and radius of the foot 7.0 to 7.2 mm after 80 us.",
-    catches=("logarithmic_strain_doubled", "hourglass_stays_elastic", "hardening_is_tangent"),
+    catches=("logarithmic_strain_doubled", "hourglass_stays_elastic"),
 )
 def taylor_bar(setup: Setup) -> list[Row]:
     """L = 32.4 mm, R = 3.2 mm, E = 117 GPa, nu = 0.35, 8930 kg/m^3, sigma_y = 400 MPa, E_t = 100 MPa; finite strain.
