@@ -37,11 +37,28 @@ def copy(folder: Path, mutation: Mutation) -> None:
     file.write_text(text.replace(mutation.old, mutation.new), encoding="utf-8")
 
 
-def caught(name: str, case: str, element: str) -> bool:
+def check_origin(folder: Path) -> None:
+    """Makes sure that Python takes the package from the copy.
+
+    Raises:
+        RuntimeError: it does not.
+    """
+    text = (
+        "import warp_mca.kernels.j2 as a, warp_mca.elements as b, warp_mca.scenes as c; print(*map(origin, (a, b, c)))"
+    )
+    command = [sys.executable, "-c", f"origin = lambda module: module.__file__; {text}"]
+    said = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.split()
+    elsewhere = [file for file in said if folder.resolve() not in Path(file).resolve().parents]
+    if elsewhere:
+        raise RuntimeError(f"the copy in {folder} is not what runs: Python imports {', '.join(elsewhere)}")
+
+
+def caught(name: str, case: str) -> bool:
     """Whether `case` fails in a copy with the error `name`."""
     with tempfile.TemporaryDirectory() as folder:
         copy(Path(folder), MUTATIONS[name])
-        command = [sys.executable, "-m", "warp_mca", "verify", case, "--element", element]
+        check_origin(Path(folder))
+        command = [sys.executable, "-m", "warp_mca", "verify", case, "--element", MUTATIONS[name].element]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1):
         raise RuntimeError(done.stderr)
@@ -52,16 +69,16 @@ def main() -> None:
     """Run every pair of error and case; exit 1 if one goes unnoticed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", choices=[[], *MUTATIONS])
-    parser.add_argument("--element", default="hex8")
     args = parser.parse_args()
     missed = 0
     for case in cases():
         for name in case.catches:
             if args.names and name not in args.names:
                 continue
-            found = caught(name, case.name, args.element)
+            found = caught(name, case.name)
             missed += not found
-            print(f"{name}: {case.name} {'fails, as it must' if found else 'DOES NOT NOTICE'}", flush=True)
+            verdict = "fails, as it must" if found else "DOES NOT NOTICE"
+            print(f"{name}: {case.name} ({MUTATIONS[name].element}) {verdict}", flush=True)
     sys.exit(min(missed, 1))
 
 

@@ -11,40 +11,15 @@ from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 from warp_mca.elements import ELEMENTS
-from warp_mca.geometry.degenerate import AS_HEXAHEDRON, CORNERS_OF, cell_kinds, oriented, tetrahedral
+from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
 from warp_mca.model import build_model
 from warp_mca.solver import Solver
+from warp_mca.verify.elements import mixed_cube
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 KINDS = [(name, kinematics) for name in ELEMENTS for kinematics in ("corotational", "finite")]
-
-
-def mixed_cube() -> Mesh:
-    """A unit cube of 2 x 2 x 2 cells: one is of pyramids and tetrahedra, two of wedges, five are hexahedra."""
-    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
-    points = box.points.copy()
-    inside = ((points > 0.0) & (points < 1.0)).all(axis=1)
-    points[inside] += [0.03, -0.05, 0.04]
-    middle = points[box.hexahedra].mean(axis=1)
-    corners = box.hexahedra[np.argmin(middle @ [1.0, 1.0, -1.0])]
-    centre = len(points)
-    points = np.vstack([points, points[corners].mean(axis=0)])
-    # faces seen from inside; the last two are free, so that they may be cut in triangles
-    faces = [[0, 1, 2, 3], [4, 7, 6, 5], [1, 5, 6, 2], [2, 6, 7, 3], [0, 4, 5, 1], [3, 7, 4, 0]]
-    pyramids = [[*corners[face], centre] for face in faces[:4]]
-    tetrahedra = [[*corners[face][pick], centre] for face in faces[4:] for pick in ([0, 1, 2], [0, 2, 3])]
-    column = np.flatnonzero((middle[:, 0] > 0.5) & (middle[:, 2] > 0.5))  # cut by one plane along y
-    wedges = []
-    for h in box.hexahedra[column]:
-        wedges += [[h[0], h[1], h[5], h[3], h[2], h[6]], [h[0], h[5], h[4], h[3], h[6], h[7]]]
-    kept = [c for c in range(8) if c not in column and (box.hexahedra[c] != corners).any()]
-    hexahedra = [box.hexahedra[kept]]
-    for kind, cells in (("wedge", wedges), ("pyramid", pyramids)):
-        hexahedra.append(oriented(points, np.array(cells), kind)[:, AS_HEXAHEDRON[kind]])
-    tetrahedra = oriented(points, np.array(tetrahedra), "tetra")
-    return Mesh(points, np.concatenate(hexahedra).astype(np.int32), {}, {}, tetrahedra)
 
 
 def solver_of(mesh: Mesh, element: str, kinematics: str, precision: str = "float64", material=STEEL) -> Solver:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 import threading
@@ -14,8 +15,10 @@ import pytest
 from warp_mca.errors import RequestError
 from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
 from warp_mca.geometry.blocks import Blocks, growth
+from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.edit import compact
-from warp_mca.geometry.quality import check, edge_lengths, scaled_jacobian, volumes
+from warp_mca.geometry.quality import check, edge_lengths, gauss_jacobians, scaled_jacobian, volumes
+from warp_mca.verify.elements import patch
 
 R, LENGTH, FOCUS = 0.013, 0.21, math.radians(36.43)
 
@@ -397,6 +400,21 @@ def test_check_names_body_and_element():
     bad = Mesh(mesh.points, np.array([mesh.hexahedra[0], np.roll(mesh.hexahedra[1], 4)]))
     with pytest.raises(RequestError, match="body arm: 1 of 2 elements are inverted, first element 1"):
         check(bad, "arm")
+
+
+def test_hexahedra_are_judged_at_their_gauss_points():
+    """The standard patch has a corner that is folded over a little; the hexahedron integrates no such point."""
+    mesh = patch()
+    assert scaled_jacobian(mesh).min() < 0.0 < gauss_jacobians(mesh).min()
+    check(mesh, "arm")
+
+
+def test_tetrahedra_are_judged_by_their_volume():
+    mesh = tetrahedral(Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build())
+    turned = mesh.tetrahedra.copy()
+    turned[2] = turned[2][[0, 2, 1, 3]]
+    with pytest.raises(RequestError, match="body arm: 1 of 6 elements are inverted, first element 2"):
+        check(dataclasses.replace(mesh, tetrahedra=turned), "arm")
 
 
 def test_compact_drops_unused_nodes():

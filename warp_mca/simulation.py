@@ -84,7 +84,11 @@ def mesh(scene: Scene) -> dict[str, Mesh]:
             made[key] = body.geometry if isinstance(body.geometry, Mesh) else body.geometry.build()
             check(made[key], body.name)
         meshes[body.name] = made[key]
-    return _cut(scene, meshes)
+    cut = _cut(scene, meshes)
+    for name, item in cut.items():
+        if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
+            check(item, name)
+    return cut
 
 
 def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
 
 Level = Literal["quick", "full"]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +34,10 @@ class Setup:
     precision: str = "mixed"
     element: str = "hex8"
     level: Level = "quick"
+
+    def by_element(self, value: T, **others: T) -> T:
+        """`value`, or the one that is named after this element."""
+        return others.get(self.element, value)
 
     def choose(self, quick: tuple, full: tuple) -> tuple:
         """What belongs to the level: meshes from coarse to fine, most often."""
@@ -67,6 +72,8 @@ class Row:
         sizes: element sizes of the meshes, in any one unit; needed for an order.
         scale: what errors are shares of; |exact| by default, so needed where that is 0.
         least_order: observed order that is demanded between the two finest meshes, or None.
+        open: what is known where the row is not met for reasons not yet found; it is shown as open then, and does not
+            fail its case.
     """
 
     quantity: str
@@ -78,6 +85,7 @@ class Row:
     sizes: tuple[float, ...] = ()
     scale: float | None = None
     least_order: float | None = None
+    open: str | None = None
 
     @property
     def errors(self) -> tuple[float, ...]:
@@ -91,6 +99,11 @@ class Row:
         if len(self.sizes) < 2 or len(self.measured) < 2 or min(self.errors[-2:]) == 0.0:
             return None
         return math.log(self.errors[-2] / self.errors[-1]) / math.log(self.sizes[-2] / self.sizes[-1])
+
+    @property
+    def verdict(self) -> str:
+        """In a word."""
+        return "met" if self.met else "OPEN" if self.open else "NOT MET"
 
     @property
     def met(self) -> bool:
@@ -111,6 +124,7 @@ class Case:
         measure: runs it.
         catches: deliberate errors in the engine that it was seen to catch, names out of `mutations.MUTATIONS`.
         needs: a module that it compares with and that may be missing; the case is skipped then.
+        uses_elements: whether finite elements take part; the case is run once, not for each of them, if not.
     """
 
     name: str
@@ -120,6 +134,7 @@ class Case:
     measure: Callable[[Setup], list[Row]]
     catches: tuple[str, ...] = ()
     needs: str | None = None
+    uses_elements: bool = True
 
 
 CASES: dict[str, Case] = {}
@@ -134,7 +149,13 @@ def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: floa
 
 
 def case(
-    *, group: str, title: str, reference: str, catches: tuple[str, ...] = (), needs: str | None = None
+    *,
+    group: str,
+    title: str,
+    reference: str,
+    catches: tuple[str, ...] = (),
+    needs: str | None = None,
+    uses_elements: bool = True,
 ) -> Callable[[Callable[[Setup], list[Row]]], Callable[[Setup], list[Row]]]:
     """Register the function below as the case of its name."""
 
@@ -142,7 +163,14 @@ def case(
         name: str = measure.__name__  # type: ignore[attr-defined]
         assert name not in CASES, name
         CASES[name] = Case(
-            name=name, group=group, title=title, reference=reference, measure=measure, catches=catches, needs=needs
+            name=name,
+            group=group,
+            title=title,
+            reference=reference,
+            measure=measure,
+            catches=catches,
+            needs=needs,
+            uses_elements=uses_elements,
         )
         return measure
 

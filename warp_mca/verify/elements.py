@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.geometry.degenerate import AS_HEXAHEDRON, oriented
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.verify.case import Row, Setup, case
 
@@ -28,6 +31,7 @@ PATCH = np.array(
     dtype=np.int32,
 )  # fmt: skip
 MATERIAL = mca.Elastic(E=1e6, nu=0.25, rho=1000.0)  # of the patch test in its source, with a density besides
+Kinematics = Literal["corotational", "finite"]
 EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}
 
 
@@ -38,17 +42,16 @@ class Imposed:
         X: positions of the nodes before [m], shape (node_count, 3), float64.
     """
 
-    def __init__(self, setup: Setup, geometry: Mesh, material: mca.Elastic = MATERIAL) -> None:
+    def __init__(self, setup: Setup, geometry: Mesh, kinematics: Kinematics = "corotational"):
         from warp_mca.handoff import hand_off
         from warp_mca.model import build_model, nodal_masses
         from warp_mca.output import NodalStress
         from warp_mca.solver import Solver
 
-        body = mca.Body(name="block", geometry=geometry, material=material)
+        body = mca.Body(name="block", geometry=geometry, material=MATERIAL, kinematics=kinematics)
         scene = mca.Scene(name="imposed", bodies=(body,), impact=mca.ImpactPhase(duration=1.0))
         scene = setup.with_element(scene)
-        # not checked as a run checks it: the standard patch has a corner that is slightly inverted
-        meshes = {"block": geometry}
+        meshes = mca.mesh(scene)
         start = hand_off(scene, meshes, nodal_masses(scene, meshes))
         self.model = build_model(scene, meshes, start.positions, start.velocities)
         self.solver = Solver(self.model, device=setup.device, precision=setup.precision, dt=self.model.stable.dt)
@@ -81,6 +84,32 @@ class Imposed:
 def patch() -> Mesh:
     """The unit cube of seven distorted hexahedra [m]."""
     return Mesh(np.concatenate([CUBE, INNER]), PATCH)
+
+
+def mixed_cube() -> Mesh:
+    """The unit cube of 2 x 2 x 2 cells [m]: one is of pyramids and tetrahedra, two of wedges, five are hexahedra."""
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+    points = box.points.copy()
+    inside = ((points > 0.0) & (points < 1.0)).all(axis=1)
+    points[inside] += [0.03, -0.05, 0.04]
+    middle = points[box.hexahedra].mean(axis=1)
+    corners = box.hexahedra[np.argmin(middle @ [1.0, 1.0, -1.0])]
+    centre = len(points)
+    points = np.vstack([points, points[corners].mean(axis=0)])
+    # faces seen from inside; the last two are free, so that they may be cut in triangles
+    faces = [[0, 1, 2, 3], [4, 7, 6, 5], [1, 5, 6, 2], [2, 6, 7, 3], [0, 4, 5, 1], [3, 7, 4, 0]]
+    pyramids = [[*corners[face], centre] for face in faces[:4]]
+    tetrahedra = [[*corners[face][pick], centre] for face in faces[4:] for pick in ([0, 1, 2], [0, 2, 3])]
+    column = np.flatnonzero((middle[:, 0] > 0.5) & (middle[:, 2] > 0.5))  # cut by one plane along y
+    wedges = []
+    for h in box.hexahedra[column]:
+        wedges += [[h[0], h[1], h[5], h[3], h[2], h[6]], [h[0], h[5], h[4], h[3], h[6], h[7]]]
+    kept = [c for c in range(8) if c not in column and (box.hexahedra[c] != corners).any()]
+    hexahedra = [box.hexahedra[kept]]
+    for kind, cells in (("wedge", wedges), ("pyramid", pyramids)):
+        hexahedra.append(oriented(points, np.array(cells), kind)[:, AS_HEXAHEDRON[kind]])
+    tetrahedra = oriented(points, np.array(tetrahedra), "tetra")
+    return Mesh(points, np.concatenate(hexahedra).astype(np.int32), {}, {}, tetrahedra)
 
 
 def turned(axis: Array, angle: float) -> Array:
@@ -128,6 +157,60 @@ def patch_test(setup: Setup) -> list[Row]:
             why="ten units of round-off: stress is output in single precision",
         ),
     ]
+
+
+@case(
+    group="elements",
+    title="Hexahedra, wedges, pyramids and tetrahedra in one body carry constant strain, small and large",
+    reference="Closed forms: S = 2 G e + K tr(e) I; Kirchhoff stress 2 G dev(ln V) + K ln(J) I by logarithmic strain.",
+    catches=("gauss_points_moved", "logarithmic_strain_doubled", "tetrahedra_twice_as_large"),
+)
+def mixed_patch(setup: Setup) -> list[Row]:
+    """Unit cube of 5 hexahedra, 4 wedges, 4 pyramids and 4 tetrahedra; strains of 0.1 % and, finite, of 10 %."""
+    gradient = np.array([[0.5, 0.3, -0.2], [0.1, -0.4, 0.6], [0.7, 0.2, 0.3]])
+    G, K, identity = MATERIAL.shear_modulus, MATERIAL.bulk_modulus, np.eye(3)
+    e = 0.5e-3 * (gradient + gradient.T)
+    small = 2.0 * G * e + (K - 2.0 / 3.0 * G) * np.trace(e) * identity
+    F = identity + 0.1 * gradient
+    squared, axes = np.linalg.eigh(F @ F.T)
+    strain, J = axes @ np.diag(0.5 * np.log(squared)) @ axes.T, float(np.linalg.det(F))
+    large = (2.0 * G * (strain - np.log(J) / 3.0 * identity) + K * np.log(J) * identity) / J
+    rows = []
+    measures: tuple[tuple[Kinematics, Array, Array], ...] = (
+        ("corotational", e, small),
+        ("finite", F - identity, large),
+    )
+    for kinematics, H, exact in measures:
+        body = Imposed(setup, mixed_cube(), kinematics)
+        u = body.X @ H.T
+        inside = ((body.X > 1e-9) & (body.X < 1.0 - 1e-9)).all(axis=1)
+        left_over = float(np.linalg.norm(body.force(u)[inside], axis=1).max())
+        scale = body.largest_element_force()
+        stress = body.stress(u)
+        known = exact[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+        worst = np.unravel_index(np.abs(stress - known).argmax(), stress.shape)
+        rows += [
+            Row(
+                quantity=f"{kinematics}: largest force left on an inner node",
+                exact=0.0,
+                measured=(left_over,),
+                unit="N",
+                scale=scale,
+                tolerance=setup.by_element(10.0, tet4=40.0) * EPSILON[setup.precision],
+                why="ten units of round-off, as a share of the largest force of one element on a node; forty of "
+                "tetrahedra, of which twenty meet at a node",
+            ),
+            Row(
+                quantity=f"{kinematics}: stress farthest from exact, of 6 components at all nodes",
+                exact=float(known[worst[1]]),
+                measured=(float(stress[worst]),),
+                unit="Pa",
+                scale=float(np.abs(exact).max()),
+                tolerance=10.0 * EPSILON["mixed"],
+                why="ten units of round-off: stress is output in single precision",
+            ),
+        ]
+    return rows
 
 
 @case(

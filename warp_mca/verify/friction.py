@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -20,6 +21,24 @@ def impulse(result: mca.Result) -> NDArray[np.float64]:
     return np.cumsum(result.F_t) * (result.time[1] - result.time[0])  # row 0 holds the first step alone
 
 
+def springs(setup: Setup, scene: mca.Scene) -> float:
+    """Stiffness of all springs of the scene's contact together [N/m]: it depends on the faces of the element."""
+    from warp_mca.handoff import hand_off
+    from warp_mca.model import build_model, nodal_masses
+
+    scene = setup.with_element(scene)
+    meshes = mca.mesh(scene)
+    start = hand_off(scene, meshes, nodal_masses(scene, meshes))
+    model = build_model(scene, meshes, start.positions, start.velocities)
+    return float(sum(item.stiffness.sum() for item in model.passes))
+
+
+def sunk(setup: Setup, scene: mca.Scene, load: float) -> mca.Scene:
+    """The scene with its body as deep in the plane y = 0 as its springs ask for under `load` [N]."""
+    body = dataclasses.replace(scene.bodies[0], position=(0.0, -load / springs(setup, scene), 0.0))
+    return dataclasses.replace(scene, bodies=(body,))
+
+
 @case(
     group="friction",
     title="A block slides to rest: over v^2 / (2 mu g), in v / (mu g), and all its energy becomes heat",
@@ -31,7 +50,7 @@ def sliding_block(setup: Setup) -> list[Row]:
     cells = setup.choose((1, 2), (1, 2, 4))
     distance, time, heat = [], [], []
     for count in cells:
-        result = setup.run(setup.scene("sliding_block", cells=count))
+        result = setup.run(sunk(setup, setup.scene("sliding_block", cells=count), MASS * GRAVITY))
         speed = SPEED + impulse(result) / MASS
         distance.append(float(np.trapezoid(speed, result.time)))
         time.append(float(crossings(result.time, speed, 0.0)[0]))
@@ -77,7 +96,7 @@ def block_on_belt(setup: Setup) -> list[Row]:
     time, speed, heat, work, rest = [], [], [], [], []
     exact = SPEED / (MU * GRAVITY)
     for count in cells:
-        result = setup.run(setup.scene("block_on_belt", cells=count))
+        result = setup.run(sunk(setup, setup.scene("block_on_belt", cells=count), MASS * GRAVITY))
         of_block = impulse(result) / MASS
         caught = crossings(result.time, of_block, SPEED)
         time.append(float(caught[0]))
@@ -122,7 +141,7 @@ def friction_work(setup: Setup) -> list[Row]:
 
     The work done over the second half of the run, from when all springs slip, is compared.
     """
-    result = setup.run(setup.scene("block_on_belt", cells=1, held=True))
+    result = setup.run(sunk(setup, setup.scene("block_on_belt", cells=1, held=True), MASS * GRAVITY))
     half = len(result.time) // 2
     work = SPEED * (impulse(result)[-1] - impulse(result)[half])
     heat = result["E_friction"][-1] - result["E_friction"][half]
@@ -150,7 +169,7 @@ def friction_work(setup: Setup) -> list[Row]:
 @case(
     group="friction",
     title="Sticking contact gives all of its elastic energy back, at the frequency of its springs",
-    reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V for each node of the sole.",
+    reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V a node, of equal faces.",
     catches=("tangential_spring_halved", "friction_limit_halved"),
 )
 def sticking_energy(setup: Setup) -> list[Row]:
@@ -159,12 +178,13 @@ def sticking_energy(setup: Setup) -> list[Row]:
     omega, kept, heat = [], [], []
     exact = 0.0
     for count in cells:
-        scene = setup.scene("sticking_block", cells=count)
+        penalty = setup.by_element(0.001, tet4=0.001 / 1.5)  # half of a cube's face, a sixth of its volume: A^2 / V
+        scene = setup.scene("sticking_block", cells=count, penalty=penalty)
         material = scene.body("block").material
         assert isinstance(material, mca.Elastic)
         edge = 0.01
-        springs = 0.001 * material.bulk_modulus * edge * (count + 1) ** 2
-        exact = math.sqrt(springs / (material.rho * count**2 * edge**3))
+        stiffness = 0.001 * material.bulk_modulus * edge * (count + 1) ** 2
+        exact = math.sqrt(stiffness / (material.rho * count**2 * edge**3))
         result = setup.run(scene)
         turns = crossings(result.time, result["tip_vx"], 0.0)
         omega.append(math.pi * (len(turns) - 1) / float(turns[-1] - turns[0]) / exact)
@@ -219,7 +239,7 @@ def stick_slip(setup: Setup) -> list[Row]:
     slowed = 20.0 * math.sqrt(0.004 * 2e-3 / stiffness)  # half of the time in which the spring's end is slowed
     stuck, period, amplitude, heat = [], [], [], []
     for count in cells:
-        result = setup.run(setup.scene("stick_slip", cells=count))
+        result = setup.run(sunk(setup, setup.scene("stick_slip", cells=count), force / MU))
         interval = result.time[1] - result.time[0]
         way = np.cumsum(result["tip_vx"]) * interval
         row = int(np.flatnonzero(result["stick_fraction"] > 0.0)[0])

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.recorders import Cadence
 from warp_mca.verify.case import Row, Setup, case, crossings
+
+if TYPE_CHECKING:
+    from warp_mca.recorders.recorder import Frame, RunInfo
 
 
 @case(
@@ -61,7 +69,8 @@ def coaxial_rods(setup: Setup) -> list[Row]:
     The speed of the short rod's centre of mass follows from the impulse; that of the long rod's is the mean at its
     middle over a whole period 2 L2 / c of its free waves, so that the two do not share an error.
     """
-    counts = setup.choose((40, 80), (40, 80, 160))
+    quick = setup.by_element((40, 80), tet4=(80, 160))  # with 40, the duration shows no order yet
+    counts = setup.choose(quick, (40, 80, 160))
     length, v, c = 0.5, 2.0, math.sqrt(200e9 / 7800.0)
     exact = 0.5 * 7800.0 * c * 0.04**2 * v
     mass, transit = 7800.0 * 0.04**2 * length, 2.0 * length / c
@@ -202,20 +211,109 @@ def hertz_block(setup: Setup) -> list[Row]:
     sizes = tuple(1.2e-3 / section for section in sections)
     found = []
     for section, size in zip(sections, sizes, strict=True):
-        parameters = {"section": section, "pole_size": size, "pole_layers": section if setup.level == "full" else 5}
+        layers = section if setup.level == "full" else setup.by_element(5, tet4=section)
+        parameters = {"section": section, "pole_size": size, "pole_layers": layers}
         found.append(peak_and_duration(setup.run(setup.scene("hertz_sphere", target="block", **parameters))))
     force, duration = hertz(1.0, 0.5 * STEEL)
+    limit, reason = 0.025, FINITE
+    if setup.element == "tet4" and setup.level == "quick":
+        more = "linear tetrahedra under the contact add 1.5 %, of order 1.4: 6.3, 3.5, 2.3 % with 4, 6, 8 layers"
+        limit, reason = 0.04, f"{FINITE}; {more}"
     return [
         Row(
             quantity=quantity,
             exact=exact,
             measured=measured,
             unit=unit,
-            tolerance=0.025,
-            why=FINITE,
+            tolerance=tolerance,
+            why=why,
         )
-        for quantity, exact, measured, unit in (
-            ("peak force F_max", force, tuple(item[0] for item in found), "N"),
-            ("duration", duration, tuple(item[1] for item in found), "s"),
+        for quantity, exact, measured, unit, tolerance, why in (
+            ("peak force F_max", force, tuple(item[0] for item in found), "N", 0.025, FINITE),
+            ("duration", duration, tuple(item[1] for item in found), "s", limit, reason),
         )
+    ]
+
+
+class _Foot:
+    """A recorder that keeps the final shape of `taylor_bar`.
+
+    Attributes:
+        length: greatest extent along x [m].
+        radius: mean distance of the nodes of the foot's rim from the axis [m].
+    """
+
+    name = "foot"
+    needs = frozenset(("surface",))
+
+    def __init__(self, length: float, radius: float) -> None:
+        self.cadence = Cadence(frames=2)
+        self._end, self._rim = length, radius
+        self._nodes: NDArray[np.intp] | None = None
+        self.length = self.radius = math.nan
+
+    def start(self, info: RunInfo) -> None:
+        """Nothing to prepare."""
+
+    def frame(self, frame: Frame) -> None:
+        """Choose the rim in the first frame, measure in each."""
+        x, y, z = np.asarray(frame.points["bar"], dtype=np.float64).T
+        distance = np.hypot(y, z)
+        if self._nodes is None:
+            self._nodes = np.flatnonzero((x > 0.9999 * self._end) & (distance > 0.999 * self._rim))
+        self.length, self.radius = float(np.ptp(x)), float(distance[self._nodes].mean())
+
+    def history(self, rows: object) -> None:
+        """Not used."""
+
+    def finish(self, succeeded: bool) -> None:
+        """Nothing to close."""
+
+
+@case(
+    group="impact",
+    title="A copper cylinder strikes a rigid wall at 227 m/s and mushrooms as other codes have it",
+    reference="Taylor's impact test: Kamoulakos (1990); Zhu and Cescotto (1995); Camacho and Ortiz, Comput. Meth. Appl. "
+    "Mech. Engng 142 (1997) 269: length 21.4 to 21.5 mm and radius of the foot 7.0 to 7.2 mm after 80 us.",
+    catches=("logarithmic_strain_doubled", "hourglass_stays_elastic"),
+)
+def taylor_bar(setup: Setup) -> list[Row]:
+    """L = 32.4 mm, R = 3.2 mm, E = 117 GPa, nu = 0.35, 8930 kg/m^3, sigma_y = 400 MPa, E_t = 100 MPa; finite strain.
+
+    The radius is the mean over the rim's nodes, which lay on the circle: the corners of the core lead to rim nodes up
+    to 1 % farther out. Cells of the foot flatten, so that the step is a small share of the first stable one.
+    """
+    quick = setup.by_element((24,), hex8r=(24, 36))
+    counts = setup.choose(quick, (24, 36))
+    length, radius = [], []
+    for count in counts:
+        foot = _Foot(0.0324, 0.0032)
+        scale = setup.by_element(0.15, hex8r=0.1, tet4=0.3)
+        setup.run(setup.scene("taylor_bar", axial=count, time_step_scale=scale), recorders=[foot])
+        length.append(1e3 * foot.length)
+        radius.append(1e3 * foot.radius)
+    scatter = "the published range"
+    mesh = (length[-2] - length[-1]) / (counts[-1] / counts[-2] - 1.0) if setup.element == "hex8r" else 0.0
+    coarse = (
+        "; and what order 1 leaves of the change from the mesh before: 21.66, 21.57, 21.50 mm with 24, 36, 54 cells"
+    )
+    return [
+        Row(
+            quantity="final length",
+            exact=21.45,
+            measured=tuple(length),
+            unit="mm",
+            tolerance=(0.05 + mesh) / 21.45,
+            why=scatter + setup.by_element("", hex8r=coarse),
+        ),
+        Row(
+            quantity="final radius of the foot, mean over its rim",
+            exact=7.1,
+            measured=tuple(radius),
+            unit="mm",
+            tolerance=0.1 / 7.1,
+            why=scatter,
+            open="it grows on finer meshes and does not converge into the range: 7.43, 7.41 mm with 24, 36 cells of "
+            "hex8, 7.26, 7.25, 7.32 mm with 24, 36, 54 of hex8r, 7.24, 7.32 mm with 24, 36 of tet4",
+        ),
     ]

@@ -17,12 +17,14 @@ class Mutation:
         file: that is changed, from the repository's root.
         old: text that stands there once.
         new: what takes its place.
+        element: with which the case must be run to notice.
     """
 
     what: str
     file: str
     old: str
     new: str
+    element: str = "hex8"
 
 
 MUTATIONS: dict[str, Mutation] = {
@@ -199,6 +201,47 @@ MUTATIONS: dict[str, Mutation] = {
         "kernels/hex8.py",
         "N, d, pressure)",
         "N, d, R(0.5) * pressure)",
+    ),
+    "logarithmic_strain_doubled": Mutation(
+        "logarithmic strain lacks the factor 1 / 2",
+        "kernels/kinematics.py",
+        "mean = (e0 + e1 + e2) / R(3.0)",
+        "e0, e1, e2 = R(2.0) * e0, R(2.0) * e1, R(2.0) * e2\n        mean = (e0 + e1 + e2) / R(3.0)",
+    ),
+    "hourglass_reversed": Mutation(
+        "hourglass forces of hex8r have the wrong sign",
+        "kernels/hex8r.py",
+        "        Q = eighth * Q\n",
+        "        Q = -eighth * Q\n",
+        element="hex8r",
+    ),
+    "hourglass_stays_elastic": Mutation(
+        "hourglass strains of hex8r do not flow where the element yields",
+        "kernels/hex8r.py",
+        "kept = S_eq / (S_eq + R(3.0) * G * (p_new - p))",
+        "kept = R(1.0)",
+        element="hex8r",
+    ),
+    "hourglass_modulus_low": Mutation(
+        "hourglass strains of hex8r along an edge take the modulus G in place of 2 G / (1 - nu)",
+        "kernels/hex8r.py",
+        "plane = R(2.0) * G / (one - nu)",
+        "plane = G",
+        element="hex8r",
+    ),
+    "own_pressure": Mutation(
+        "tetrahedra take the pressure of their own volume change in place of the nodes' means",
+        "kernels/tet4.py",
+        "\n        strain, N, d = deviator(H)\n        S = ",
+        "\n        pressure = pressure_of(law[m, 0], wp.trace(H))\n        strain, N, d = deviator(H)\n        S = ",
+        element="tet4",
+    ),
+    "tetrahedra_twice_as_large": Mutation(
+        "the volume of a tetrahedron lacks a factor 1 / 2 where its growth is found",
+        "kernels/tet4.py",
+        "return W, H, rows, det / R(6.0)",
+        "return W, H, rows, det / R(3.0)",
+        element="tet4",
     ),
     "hinge_forgets_masses": Mutation(
         "two tied nodes take their plain mean motion in place of the mass-weighted one",

@@ -30,9 +30,14 @@ class Outcome:
     skipped: str | None = None
 
     @property
+    def element(self) -> str:
+        """Formulation that was run, or "none" where none takes part."""
+        return self.setup.element if self.case.uses_elements else "none"
+
+    @property
     def met(self) -> bool:
-        """Whether every row is."""
-        return self.failure is None and bool(self.rows) and all(row.met for row in self.rows)
+        """Whether every row is, or is known to be open."""
+        return self.failure is None and bool(self.rows) and all(row.met or row.open for row in self.rows)
 
 
 def _number(value: float) -> str:
@@ -49,7 +54,7 @@ def cells(row: Row) -> list[str]:
         f"{row.errors[-1]:.2g}",
         "" if order is None else f"{order:.1f}",
         f"{row.tolerance:.2g}",
-        "met" if row.met else "NOT MET",
+        row.verdict,
     ]
 
 
@@ -58,19 +63,19 @@ HEAD = ["quantity", "exact", "measured, coarse to fine", "error", "order", "tole
 
 def lines(outcome: Outcome) -> list[str]:
     """What the console shows of one case."""
-    case, setup = outcome.case, outcome.setup
+    case, how = outcome.case, f"{outcome.element}, {outcome.setup.precision}"
     if outcome.skipped:
         return [f"{case.group}/{case.name}: {case.title}: {outcome.skipped}"]
     verdict = "met" if outcome.met else "NOT MET"
-    shown = [
-        f"{case.group}/{case.name} ({setup.element}, {setup.precision}): {case.title}: {verdict}, {outcome.wall:.1f} s"
-    ]
+    shown = [f"{case.group}/{case.name} ({how}): {case.title}: {verdict}, {outcome.wall:.1f} s"]
     if outcome.failure:
         shown.append(f"  {outcome.failure}")
     for row in outcome.rows:
         quantity, exact, measured, error, order, tolerance, met = cells(row)
         rate = f", order {order}" if order else ""
         shown.append(f"  {quantity}: {measured} for {exact}, error {error}{rate}, tolerance {tolerance}: {met}")
+        if row.verdict == "OPEN" and row.open:
+            shown.append(f"    {row.open}")
     return shown
 
 
@@ -101,10 +106,10 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
     text += ["| element | precision | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 2) + "|"]
     reasons: dict[str, str] = {}
     for outcome in outcomes:
-        who = f"| {outcome.setup.element} | {outcome.setup.precision} | "
+        who = f"| {outcome.element} | {outcome.setup.precision} | "
         for row in outcome.rows:
             text.append(who + " | ".join(cells(row)) + " |")
-            reasons.setdefault(row.quantity, row.why)
+            reasons.setdefault(row.quantity, row.why + (f"; open: {row.open}" if row.verdict == "OPEN" else ""))
         if outcome.failure:
             text.append(who + f"{outcome.failure} | | | | | | NOT MET |")
     text += ["", "Tolerances: " + "; ".join(f"{key}: {why}" for key, why in reasons.items()) + "."]
@@ -125,7 +130,7 @@ def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
     figure = new_figure(7.0, 3.0 * len(groups))
     for axes, group in zip(figure.subplots(len(groups), 1, squeeze=False)[:, 0], groups, strict=True):
         for k, (outcome, row) in enumerate((o, r) for o, r in curves if o.case.group == group):
-            label = f"{outcome.case.name}, {outcome.setup.element}, {outcome.setup.precision}: {row.quantity}"
+            label = f"{outcome.case.name}, {outcome.element}, {outcome.setup.precision}: {row.quantity}"
             sizes = [size / max(row.sizes) for size in row.sizes]
             axes.loglog(sizes, row.errors, marker="osv^Dx"[k % 6], label=label, linewidth=1.0, markersize=4)
         axes.set_title(group, loc="left", fontsize=10)

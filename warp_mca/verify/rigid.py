@@ -91,6 +91,7 @@ def mujoco_swing(chain: Chain, theta: Array, theta_dot: Array, samples: int, sub
     reference="MuJoCo (Todorov, Erez and Tassa, IROS 2012), Runge-Kutta method of order 4.",
     catches=("rate_force_reversed", "far_links_weightless"),
     needs="mujoco",
+    uses_elements=False,
 )
 def chain_mujoco(setup: Setup) -> list[Row]:
     """Two equal slender rods from rest, level; five crooked links that move already; g = 9.8 m/s^2."""
@@ -124,6 +125,7 @@ def chain_mujoco(setup: Setup) -> list[Row]:
     title="A swinging chain keeps its energy, and without gravity its angular momentum",
     reference="Conservation laws.",
     catches=("rate_force_reversed", "far_links_weightless"),
+    uses_elements=False,
 )
 def chain_energy(setup: Setup) -> list[Row]:
     """Five crooked links for 1 s, with g = 9.8 m/s^2 and with none."""

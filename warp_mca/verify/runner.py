@@ -56,15 +56,17 @@ def verify(
     elements = [element] if element else list(ELEMENTS)
     outcomes = []
     for case in chosen:
-        for item in elements:
+        for item in elements if case.uses_elements else elements[:1]:
             found = outcome(case, Setup(device=device, precision=precision, element=item, level=level))
             print("\n".join(lines(found)), flush=True)
             outcomes.append(found)
-    failed = [f"{o.case.name} ({o.setup.element})" for o in outcomes if not o.met and not o.skipped]
+    failed = [f"{o.case.name} ({o.element})" for o in outcomes if not o.met and not o.skipped]
     done = [o for o in outcomes if not o.skipped]
     rows = sum(len(o.rows) for o in outcomes)
     wall = sum(o.wall for o in outcomes)
     left_out = f", {len(outcomes) - len(done)} skipped" if len(done) < len(outcomes) else ""
+    unsettled = sum(row.verdict == "OPEN" for o in outcomes for row in o.rows)
+    left_out += f", {unsettled} quantities open" if unsettled else ""
     print(f"{len(done) - len(failed)} of {len(done)} cases met{left_out}, {rows} quantities, {wall:.0f} s")
     if out is not None:
         command = f"warp-mca verify --level {level} --device {device} --precision {precision}"
