@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
+import warp as wp
 
-from benchmarks.blocks import FULL, RATES, SAVINGS, Case, Held
+from benchmarks.blocks import FULL, RATES, SAVINGS, Held
 from benchmarks.memory import memory
 from benchmarks.stages import shares
-from benchmarks.timing import Care, seconds_per_call, steps_per_graph
+from benchmarks.timing import Care, clock, ratio, seconds_per_call, steps_per_graph
 from warp_mca.model import Model
+
+
+def steps_of(held: Held, care: Care) -> int:
+    """Steps of a captured graph."""
+    if held.case.record:
+        return held.case.record
+    first = seconds_per_call(lambda: held.solver.step(1), held.device, Care(0.02, 1), held.reset)
+    return steps_per_graph(first, care)
 
 
 def step_seconds(held: Held, care: Care) -> float:
     """Time of a step [s], replayed from captured graphs as a run does."""
-    held.advance(held.case.record or 1)
-    first = seconds_per_call(lambda: held.solver.step(1), held.device, Care(0.02, 1), held.reset)
-    count = held.case.record or steps_per_graph(first, care)
+    count = steps_of(held, care)
     return seconds_per_call(lambda: held.advance(count), held.device, care, held.reset) / count
+
+
+def saving(whole: Held, part: Held, care: Care) -> float:
+    """Share of the step of `whole` that `part` does without [-], timed in turns."""
+    counts = [steps_of(held, care) for held in (part, whole)]
+    calls = [(lambda h=h, n=n: h.advance(n), h.reset) for h, n in zip((part, whole), counts, strict=True)]
+    return 1.0 - ratio(calls[0], calls[1], whole.device, care) * counts[1] / counts[0]
 
 
 def _row(held: Held, care: Care) -> dict[str, Any]:
@@ -55,8 +68,9 @@ def measure_savings(model: Model, where: dict[str, Any], precisions: list[str], 
         held = Held(model, FULL, device, precision)
         row = where | {"precision": precision, "case": "everything"} | _row(held, care)
         row["stages"] = shares(held, care)
-        row["saves"] = {name: 1.0 - _less(model, case, device, precision, care) / row["seconds_per_step"]
-                        for name, case in SAVINGS.items()}  # fmt: skip
+        row["saves"] = {
+            name: saving(held, Held(model, case, device, precision), care) for name, case in SAVINGS.items()
+        }
         rows.append(row)
         say(row)
         print("    stages: " + ", ".join(f"{k} {1e6 * v:.1f} us" for k, v in row["stages"].items()))
@@ -64,27 +78,21 @@ def measure_savings(model: Model, where: dict[str, Any], precisions: list[str], 
     return rows
 
 
-def _less(model: Model, case: Case, device: str, precision: str, care: Care) -> float:
-    return step_seconds(Held(model, case, device, precision), care)
-
-
 def measure_host(model: Model, where: dict[str, Any], device: str, care: Care) -> dict[str, Any]:
     """Host time to launch a step: replayed from a graph of 20 steps, and kernel by kernel without a graph."""
-    import warp as wp
-
     held = Held(model, FULL, device, "mixed")
     solver = held.solver
-    steps, launches = 20, 5
+    steps, launches, now = 20, 5, clock(device)
     solver.step(steps)
 
     def host(call: Any) -> float:
         times = []
         for _ in range(care.repeats):
             wp.synchronize_device(device)
-            begun = time.perf_counter()
+            begun = now()
             for _ in range(launches):
                 call()
-            times.append(time.perf_counter() - begun)
+            times.append(now() - begun)
         wp.synchronize_device(device)
         return float(np.median(times)) / launches
 

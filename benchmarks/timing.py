@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections.abc import Callable
@@ -21,31 +22,55 @@ class Care:
 QUICK = Care(0.02, 3)
 
 
-def seconds_per_call(
-    call: Callable[[], None], device: str, care: Care, reset: Callable[[], None] | None = None
-) -> float:
+Call = Callable[[], None]
+
+
+def clock(device: str) -> Callable[[], float]:
+    """Wall time on a GPU; on the CPU processor time of this process, which others on the machine cannot lengthen.
+
+    Processor time is that of all threads: where a solver runs several, take wall time on a machine of one's own.
+    """
+    return time.perf_counter if wp.get_device(device).is_cuda else time.process_time
+
+
+def seconds_per_call(call: Call, device: str, care: Care, reset: Call | None = None) -> float:
     """Median time of a call [s], of calls that follow each other until `care.seconds` are over."""
+    count = _enough(call, device, care, reset)
+    return statistics.median(_timed(call, count, device, reset) for _ in range(care.repeats)) / count
+
+
+def ratio(one: tuple[Call, Call], other: tuple[Call, Call], device: str, care: Care) -> float:
+    """Median ratio of the times of two calls, taken in turns; each comes with its reset."""
+    counts = [_enough(call, device, care, reset) for call, reset in (one, other)]
+    found = []
+    for _ in range(care.repeats):
+        spent = [_timed(call, n, device, reset) / n for (call, reset), n in zip((one, other), counts, strict=True)]
+        found.append(spent[0] / spent[1])
+    return statistics.median(found)
+
+
+def _enough(call: Call, device: str, care: Care, reset: Call | None) -> int:
+    """How many calls take `care.seconds`."""
     call()
     wp.synchronize_device(device)
-    count, spent = 1, 0.0
+    count = 1
     while True:
         spent = _timed(call, count, device, reset)
         if spent > 0.25 * care.seconds:
-            break
+            return max(1, math.ceil(count * 1.1 * care.seconds / spent))
         count = count * 4 if spent < 0.02 * care.seconds else round(count * 0.5 * care.seconds / spent) + 1
-    count = max(1, round(count * 1.1 * care.seconds / spent))
-    return statistics.median(_timed(call, count, device, reset) for _ in range(care.repeats)) / count
 
 
 def _timed(call: Callable[[], None], count: int, device: str, reset: Callable[[], None] | None) -> float:
     if reset:
         reset()
     wp.synchronize_device(device)
-    begun = time.perf_counter()
+    now = clock(device)
+    begun = now()
     for _ in range(count):
         call()
     wp.synchronize_device(device)
-    return time.perf_counter() - begun
+    return now() - begun
 
 
 def captured(body: Callable[[], None], count: int, device: str) -> Callable[[], None]:
@@ -58,6 +83,6 @@ def captured(body: Callable[[], None], count: int, device: str) -> Callable[[], 
     return lambda: wp.capture_launch(capture.graph)
 
 
-def steps_per_graph(seconds: float, care: Care, multiple: int = 1) -> int:
+def steps_per_graph(seconds: float, care: Care) -> int:
     """Steps of a graph whose one step takes `seconds`: as many as a run between two searches, fewer if slow."""
-    return max(1, min(20, round(0.25 * care.seconds / max(seconds, 1e-9)))) if multiple == 1 else multiple
+    return max(1, min(20, round(0.25 * care.seconds / max(seconds, 1e-9))))
