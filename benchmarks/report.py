@@ -190,7 +190,16 @@ def peers(rows: list[dict]) -> str:
         ]
         for r in rows
     ]
-    head = ["code", "element", "elements", "steps", "dt [µs]", "wall [s]", "M element-steps/s", "warp_mca is faster by"]
+    head = [
+        "code",
+        "element",
+        "elements",
+        "steps",
+        "dt [µs]",
+        "time [s]",
+        "M element-steps/s",
+        "time / that of the first",
+    ]
     return table([*head, "error"], lines)
 
 
@@ -202,6 +211,8 @@ def render(paths: list[Path]) -> str:
         [title(d), d["device"], *(d["versions"].get(k, "") for k in ("warp_mca", "warp", "numpy", "python", "driver"))]
         for d in devices
     ]
+    unsound = [r for d in devices for part in ("rates", "savings") for r in d.get(part, []) if not r["sound"]]
+    assert not unsound, f"contact search or state failed in {unsound[0]}"
     marks = {
         "devices": table(["device", "name", "warp_mca", "Warp", "NumPy", "Python", "driver"], lines),
         "rates": sections(devices, rates),
@@ -230,7 +241,7 @@ def roofline(paths: list[Path], target: Path) -> None:
     for k, data in enumerate(devices):
         axes = page.add_subplot(1, len(devices), k + 1)
         top = data["ceilings"]
-        x = [0.5, 100.0]
+        x = [1.0, 100.0]
         for name, style in (("f32", "-"), ("f64", "--")):
             ridge = top[name] / top["bytes"]
             line = sorted([x[0], min(max(ridge, x[0]), x[1]), x[1]])
@@ -246,6 +257,10 @@ def roofline(paths: list[Path], target: Path) -> None:
                 axes.plot(*place, marker, color=colours[r["element"]], label=label, linestyle="none")
         axes.set(xscale="log", yscale="log", xlabel="operations per byte moved", ylabel="Gflop/s")
         axes.set_title(title(data), fontsize=9)
+        axes.set_ylim(top["f64"] / 1e9 / 40.0, top["f32"] / 1e9 * 4.0)
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_major_formatter("{x:,g}")
+        axes.yaxis.set_minor_formatter("")
         axes.legend(fontsize=7, frameon=False)
         tidy(axes)
     save_png(page, target)
