@@ -11,6 +11,7 @@ import argparse
 import json
 import platform
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,12 +61,14 @@ def main(words: list[str] | None = None) -> dict[str, Any]:
     parser.add_argument("--precision", nargs="+", default=["mixed", "float64"], choices=["mixed", "float64"])
     parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
     parser.add_argument("--quick", action="store_true", help="shorter timings, fewer repeats")
+    parser.add_argument("--seconds", type=float, help="that a timing lasts at least")
     parser.add_argument("-o", "--output", type=Path, help="JSON file that rows are added to")
     args = parser.parse_args(words)
     begun = time.perf_counter()
     wp.config.quiet = True
     wp.init()
     care = QUICK if args.quick else Care()
+    care = replace(care, seconds=args.seconds or care.seconds)
     cuda = wp.get_device(args.device).is_cuda
     sizes = args.sizes or (["5k", "50k", "159k", "1M"] if cuda else ["5k", "50k"])
     data: dict[str, Any] = {}

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from benchmarks.blocks import Held
+from benchmarks.blocks import Held, pool
 
 
 def arrays(owner: Any, seen: dict[int, wp.array]) -> dict[int, wp.array]:
@@ -50,13 +50,12 @@ def step_bytes(held: Held) -> float:
 
 
 def memory(held: Held) -> dict[str, float]:
-    """Bytes of the solver's arrays and of a step, for each element; what the device's pool holds, where it has one."""
+    """Bytes of the solver's arrays and of a step, for each element; what it took off the device's pool [B]."""
     count = held.solver.model.element_count
     found = {
         "bytes_per_element": sum(a.capacity for a in arrays(held.solver, {}).values()) / count,
         "step_bytes_per_element": step_bytes(held) / count,
     }
-    device = wp.get_device(held.device)
-    if device.is_cuda and device.is_mempool_enabled:
-        found["pool_bytes"] = float(wp.get_mempool_used_mem_current(device))
+    if held.pool_before is not None:
+        found["pool_bytes"] = float(pool(held.device) or 0) - held.pool_before
     return found

@@ -131,7 +131,7 @@ def memory(data: Data) -> str:
         words = [r["element"], r["precision"], r["case"], r["size"], figure(r["bytes_per_element"]), pool]
         words += [figure(r["step_bytes_per_element"]), figure(at["flop"]), figure(at["bytes"] / 1e9)]
         lines.append([*words, figure(at["flops"] / 1e9), f"{100 * at['share']:.0f} %"])
-    head = ["element", "precision", "case", "elements", "held [B/element]", "pool in use [GiB]"]
+    head = ["element", "precision", "case", "elements", "held [B/element]", "off the pool [GiB]"]
     head += ["moved [B/element-step]", "operations/element-step", "moved [GB/s]", "computed [Gflop/s]", "of ceiling"]
     if not any("pool_bytes" in r for r in rows):
         head.pop(5)
