@@ -172,33 +172,32 @@ def host(devices: list[Data]) -> str:
 
 
 def peers(rows: list[dict]) -> str:
-    """Rates and errors of other codes, and their ratio to ours."""
+    """Rates and errors of other codes; ours comes first."""
     if not rows:
         return "Not measured yet."
-    ours = next((r["rate"] for r in rows if r["code"] == "warp_mca"), None)
     lines = [
         [
+            r["problem"],
             f"{r['code']} {r['version']}",
             r["element"],
-            f"{r['n_elements']:,}",
             f"{r['n_steps']:,}",
             f"{1e6 * r['dt']:.3f}",
             f"{r['wall']:.2f}",
             figure(r["rate"] / 1e6),
-            f"{ours / r['rate']:.1f}" if ours else "",
+            f"{r['slower']:.1f}",
             f"{100 * r['error']:.2f} %",
         ]
         for r in rows
     ]
     head = [
+        "bar",
         "code",
         "element",
-        "elements",
         "steps",
         "dt [µs]",
         "time [s]",
         "M element-steps/s",
-        "time / that of the first",
+        "times slower than the first",
     ]
     return table([*head, "error"], lines)
 

@@ -1,4 +1,4 @@
-"""The same elastic bar with each code that is installed, on one core: `python -m benchmarks.peers -o FILE.json`.
+"""The same bars, elastic and plastic, with each code that is installed: `python -m benchmarks.peers -o FILE.json`.
 
 `--python PATH` is the interpreter that has Akantu and Kratos, where that is another one. A code that is missing is
 skipped. Each runs three times; the median rate counts.
@@ -24,7 +24,7 @@ def run(python: str, words: list[str], repeats: int) -> dict[str, Any]:
     for _ in range(repeats):
         command = [python, str(HERE / words[0]), *words[1:]]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-        lines = [line for line in done.stdout.splitlines() if line.startswith('{"code"')]
+        lines = [line for line in done.stdout.splitlines() if line.startswith('{"problem"')]
         if done.returncode or not lines:
             return {"skipped": (done.stderr.strip().splitlines() or ["no result"])[-1]}
         rows.append(json.loads(lines[-1]))
@@ -38,20 +38,23 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("-o", "--output", type=Path, help="JSON file to write")
     args = parser.parse_args()
-    runs = [(sys.executable, ["warp_mca_bar.py", element, "float64"]) for element in ("hex8", "hex8r")]
+    runs = [(sys.executable, ["warp_mca_bar.py", element]) for element in ("hex8", "hex8r")]
     runs += [(args.python, [f"{name}_bar.py"]) for name in PEERS]
     found: list[dict[str, Any]] = []
-    for python, words in runs:
-        row = run(python, words, args.repeats)
-        if "skipped" in row:
-            print(f"{words[0]}: skipped, {row['skipped']}", flush=True)
-            continue
-        found.append(row)
-        print(
-            f"{row['code']:10}{row['version']:14}{row['element']:24}{row['rate'] / 1e6:8.3f} M element-steps/s"
-            f"{found[0]['rate'] / row['rate']:8.1f} times slower than the first{100 * row['error']:8.2f} % error",
-            flush=True,
-        )
+    for problem in ("elastic", "plastic"):
+        first = None
+        for python, words in runs:
+            row = run(python, [*words, problem], args.repeats)
+            if "skipped" in row:
+                print(f"{problem} {words[0]}: skipped, {row['skipped']}", flush=True)
+                continue
+            first = first or row
+            found.append(row | {"slower": first["rate"] / row["rate"]})
+            print(
+                f"{problem} {row['code']:10}{row['version']:14}{row['element']:24}{row['rate'] / 1e6:8.3f} M "
+                f"element-steps/s{found[-1]['slower']:7.1f} times slower{100 * row['error']:8.2f} % error",
+                flush=True,
+            )
     if args.output:
         args.output.write_text(json.dumps({"peers": found}, indent=1) + "\n", encoding="utf-8")
 

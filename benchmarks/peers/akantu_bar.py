@@ -10,7 +10,9 @@ bar.one_thread()
 import akantu as aka  # noqa: E402
 
 with tempfile.TemporaryDirectory() as folder:
-    text = f"material elastic [\n name = steel\n rho = {bar.RHO}\n E = {bar.E}\n nu = {bar.NU}\n]\n"
+    law = "plastic_linear_isotropic_hardening" if bar.PLASTIC else "elastic"
+    more = f" sigma_y = {bar.YIELD}\n h = {bar.HARDENING}\n" if bar.PLASTIC else ""
+    text = f"material {law} [\n name = steel\n rho = {bar.RHO}\n E = {bar.E}\n nu = {bar.NU}\n{more}]\n"
     (file := Path(folder) / "material.dat").write_text(text)
     aka.parseInput(str(file))
 points, bricks, stopped, free = bar.mesh()

@@ -33,6 +33,8 @@ def run(steps: int) -> tuple[float, dict[float, float]]:
     for name, nodes in (("STOPPED", stopped), ("FREE", free), ("MOVING", moving)):
         lines += [f"*NSET, NSET={name}", *(f"{n + 1}," for n in nodes)]
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{bar.E}, {bar.NU}", "*DENSITY", f"{bar.RHO}"]
+    if bar.PLASTIC:
+        lines += ["*PLASTIC", f"{bar.YIELD}, 0.", f"{bar.YIELD + bar.HARDENING:.8g}, 1."]
     lines += ["*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL", "*BOUNDARY", "STOPPED, 1, 1"]
     lines += ["*INITIAL CONDITIONS, TYPE=VELOCITY", f"MOVING, 1, {-bar.SPEED}"]
     lines += [f"*STEP, NLGEOM, INC={10 * steps}", "*DYNAMIC, EXPLICIT", f"{bar.DT:.10g}, {bar.DT * steps:.10g}"]

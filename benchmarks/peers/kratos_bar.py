@@ -5,6 +5,8 @@ Needs `pip install KratosMultiphysics KratosStructuralMechanicsApplication`.
 
 import bar
 
+if bar.PLASTIC:
+    raise SystemExit("its plastic laws are in another application")
 bar.one_thread()
 
 import KratosMultiphysics as KM  # noqa: E402, N817

@@ -1,4 +1,4 @@
-"""Runs the bar with warp_mca: `python benchmarks/peers/warp_mca_bar.py`."""
+"""Runs the bar with warp_mca: `python benchmarks/peers/warp_mca_bar.py [hex8r] [mixed] [plastic]`."""
 
 import sys
 
@@ -11,10 +11,12 @@ from warp_mca.model import build_model  # noqa: E402
 from warp_mca.simulation import mesh  # noqa: E402
 from warp_mca.solver import Solver  # noqa: E402
 
-element = sys.argv[1] if len(sys.argv) > 1 else "hex8"
-precision = sys.argv[2] if len(sys.argv) > 2 else "float64"
+element = "hex8r" if "hex8r" in sys.argv else "hex8"
+precision = "mixed" if "mixed" in sys.argv else "float64"
 box = mca.Box(size=bar.SIZE, divisions=bar.DIVISIONS)
-steel = mca.Elastic(E=bar.E, nu=bar.NU, rho=bar.RHO)
+steel: mca.Elastic = mca.Elastic(E=bar.E, nu=bar.NU, rho=bar.RHO)
+if bar.PLASTIC:
+    steel = mca.J2Bilinear(E=bar.E, nu=bar.NU, rho=bar.RHO, sigma_y=bar.YIELD, E_t=bar.E_T, beta=1.0)
 scene = mca.Scene(
     name="bar",
     bodies=(mca.Body(name="bar", geometry=box, material=steel, element=element),),
