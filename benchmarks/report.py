@@ -260,7 +260,7 @@ def roofline(paths: list[Path], target: Path) -> None:
         axes.xaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_major_formatter("{x:,g}")
         axes.yaxis.set_minor_formatter("")
-        axes.legend(fontsize=7, frameon=False)
+        axes.legend(fontsize=7, frameon=False, loc="upper left", ncols=2)
         tidy(axes)
     save_png(page, target)
 
