@@ -51,6 +51,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
@@ -131,7 +132,6 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         Fy = to_gauss(half * (Sy + pressure * By))
         Fz = to_gauss(half * (Sz + pressure * Bz))
         f = edge_to_node(Fx, Fy, Fz)
-        count = conn.shape[1]
         for a in range(8):
             force_out[slot + a * count + e] = f[a] + W * f[a]
 
@@ -161,6 +161,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
@@ -220,7 +221,6 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
                 yielded_out[e] = flag_new
         half = R(0.5)
         f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz))
-        count = conn.shape[1]
         for a in range(8):
             force_out[slot + a * count + e] = W * f[a] + f[a]
 

@@ -189,6 +189,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
@@ -249,7 +250,6 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         f[5] = f[5] + Q[0] - Q[1] + Q[2] + Q[3]
         f[6] = f[6] - Q[0] - Q[1] - Q[2] - Q[3]
         f[7] = f[7] - Q[0] + Q[1] + Q[2] + Q[3]
-        count = conn.shape[1]
         for a in range(8):
             force_out[slot + a * count + e] = f[a] + W * f[a]
 

@@ -122,6 +122,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         group: wp.array2d(dtype=wp.int32),
         dilation: wp.array(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
@@ -153,7 +154,6 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         f0 = P * c[0]
         f1 = P * c[1]
         f2 = P * c[2]
-        count = conn.shape[1]
         force_out[slot + e] = -f0 - f1 - f2
         force_out[slot + count + e] = f0
         force_out[slot + 2 * count + e] = f1
