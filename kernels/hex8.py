@@ -19,6 +19,7 @@ from warp_mca.kernels.hexahedron import (
     history_functions,
     load_function,
     node_force_function,
+    store_function,
     stress_function,
 )
 from warp_mca.kernels.kinematics import kinematics
@@ -40,6 +41,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     element_rotation, local_displacement = frame_functions(precision)
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
+    store_force = store_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
 
@@ -133,7 +135,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         Fz = to_gauss(half * (Sz + pressure * Bz))
         f = edge_to_node(Fx, Fy, Fz)
         for a in range(8):
-            force_out[slot + a * count + e] = f[a] + W * f[a]
+            store_force(force_out, slot + a * count + e, f, W, a)
 
     return hex8_force
 
@@ -147,6 +149,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
     element_rotation, local_displacement = frame_functions(precision, True)
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
+    store_force = store_function(precision)
     point_gradient = gradient_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
@@ -222,7 +225,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
         half = R(0.5)
         f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz))
         for a in range(8):
-            force_out[slot + a * count + e] = W * f[a] + f[a]
+            store_force(force_out, slot + a * count + e, f, W, a)
 
     return hex8_finite_force
 

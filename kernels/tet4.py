@@ -154,10 +154,11 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         f0 = P * c[0]
         f1 = P * c[1]
         f2 = P * c[2]
-        force_out[slot + e] = -f0 - f1 - f2
-        force_out[slot + count + e] = f0
-        force_out[slot + 2 * count + e] = f1
-        force_out[slot + 3 * count + e] = f2
+        for i in range(3):  # by components, as in `hexahedron.store_function`
+            force_out[slot + e][i] = -f0[i] - f1[i] - f2[i]
+            force_out[slot + count + e][i] = f0[i]
+            force_out[slot + 2 * count + e][i] = f1[i]
+            force_out[slot + 3 * count + e][i] = f2[i]
 
     return tet4_force
 

@@ -19,12 +19,13 @@ from typing import Any
 import warp as wp
 
 from warp_mca.errors import bad_value
+from warp_mca.kernels.lanes import LANES
 
 Task = Callable[[], object]
 Launch = Callable[[slice], None]  # of the elements or nodes of a range
 Split = Callable[[int, Launch, int], None]  # (count, launch, least length of a range)
 
-ELEMENTS, NODES = 256, 4096  # least length of a range, about 0.1 ms: passing one to a thread costs about 0.02 ms
+ELEMENTS, NODES = 1024, 4096  # least length of a range, about 0.1 ms: to pass one to a thread costs about 0.02 ms
 RANGES = 4  # for each thread: one that is held up, or meets more that yields, leaves ranges to the others
 
 
@@ -152,7 +153,7 @@ class Stages:
             return
         self._end()
         stage: list[Task] = []
-        ends = [count * k // parts for k in range(parts + 1)]
+        ends = [count * k // parts // LANES * LANES for k in range(parts)] + [count]
         for start, end in pairwise(ends):
             with wp.ScopedCapture() as capture:
                 launch(slice(start, end))

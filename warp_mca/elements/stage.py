@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.lanes import side_by_side
 from warp_mca.kernels.scalars import scalars
 from warp_mca.threads import ELEMENTS, Split, whole
 
@@ -46,8 +47,8 @@ class ElementStage:
         self.points = points
         self.history = wp.zeros((rows or points * j2.HISTORY_SIZE, kept), dtype=scalars(precision).real)
         kind = (precision, block.plastic, block.finite)
-        self.force_kernel = kernels.force_kernel(*kind)
-        self.energy_kernel = kernels.energy_kernel(*kind)
+        self.force_kernel = side_by_side(kernels.force_kernel(*kind))
+        self.energy_kernel = side_by_side(kernels.energy_kernel(*kind))
         self.stress_kernel = kernels.stress_kernel(*kind)
 
     def kernels(self) -> list[Any]:
