@@ -10,7 +10,7 @@ import os
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from queue import SimpleQueue
@@ -69,14 +69,16 @@ class Pool:
             Exception: what a task raised, once no other is under way.
         """
         shared = deque(tasks)
-        called = self._inboxes[: len(tasks) - 1]
         try:
-            for inbox in called:
+            for inbox in self._inboxes[: len(tasks) - 1]:
                 inbox.put(shared)
-            _drain(shared)
-            errors = [error for error in [self._done.get() for _ in called] if error]
-            if errors:
-                raise errors[0]
+            left = len(tasks)
+            for task in _taken(shared):
+                task()
+                left -= 1
+            for _ in range(left):  # taken by others; who came too late to take one is not waited for
+                if error := self._done.get():
+                    raise error
         except BaseException:  # an interrupt too: no thread may still write to arrays that are about to go
             shared.clear()
             self.close()
@@ -89,20 +91,22 @@ class Pool:
             worker.join()
 
 
-def _drain(tasks: deque[Task]) -> None:
+def _taken(tasks: deque[Task]) -> Iterator[Task]:
+    """Tasks that no other thread has taken, until none is left."""
     while True:
         try:
             task = tasks.popleft()
         except IndexError:
             return
-        task()
+        yield task
 
 
 def _work(inbox: SimpleQueue[deque[Task] | None], done: SimpleQueue[BaseException | None]) -> None:
     while (tasks := inbox.get()) is not None:
         try:
-            _drain(tasks)
-            done.put(None)
+            for task in _taken(tasks):
+                task()
+                done.put(None)
         except BaseException as error:
             tasks.clear()
             done.put(error)
