@@ -147,8 +147,9 @@ class Stages:
         self._capture.__enter__()
 
     def _end(self) -> None:
-        self._capture.__exit__(None, None, None)
-        self._stages.append([_task(self._capture.graph)])
+        if self._capture.active:  # not where capturing a range failed
+            self._capture.__exit__(None, None, None)
+            self._stages.append([_task(self._capture.graph)])
 
     def _split(self, count: int, launch: Launch, least: int) -> None:
         parts = min(RANGES * self.threads, count // least)

@@ -49,7 +49,7 @@ class ElementStage:
         kind = (precision, block.plastic, block.finite)
         self.force_kernel = side_by_side(kernels.force_kernel(*kind))
         self.energy_kernel = side_by_side(kernels.energy_kernel(*kind))
-        self.stress_kernel = kernels.stress_kernel(*kind)
+        self.stress_kernel = side_by_side(kernels.stress_kernel(*kind))
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

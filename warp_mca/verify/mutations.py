@@ -154,9 +154,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "forces_not_turned_back": Mutation(
         "forces stay in the element's own frame",
-        "kernels/hex8.py",
-        "= f[a] + W * f[a]",
-        "= f[a]",
+        "kernels/hexahedron.py",
+        "= f[a, i] + (W[i, 0] * f[a, 0] + W[i, 1] * f[a, 1] + W[i, 2] * f[a, 2])",
+        "= f[a, i]",
     ),
     "rate_force_reversed": Mutation(
         "centrifugal forces of the rigid chain have the wrong sign",
