@@ -21,6 +21,7 @@ from warp_mca.kernels.hexahedron import (
     line_functions,
     load_function,
     node_force_function,
+    store_function,
     stress_function,
 )
 from warp_mca.kernels.kinematics import kinematics
@@ -79,6 +80,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str 
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
     add_traction, symmetric_gradient = stress_functions(precision)
+    store_force = store_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
     scale = LINE_SCALE**3
@@ -94,13 +96,13 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str 
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         list_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
-        count = conn.shape[1]
         if wp.static(plastic and turn == "elastic"):
             if yielded_out[e] != 0:
                 return
@@ -226,7 +228,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str 
         Fz = to_lines(Sz + pressure * Bz)
         f = edge_to_node(Fx, Fy, Fz)
         for a in range(8):
-            force_out[slot + a * count + e] = f[a] + W * f[a]
+            store_force(force_out, slot + a * count + e, f, W, a)
 
     return hex8_force
 
@@ -240,6 +242,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
     element_rotation, local_displacement = frame_functions(precision, True)
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
+    store_force = store_function(precision)
     point_gradient = gradient_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
@@ -254,6 +257,7 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
@@ -313,9 +317,8 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
                 yielded_out[e] = flag_new
         half = R(0.5)
         f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz))
-        count = conn.shape[1]
         for a in range(8):
-            force_out[slot + a * count + e] = W * f[a] + f[a]
+            store_force(force_out, slot + a * count + e, f, W, a)
 
     return hex8_finite_force
 

@@ -19,6 +19,7 @@ from warp_mca.kernels.hexahedron import (
     history_functions,
     load_function,
     node_force_function,
+    store_function,
     stress_function,
 )
 from warp_mca.kernels.kinematics import kinematics
@@ -173,6 +174,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     R, vec3, mat33, mat43, mat83 = t.real, t.vec3, t.mat33, t.mat43, t.mat83
     element_rotation, local_displacement = frame_functions(precision, finite)
     load_element = load_function(precision)
+    store_force = store_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     hourglass_sums, brick, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
@@ -190,6 +192,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
@@ -250,9 +253,8 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         f[5] = f[5] + Q[0] - Q[1] + Q[2] + Q[3]
         f[6] = f[6] - Q[0] - Q[1] - Q[2] - Q[3]
         f[7] = f[7] - Q[0] + Q[1] + Q[2] + Q[3]
-        count = conn.shape[1]
         for a in range(8):
-            force_out[slot + a * count + e] = f[a] + W * f[a]
+            store_force(force_out, slot + a * count + e, f, W, a)
 
     return hex8r_force
 

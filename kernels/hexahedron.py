@@ -197,6 +197,23 @@ def node_force_function(precision: str) -> Any:
 
 
 @cache
+def store_function(precision: str) -> Any:
+    """The function (force_out, n, f, W, a) that stores the force on corner a, turned back by Q = I + W, in entry n.
+
+    Component by component: as a whole, a vector of three would keep the CPU from computing elements side by side.
+    """
+    t = scalars(precision)
+    vec3, mat33, mat83 = t.vec3, t.mat33, t.mat83
+
+    @wp.func
+    def store_force(force_out: wp.array(dtype=vec3), n: int, f: mat83, W: mat33, a: int):
+        for i in range(3):
+            force_out[n][i] = f[a, i] + (W[i, 0] * f[a, 0] + W[i, 1] * f[a, 1] + W[i, 2] * f[a, 2])
+
+    return store_force
+
+
+@cache
 def load_function(precision: str) -> Any:
     """The function that reads an element's nodes relative to its first one, differenced before they are rounded."""
     t = scalars(precision)

@@ -123,6 +123,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        count: int,
         group: wp.array2d(dtype=wp.int32),
         dilation: wp.array(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
@@ -154,11 +155,11 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         f0 = P * c[0]
         f1 = P * c[1]
         f2 = P * c[2]
-        count = conn.shape[1]
-        force_out[slot + e] = -f0 - f1 - f2
-        force_out[slot + count + e] = f0
-        force_out[slot + 2 * count + e] = f1
-        force_out[slot + 3 * count + e] = f2
+        for i in range(3):  # by components, as in `hexahedron.store_function`
+            force_out[slot + e][i] = -f0[i] - f1[i] - f2[i]
+            force_out[slot + count + e][i] = f0[i]
+            force_out[slot + 2 * count + e][i] = f1[i]
+            force_out[slot + 3 * count + e][i] = f2[i]
 
     return tet4_force
 

@@ -51,7 +51,9 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         force = wp.full(8 * count, np.nan, dtype=t.vec3)
         energy = wp.full((5, count), np.nan, dtype=t.real)
         kernel = hex8.force_kernel(precision, plastic)
-        wp.launch(kernel, count, inputs=[*arrays, law, field, 0], outputs=[history[0], unlisted, history[1], force])
+        wp.launch(
+            kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[history[0], unlisted, history[1], force]
+        )
         kernel = hex8.energy_kernel(precision, plastic)
         wp.launch(kernel, count, inputs=[*arrays, law, *history, field, 0], outputs=[energy])
     total = np.zeros_like(X)

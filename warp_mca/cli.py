@@ -96,6 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="run a scene or a built model", allow_abbrev=False)
     _add_scene(run)
     _add_device(run)
+    run.add_argument("--threads", type=int, metavar="N", help="of a run on the CPU (default: all cores)")
     run.add_argument("--duration", type=float, metavar="SECONDS", help="of the impact phase (default: the scene's)")
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     run.add_argument("--force", action="store_true", help="replace results that the folder holds already")
@@ -218,6 +219,7 @@ def _run(args: argparse.Namespace) -> None:
             request.scene,
             device=args.device,
             precision=args.precision,
+            threads=args.threads,
             duration=args.duration,
             out=out,
             force=args.force,

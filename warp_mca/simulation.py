@@ -143,6 +143,7 @@ def run(
     *,
     device: str = "cpu",
     precision: str = "mixed",
+    threads: int | None = None,
     duration: float | None = None,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
@@ -156,6 +157,7 @@ def run(
         scene: what to run.
         device: "cpu" or a CUDA device as "cuda:0".
         precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
+        threads: of a run on the CPU, all cores that this process may use if None; results do not depend on it.
         duration: of the impact phase [s]; the scene's own if None.
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
@@ -173,12 +175,14 @@ def run(
     from warp_mca.output import Output
     from warp_mca.recorders.frames import Recording, skins
     from warp_mca.solver import Solver, check_device
+    from warp_mca.threads import thread_count
 
     tell = progress or (lambda stage, done: None)
     span = scene.impact.duration if duration is None else duration
     if not (math.isfinite(span) and span > 0.0):
         raise bad_value("duration", span, "give a finite time above 0 s")
     check_device(device)
+    threads = thread_count(threads)
     if out is not None:
         check_output(out, force=force)
     clock = _Clock()
@@ -193,7 +197,7 @@ def run(
     probes = locate(scene, model, meshes)
     clock.lap("mesh")
     tell("compile", 0.0)
-    solver = Solver(model, device=device, precision=precision, dt=steps.dt)
+    solver = Solver(model, device=device, precision=precision, dt=steps.dt, threads=threads)
     said: list[str] = []
     surfaces = skins(model, meshes) if recorders else {}
     info = RunInfo(scene, model, surfaces, probes.position, steps.dt, steps.interval, span, said.append)
@@ -285,6 +289,7 @@ def _facts(
         "max_strain": ledger.max_strain,
         "stable_dt": model.stable.dt,
         "joint_impulse": solver.joint_impulses(),
+        "threads": solver.threads,
     }
     if scene.paths:
         body = scene.body(scene.paths[0].lines[0].body)

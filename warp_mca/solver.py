@@ -12,7 +12,8 @@
 | 7 record of motion | `sum_nodes`, `record_points` | first step of each output interval |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
-between two searches raise a flag, which stops the run.
+between two searches raise a flag, which stops the run. On the CPU, stages 1 and 4 and the energies of stage 3 are cut
+in ranges, which threads compute side by side.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from warp_mca.kernels import constraint, contact, ledger, node, search
 from warp_mca.kernels.scalars import scalars
 from warp_mca.model import Model
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
+from warp_mca.threads import ELEMENTS as RANGE
+from warp_mca.threads import NODES, Pool, Split, Stages, whole
 
 if TYPE_CHECKING:
     from warp_mca.output import Output
@@ -140,15 +143,20 @@ class Solver:
         v: velocities at the last half step [m/s], shape (node_count,), vec3d.
         dt: time step [s].
         output: what is read off the state for paths and recorders, or None.
+        threads: that compute; one on a GPU, and for a model that is too small to gain from more.
     """
 
-    def __init__(self, model: Model, *, device: str, precision: str, dt: float) -> None:
+    def __init__(self, model: Model, *, device: str, precision: str, dt: float, threads: int = 1) -> None:
         if precision not in ("mixed", "float64"):
             raise bad_value("precision", precision, "choose mixed or float64")
         self.model, self.device, self.precision, self.dt = model, check_device(device), precision, dt
         with wp.ScopedDevice(self.device):
             self._allocate()
         self.graphs: dict[str, Any] = {}
+        self.stages: dict[str, Stages] = {}
+        largest = max(block.conn.shape[1] for block in model.blocks)
+        self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
+        self.pool = Pool(self.threads) if self.threads > 1 else None
         self.output: Output | None = None
 
     def _allocate(self) -> None:
@@ -193,17 +201,24 @@ class Solver:
         self.drive_work_after = wp.zeros(len(model.prescribed_node), dtype=wp.float64)
         self.step_count = wp.zeros(1, dtype=wp.int32)
 
-    def _forces(self) -> None:
+    def _forces(self, split: Split = whole) -> None:
         for stage in self.elements:
-            stage.forces(self.X, self.law, self.u, self.force)
+            stage.forces(self.X, self.law, self.u, self.force, split)
         for stage in self.contacts:
             stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
 
-    def _integrate(self, kick: float, drift: float) -> None:
-        inputs = [self.inverse_mass, self.offset, self.slot, self.fixed_axes, self.force]
-        inputs += [wp.vec3d(*self.model.gravity), kick, drift]
-        outputs = [self.contact_force, self.u, self.v]
-        wp.launch(self.integrate_kernel, self.model.node_count, inputs=inputs, outputs=outputs, block_dim=128)
+    def _integrate(self, kick: float, drift: float, split: Split = whole) -> None:
+        gravity = wp.vec3d(*self.model.gravity)
+
+        def launch(part: slice) -> None:
+            fixed_axes = self.fixed_axes[part] if len(self.fixed_axes) else self.fixed_axes
+            contact_force = self.contact_force[part] if self.contacts else self.contact_force
+            inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot, fixed_axes]
+            inputs += [self.force, gravity, kick, drift]
+            outputs = [contact_force, self.u[part], self.v[part]]
+            wp.launch(self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=128)
+
+        split(self.model.node_count, launch, NODES)
 
     def _constrain(self) -> None:
         if len(self.joint_first):
@@ -216,26 +231,26 @@ class Solver:
             wp.launch(constraint.prescribe, len(self.drive_work), inputs=inputs, outputs=outputs)
             wp.launch(constraint.advance_clock, 1, outputs=[self.step_count])
 
-    def _step(self) -> None:
-        self._forces()
-        self._integrate(self.dt, self.dt)
+    def _step(self, split: Split = whole) -> None:
+        self._forces(split)
+        self._integrate(self.dt, self.dt, split)
         self._constrain()
 
     def _sum(self, kernel: Any, *inputs: Any) -> None:
         wp.launch(kernel, SUM_WIDTH, inputs=list(inputs), outputs=[self.partial])
 
-    def _record_step(self, needs: frozenset[str]) -> None:
+    def _record_step(self, needs: frozenset[str], split: Split = whole) -> None:
         """One step that also writes a record of the state at its start, and a frame of `needs`."""
-        self._forces()
+        self._forces(split)
         if self.output:
             self.output.before_step(needs)
         for stage in self.elements:
-            stage.energies(self.X, self.law, self.u, self.energy)
+            stage.energies(self.X, self.law, self.u, self.energy, split)
         self._sum(self.sum_elements_kernel, self.energy, self.row, SUM_WIDTH)
         for stage in self.contacts:
             self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
         wp.copy(self.v_before, self.v)
-        self._integrate(self.dt, self.dt)
+        self._integrate(self.dt, self.dt, split)
         self._constrain()
         if len(self.drive_work):
             self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH)
@@ -255,6 +270,14 @@ class Solver:
                     body()
                 self.graphs[name] = capture.graph
             wp.capture_launch(self.graphs[name])
+
+    def _replay(self, pool: Pool, name: str, body: Callable[[Split], None], count: int = 1) -> None:
+        """Replay the stages `name`, captured from `body` at their first use, `count` times with all threads."""
+        with wp.ScopedDevice(self.device):
+            if name not in self.stages:
+                self.stages[name] = Stages(self.threads, body)
+            for _ in range(count):
+                self.stages[name].replay(pool)
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
@@ -285,7 +308,15 @@ class Solver:
             self._integrate(-0.5 * self.dt, 0.0)
 
     def record_and_step(self, count: int, needs: frozenset[str] = frozenset()) -> None:
-        """Record the state, with a frame of `needs`, then advance `count` steps."""
+        """Record the state, with a frame of `needs`, then advance `count` steps.
+
+        Raises:
+            Exception: what a thread raised.
+        """
+        if self.pool:
+            self._replay(self.pool, f"record {sorted(needs)}", lambda split: self._record_step(needs, split))
+            self.step(count - 1)
+            return
 
         def interval() -> None:
             self._record_step(needs)
@@ -295,7 +326,14 @@ class Solver:
         self._launch(f"record {count} {sorted(needs)}", interval)
 
     def step(self, count: int) -> None:
-        """Advance `count` steps."""
+        """Advance `count` steps.
+
+        Raises:
+            Exception: what a thread raised.
+        """
+        if self.pool:
+            self._replay(self.pool, "step", self._step, count)
+            return
 
         def steps() -> None:
             for _ in range(count):

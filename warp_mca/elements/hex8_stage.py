@@ -8,6 +8,7 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import hex8
+from warp_mca.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Block
@@ -32,9 +33,20 @@ class Hex8Stage(ElementStage):
         """Those of a step."""
         return [self.energy_kernel, *(kernel for kernel, _ in self.launches)]
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.conn, self.material, law, u, self.block.slot]
-        outputs = [self.yielded, self.list, self.history, force]
-        for kernel, blocks in self.launches:
-            wp.launch(kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM, max_blocks=blocks)
+
+        def launch(part: slice) -> None:
+            inputs = [X, self.conn[:, part], self.material[part], law, u, self.block.slot + part.start, self.count]
+            yielded, history = self._history(part)
+            for kernel, blocks in self.launches:
+                wp.launch(
+                    kernel,
+                    part.stop - part.start,
+                    inputs=inputs,
+                    outputs=[yielded, self.list, history, force],
+                    block_dim=BLOCK_DIM,
+                    max_blocks=blocks,
+                )
+
+        split(self.count, launch, ELEMENTS)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.lanes import side_by_side
 from warp_mca.kernels.scalars import scalars
+from warp_mca.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Block
@@ -45,34 +47,49 @@ class ElementStage:
         self.points = points
         self.history = wp.zeros((rows or points * j2.HISTORY_SIZE, kept), dtype=scalars(precision).real)
         kind = (precision, block.plastic, block.finite)
-        self.force_kernel = kernels.force_kernel(*kind)
-        self.energy_kernel = kernels.energy_kernel(*kind)
-        self.stress_kernel = kernels.stress_kernel(*kind)
+        self.force_kernel = side_by_side(kernels.force_kernel(*kind))
+        self.energy_kernel = side_by_side(kernels.energy_kernel(*kind))
+        self.stress_kernel = side_by_side(kernels.stress_kernel(*kind))
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
         return [self.force_kernel, self.energy_kernel]
 
-    def more(self) -> list[wp.array]:
-        """What kernels of this formulation take beside what all take."""
+    def more(self, part: slice) -> list[Any]:
+        """What kernels of this formulation take beside what all take, of a range of elements."""
         return []
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
-        """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.conn, self.material, law, u, self.block.slot, *self.more()]
-        outputs = [self.yielded, self.history, force]
-        wp.launch(self.force_kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+    def _history(self, part: slice) -> list[Any]:
+        """Yield flags and history of a range of elements."""
+        return [self.yielded[part], self.history[:, part]] if self.block.plastic else [self.yielded, self.history]
 
-    def energies(self, X: wp.array, law: wp.array, u: wp.array, energy: wp.array) -> None:
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
+        """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
+
+        def launch(part: slice) -> None:
+            inputs = [X, self.conn[:, part], self.material[part], law, u, self.block.slot + part.start, self.count]
+            outputs = [*self._history(part), force]
+            inputs += self.more(part)
+            wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+        split(self.count, launch, ELEMENTS)
+
+    def energies(self, X: wp.array, law: wp.array, u: wp.array, energy: wp.array, split: Split = whole) -> None:
         """Rows elastic, plastic energy [J], largest strain, smallest Jacobian ratio [-], hourglass energy [J]."""
-        inputs = [X, self.conn, self.material, law, self.yielded, self.history, u, self.block.first, *self.more()]
-        wp.launch(self.energy_kernel, self.count, inputs=inputs, outputs=[energy], block_dim=BLOCK_DIM)
+
+        def launch(part: slice) -> None:
+            inputs = [X, self.conn[:, part], self.material[part], law, *self._history(part), u]
+            inputs += [self.block.first + part.start, *self.more(part)]
+            wp.launch(self.energy_kernel, part.stop - part.start, inputs=inputs, outputs=[energy], block_dim=BLOCK_DIM)
+
+        split(self.count, launch, ELEMENTS)
 
     def stresses(
         self, X: wp.array, law: wp.array, u: wp.array, element: wp.array, first: int, stress: wp.array
     ) -> None:
         """Stress [Pa] and plastic strain [-] at the corners of some elements, from slot `first` on."""
-        inputs = [X, self.conn, self.material, law, self.yielded, self.history, u, element, first, *self.more()]
+        inputs = [X, self.conn, self.material, law, self.yielded, self.history, u, element, first]
+        inputs += self.more(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
 
     def max_plastic_strain(self) -> float:

@@ -10,7 +10,9 @@ import warp as wp
 from warp_mca.elements.element import Array
 from warp_mca.elements.stage import ElementStage
 from warp_mca.kernels import tet4
+from warp_mca.kernels.lanes import side_by_side
 from warp_mca.kernels.scalars import scalars
+from warp_mca.threads import ELEMENTS, NODES, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Block
@@ -34,20 +36,29 @@ class Tet4Stage(ElementStage):
         self.inverse_volume = wp.array(1.0 / around, dtype=real)
         self.growth = wp.zeros(self.count, dtype=real)
         self.dilation = wp.zeros(len(found), dtype=real)
-        self.dilation_kernel = tet4.dilation_kernel(precision, block.finite)
+        self.dilation_kernel = side_by_side(tet4.dilation_kernel(precision, block.finite))
         self.average_kernel = tet4.average_kernel(precision)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
         return [*super().kernels(), self.dilation_kernel, self.average_kernel]
 
-    def more(self) -> list[wp.array]:
-        """Pressure nodes of each element, and their dilatation."""
-        return [self.group, self.dilation]
+    def more(self, part: slice) -> list[Any]:
+        """Pressure nodes of each element of a range, and the dilatation of all."""
+        return [self.group[:, part], self.dilation]
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array) -> None:
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], after the dilatation at the pressure nodes."""
-        wp.launch(self.dilation_kernel, self.count, inputs=[X, self.conn, u], outputs=[self.growth])
-        inputs = [self.offset, self.element, self.inverse_volume, self.growth]
-        wp.launch(self.average_kernel, len(self.dilation), inputs=inputs, outputs=[self.dilation])
-        super().forces(X, law, u, force)
+
+        def grow(part: slice) -> None:
+            inputs = [X, self.conn[:, part], u]
+            wp.launch(self.dilation_kernel, part.stop - part.start, inputs=inputs, outputs=[self.growth[part]])
+
+        def average(part: slice) -> None:
+            ends = self.offset[part.start : part.stop + 1]
+            inputs = [ends, self.element, self.inverse_volume[part], self.growth]
+            wp.launch(self.average_kernel, part.stop - part.start, inputs=inputs, outputs=[self.dilation[part]])
+
+        split(self.count, grow, ELEMENTS)
+        split(len(self.dilation), average, NODES)
+        super().forces(X, law, u, force, split)

@@ -1,0 +1,114 @@
+"""Threads: the same figures for any number of them, bad numbers, and failures while they run."""
+
+import os
+import threading
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca import solver, threads
+from warp_mca.cli import main
+
+
+@pytest.fixture(autouse=True)
+def short_ranges(monkeypatch):
+    """Ranges that small models can be cut in."""
+    for module in (threads, solver):
+        monkeypatch.setattr(module, "NODES", threads.LANES)
+    monkeypatch.setattr(solver, "RANGE", threads.LANES)
+    for module in ("warp_mca.elements.stage", "warp_mca.elements.tet4_stage"):
+        monkeypatch.setattr(f"{module}.ELEMENTS", threads.LANES)
+    monkeypatch.setattr("warp_mca.elements.tet4_stage.NODES", threads.LANES)
+
+
+def scene(element: str = "hex8", **impact: float) -> mca.Scene:
+    """Two hinged bars that yield fly aslant into a rough plate; no number of elements is a multiple of a range."""
+    metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)
+    flight = {"material": metal, "velocity": (1.0, -3.0, 0.5), "element": element}
+    bar = mca.Box(size=(0.02, 0.06, 0.02), divisions=(5, 15, 5), origin=(-0.011, 0.0, -0.012))
+    plate = mca.Box(size=(0.06, 0.03, 0.06), divisions=(9, 5, 9), origin=(-0.03, -0.03, -0.03))
+    return mca.Scene(
+        name="hinged",
+        bodies=(
+            mca.Body(name="low", geometry=bar, **flight),
+            mca.Body(name="high", geometry=bar, position=(0.0, 0.06, 0.0), **flight),
+            mca.Body(name="plate", geometry=plate, material=metal, element=element),
+        ),
+        joints=(mca.Revolute(name="A", body="low", at=(-0.011, 0.06, 0.0), other="high", other_at=(-0.011, 0.0, 0.0)),),
+        contacts=(
+            mca.Contact(
+                slave=mca.Surface(body="low", nodes="ymin"), master=mca.Surface(body="plate", nodes="ymax"), mu=0.4
+            ),
+        ),
+        fixed=(mca.Fixed(body="plate", nodes="ymin"),),
+        gravity=(0.0, -9.8, 0.0),
+        impact=mca.ImpactPhase(**{"duration": 1e-5, "output_interval": 1e-6} | impact),
+        tip=mca.Point(body="low", at=(0.0, 0.0, 0.0)),
+    )
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+def test_histories_are_the_same_bit_for_bit(element):
+    one, *others = [mca.run(scene(element), threads=count) for count in (1, 2, 3)]
+    assert one.summary["max_plastic_strain"] > 1e-4
+    assert one["E_friction"][-1] > 0.0
+    assert one.summary["threads"] == 1
+    for count, other in enumerate(others, 2):
+        assert other.summary["threads"] == count
+        for name in one.history:
+            assert np.array_equal(one[name], other[name], equal_nan=True), name
+        for name in ("max_plastic_strain", "energy", "joint_impulse", "max_penetration"):
+            assert one.summary[name] == other.summary[name], name
+
+
+def test_all_cores_by_default_and_one_for_small_models(monkeypatch):
+    assert threads.thread_count(None) == len(os.sched_getaffinity(0))
+    monkeypatch.setattr(solver, "RANGE", 10**6)
+    assert mca.run(scene(), duration=2e-6, threads=2).summary["threads"] == 1
+
+
+@pytest.mark.parametrize("value", [0, -1, 1.5, True, "2"])
+def test_bad_numbers_are_refused(value):
+    with pytest.raises(mca.RequestError, match="threads"):
+        mca.run(scene(), threads=value)
+
+
+@pytest.mark.parametrize("value", ["0", "-2", "many", "1.5"])
+def test_bad_numbers_on_the_command_line(value, tmp_path, capsys):
+    assert main(["run", "single_rod", f"--threads={value}", "--out", str(tmp_path / "out")]) == 2
+    assert "threads" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_guard_stops_a_run_with_threads():
+    before = threading.active_count()
+    with pytest.raises(mca.GuardError, match="energy"):
+        mca.run(scene(energy_tolerance=1e-12), threads=3)
+    assert threading.active_count() <= before + 2  # none but those of a solver that is not collected yet
+
+
+@pytest.mark.parametrize("culprit", range(6))
+def test_what_a_task_raises_reaches_the_caller_and_ends_the_threads(culprit):
+    pool = threads.Pool(3)
+    done: list[int] = []
+
+    def task(k: int) -> None:
+        if k == culprit:
+            raise ZeroDivisionError
+        done.append(k)
+
+    pool.run([lambda k=k: done.append(k) for k in range(7)])
+    assert sorted(done) == list(range(7))
+    with pytest.raises(ZeroDivisionError):
+        pool.run([lambda k=k: task(k) for k in range(6)])
+    assert not any(worker.is_alive() for worker in pool._workers)
+
+
+def test_threads_end_with_their_pool():
+    pool = threads.Pool(2)
+    workers = pool._workers
+    del pool
+    for worker in workers:
+        worker.join(timeout=10.0)
+        assert not worker.is_alive()
