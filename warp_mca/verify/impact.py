@@ -273,8 +273,8 @@ class _Foot:
 @case(
     group="impact",
     title="A copper cylinder strikes a rigid wall at 227 m/s and mushrooms as other codes have it",
-    reference="Taylor's impact test: Kamoulakos (1990); Zhu and Cescotto (1995); Camacho and Ortiz, Comput. Meth. Appl."
-    " Mech. Engng 142 (1997) 269: length 21.4 to 21.5 mm and radius of the foot 7.0 to 7.2 mm after 80 us.",
+    reference="Taylor's impact test: Kamoulakos (1990); Zhu and Cescotto (1995); Camacho and Ortiz, Comput. Meth. "
+    "Appl. Mech. Engng 142 (1997) 269: length 21.4 to 21.5 mm and radius of the foot 7.0 to 7.2 mm after 80 us.",
     catches=("logarithmic_strain_doubled", "hourglass_stays_elastic"),
 )
 def taylor_bar(setup: Setup) -> list[Row]:
