@@ -153,6 +153,8 @@ class Stages:
 
     def _split(self, count: int, launch: Launch, least: int) -> None:
         parts = min(RANGES * self.threads, count // least)
+        if parts > self.threads:
+            parts -= parts % self.threads  # as many for each thread
         if parts < 2:
             launch(slice(0, count))
             return
