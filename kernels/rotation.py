@@ -37,7 +37,13 @@ def nearest_rotation(precision: str, finite: bool = False) -> Any:
             cofactor = mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
             Q = R(0.5) * Q + half * cofactor
         W = Q - wp.identity(n=3, dtype=R)
-        excess = R(0.5) * (W + wp.transpose(W) + wp.transpose(W) * W)
-        return W - excess - W * excess
+        V = W
+        if wp.static(precision == "mixed"):
+            # The cube of what is smaller is subnormal, on which CPUs are slow; it needs no correction either.
+            for i in range(3):
+                for j in range(3):
+                    V[i, j] = wp.where(wp.abs(W[i, j]) < R(1e-12), R(0.0), W[i, j])
+        excess = R(0.5) * (V + wp.transpose(V) + wp.transpose(V) * V)
+        return W - excess - V * excess
 
     return polar_rotation

@@ -82,8 +82,11 @@ def spinning_rod(setup: Setup) -> list[Row]:
             exact=load / 8.0,
             measured=centre,
             unit="Pa",
-            tolerance=1e-4,
-            why="what the window leaves of the oscillation",
+            tolerance=setup.by_element(1e-4, tet4=5e-4),
+            why=setup.by_element(
+                "what the window leaves of the oscillation",
+                tet4="stress of a tetrahedron is constant, and those around a node are not symmetric about it: order 1",
+            ),
         ),
         Row(
             quantity="free: greatest stress at the centre",

@@ -195,7 +195,9 @@ def tension_torsion(setup: Setup) -> list[Row]:
     """One element, strain and shear / sqrt(3) up to 1 %, five times the yield strain; beta = 0.5."""
     durations = setup.choose((4e-3, 16e-3), (1e-3, 4e-3, 16e-3))
     rows = []
-    for course, tolerance, order in (("together", 1e-5, None), ("in turn", 2e-4, 0.9), ("around", 8e-4, 0.9)):
+    # float32 rounds each increment of the plastic strain: in many small steps more than in few
+    together = 2e-5 if setup.precision == "mixed" else 1e-5
+    for course, tolerance, order in (("together", together, None), ("in turn", 2e-4, 0.9), ("around", 8e-4, 0.9)):
         worst, steps = [], []
         for duration in durations:
             scene = setup.scene("strained_element", course=course, strain=STRAIN, size=SIZE, duration=duration)
