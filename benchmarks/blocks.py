@@ -173,8 +173,7 @@ class Held:
             wp.copy(solver.u, self._u)
             wp.copy(solver.v, self._v)
             for stage in solver.elements:
-                stage.yielded.zero_()
-                stage.history.zero_()
+                stage.reset()
             for stage in solver.contacts:
                 stage.spring.tangential.zero_()
             solver.contact_force.zero_()

@@ -18,9 +18,8 @@ def sum_nodes(
     v_before: wp.array(dtype=wp.vec3d),
     v: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
-    row: wp.array(dtype=wp.int32),
     width: int,
-    partial_out: wp.array3d(dtype=wp.float64),
+    wide_out: wp.array2d(dtype=wp.float64),
 ):
     """Kinetic energy v(n-1/2) . M v(n+1/2) / 2, which central differences keep exactly, and gravity's work at t(n)."""
     k = wp.tid()
@@ -29,8 +28,8 @@ def sum_nodes(
     for i in range(k, mass.shape[0], width):
         kinetic += wp.float64(0.5) * mass[i] * wp.dot(v_before[i], v[i])
         work += mass[i] * wp.dot(gravity, u[i] - dt * v[i])
-    partial_out[row[0], 0, k] = kinetic
-    partial_out[row[0], 1, k] = work
+    wide_out[0, k] = kinetic
+    wide_out[1, k] = work
 
 
 @wp.kernel(enable_backward=False)
@@ -57,9 +56,8 @@ def sum_elements_kernel(precision: str) -> Any:
     @wp.kernel(enable_backward=False, module="unique")
     def sum_elements(
         energy: wp.array2d(dtype=R),
-        row: wp.array(dtype=wp.int32),
         width: int,
-        partial_out: wp.array3d(dtype=wp.float64),
+        wide_out: wp.array2d(dtype=wp.float64),
     ):
         k = wp.tid()
         elastic = wp.float64(0.0)
@@ -73,13 +71,34 @@ def sum_elements_kernel(precision: str) -> Any:
             hourglass += wp.float64(energy[4, e])
             largest = wp.max(largest, wp.float64(energy[2, e]))
             smallest = wp.min(smallest, wp.float64(energy[3, e]))
-        partial_out[row[0], 6, k] = hourglass
-        partial_out[row[0], 2, k] = elastic
-        partial_out[row[0], 3, k] = plastic
-        partial_out[row[0], 4, k] = largest
-        partial_out[row[0], 5, k] = smallest
+        wide_out[2, k] = elastic
+        wide_out[3, k] = plastic
+        wide_out[4, k] = largest
+        wide_out[5, k] = smallest
+        wide_out[6, k] = hourglass
 
     return sum_elements
+
+
+@wp.kernel(enable_backward=False)
+def fold(
+    wide: wp.array2d(dtype=wp.float64),
+    row: wp.array(dtype=wp.int32),
+    width: int,
+    partial_out: wp.array3d(dtype=wp.float64),
+):
+    """Fold the sums and extremes of many threads into those of `width`: the first columns of a record."""
+    k = wp.tid()
+    for column in range(wide.shape[0]):
+        value = wide[column, k]
+        for j in range(k + width, wide.shape[1], width):
+            if column == 4:
+                value = wp.max(value, wide[column, j])
+            elif column == 5:
+                value = wp.min(value, wide[column, j])
+            else:
+                value += wide[column, j]
+        partial_out[row[0], column, k] = value
 
 
 @wp.kernel(enable_backward=False)

@@ -36,7 +36,9 @@ from warp_mca.threads import NODES, Pool, Split, Stages, whole
 if TYPE_CHECKING:
     from warp_mca.output import Output
 
-SUM_WIDTH = 256  # threads that share a sum, in a fixed order
+SUM_WIDTH = 256  # partial sums of a record, in a fixed order
+SHARE = 16  # elements for each thread that sums them at first, while there are at most SPREAD threads for a partial sum
+SPREAD = 64
 ROWS = 32  # records kept on the device before the host reads them
 # Columns of a record, then eight for each contact pass (`contact.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
@@ -182,6 +184,8 @@ class Solver:
         self.row = wp.zeros(1, dtype=wp.int32)
         columns = PASS + PASS_COLUMNS * len(self.contacts)
         self.partial = wp.zeros((ROWS, columns, SUM_WIDTH), dtype=wp.float64)
+        spread = min(max(model.element_count // (SHARE * SUM_WIDTH), 1), SPREAD)
+        self.wide = wp.zeros((HOURGLASS + 1, spread * SUM_WIDTH), dtype=wp.float64)
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
         self.integrate_kernel = node.integrate_kernel(self.precision, bool(self.contacts), bool(model.fixed_axes.any()))
@@ -246,7 +250,8 @@ class Solver:
             self.output.before_step(needs)
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
-        self._sum(self.sum_elements_kernel, self.energy, self.row, SUM_WIDTH)
+        width = self.wide.shape[1]
+        wp.launch(self.sum_elements_kernel, width, inputs=[self.energy, width], outputs=[self.wide])
         for stage in self.contacts:
             self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
         wp.copy(self.v_before, self.v)
@@ -255,7 +260,9 @@ class Solver:
         if len(self.drive_work):
             self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH)
         gravity = wp.vec3d(*self.model.gravity)
-        self._sum(ledger.sum_nodes, self.mass, gravity, self.u, self.v_before, self.v, self.dt, self.row, SUM_WIDTH)
+        inputs = [self.mass, gravity, self.u, self.v_before, self.v, self.dt, width]
+        wp.launch(ledger.sum_nodes, width, inputs=inputs, outputs=[self.wide])
+        self._sum(ledger.fold, self.wide, self.row, SUM_WIDTH)
         inputs = [self.point_node, self.v_before, self.v, self.row]
         wp.launch(ledger.record_points, len(self.point_node), inputs=inputs, outputs=[self.point_velocity])
         if self.output:

@@ -33,6 +33,11 @@ class Hex8Stage(ElementStage):
         """Those of a step."""
         return [self.energy_kernel, *(kernel for kernel, _ in self.launches)]
 
+    def reset(self) -> None:
+        """Forget all plastic flow."""
+        super().reset()
+        self.list.zero_()
+
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
 

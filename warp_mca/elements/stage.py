@@ -92,6 +92,11 @@ class ElementStage:
         inputs += self.more(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
 
+    def reset(self) -> None:
+        """Forget all plastic flow."""
+        self.yielded.zero_()
+        self.history.zero_()
+
     def max_plastic_strain(self) -> float:
         """Greatest equivalent plastic strain of any point [-]."""
         last = self.history.numpy()[: self.points * j2.HISTORY_SIZE][j2.HISTORY_SIZE - 1 :: j2.HISTORY_SIZE]
