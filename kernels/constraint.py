@@ -77,17 +77,14 @@ def prescribe(
     c = axis[k]
     t = (wp.float64(step[0]) + wp.float64(0.5)) * dt
     target = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t)
-    free = v_out[i]
-    v = free
-    v[c] = target
-    u = u_out[i]
-    u[c] = u[c] + dt * (target - free[c])
+    # one component alone: other threads drive the others of this node
+    free = v_out[i][c]
+    v_out[i][c] = target
+    u_out[i][c] = u_out[i][c] + dt * (target - free)
     before = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t - dt)
-    half_impulse = wp.float64(0.5) * mass[i] * (target - free[c])
+    half_impulse = wp.float64(0.5) * mass[i] * (target - free)
     work_out[k] = work_after_out[k] + half_impulse * before
     work_after_out[k] = work_out[k] + half_impulse * target
-    u_out[i] = u
-    v_out[i] = v
 
 
 @wp.kernel(enable_backward=False)

@@ -77,3 +77,18 @@ def test_frames_arrive_in_order_and_equal_those_of_the_cpu():
         assert one.volume is not None
         assert other.volume is not None
         np.testing.assert_allclose(one.volume.velocity, other.volume.velocity, atol=1e-5)
+
+
+def test_a_node_driven_along_all_axes_follows_all_of_them():
+    """Threads of one node write one component each; checked through strains, which take all three."""
+    scene = mca.make_scene("strained_element", course="around", duration=1e-3)
+    host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))
+    np.testing.assert_allclose(device.paths[0].stress, host.paths[0].stress, rtol=1e-5, atol=1e3)
+
+
+def test_elements_that_yield_are_listed_once_and_give_the_same_forces():
+    scene = oblique()
+    host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))
+    assert host.summary["max_plastic_strain"] > 1e-4
+    assert device.summary["max_plastic_strain"] == pytest.approx(host.summary["max_plastic_strain"], rel=1e-6)
+    np.testing.assert_allclose(device["E_plastic"], host["E_plastic"], rtol=1e-6, atol=1e-12)

@@ -288,7 +288,7 @@ def taylor_bar(setup: Setup) -> list[Row]:
     length, radius = [], []
     for count in counts:
         foot = _Foot(0.0324, 0.0032)
-        scale = setup.by_element(0.15, hex8r=0.1, tet4=0.3)
+        scale = setup.by_element(0.15, hex8r=0.1, tet4=0.2) * counts[0] / count
         setup.run(setup.scene("taylor_bar", axial=count, time_step_scale=scale), recorders=[foot])
         length.append(1e3 * foot.length)
         radius.append(1e3 * foot.radius)
