@@ -119,23 +119,32 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
-    """Error over element size, for every row that has an order; None when there is none."""
-    from warp_mca.report.style import new_figure, save_png, tidy
+    """Error over element size, for every row that demands or shows an order; None when there is none."""
+    from warp_mca.report.style import BLUE, GREEN, VERMILION, new_figure, save_png, tidy
 
-    curves = [(o, row) for o in outcomes for row in o.rows if len(row.sizes) > 1 and row.order is not None]
+    looks = {"hex8": (BLUE, "o", "-"), "hex8r": (VERMILION, "s", "--"), "tet4": (GREEN, "^", ":")}
+    curves = [(o, row) for o in outcomes for row in o.rows if row.order is not None and row.order > 0.3]
     if not curves:
         return None
     groups = list(dict.fromkeys(outcome.case.group for outcome, _ in curves))
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure = new_figure(7.0, 3.0 * len(groups))
-    for axes, group in zip(figure.subplots(len(groups), 1, squeeze=False)[:, 0], groups, strict=True):
-        for k, (outcome, row) in enumerate((o, r) for o, r in curves if o.case.group == group):
-            label = f"{outcome.case.name}, {outcome.element}, {outcome.setup.precision}: {row.quantity}"
-            sizes = [size / max(row.sizes) for size in row.sizes]
-            axes.loglog(sizes, row.errors, marker="osv^Dx"[k % 6], label=label, linewidth=1.0, markersize=4)
-        axes.set_title(group, loc="left", fontsize=10)
-        axes.set_xlabel("element size over the coarsest [-]")
-        axes.set_ylabel("relative error [-]")
+    figure = new_figure(7.0, 2.6 * ((len(groups) + 1) // 2))
+    all_axes = figure.subplots(-(-len(groups) // 2), 2, squeeze=False).ravel()
+    for axes in all_axes[len(groups) :]:
+        axes.set_visible(False)
+    for axes, group in zip(all_axes, groups, strict=False):
+        for outcome, row in curves:
+            if outcome.case.group == group:
+                color, marker, line = looks.get(outcome.setup.element, ("0.5", "x", "-"))
+                sizes = [size / max(row.sizes) for size in row.sizes]
+                axes.loglog(sizes, row.errors, color=color, marker=marker, linestyle=line, linewidth=0.8, markersize=3)
+        axes.xaxis.set_minor_formatter("")
+        axes.set_title(group, loc="left", fontsize=9)
+        axes.set_xlabel("element size over the coarsest [-]", fontsize=8)
+        axes.set_ylabel("relative error [-]", fontsize=8)
         tidy(axes)
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=6)
+        for name in dict.fromkeys(outcome.setup.element for outcome, _ in curves):
+            color, marker, line = looks.get(name, ("0.5", "x", "-"))
+            axes.plot([], [], color=color, marker=marker, linestyle=line, markersize=3, label=name)
+        axes.legend(fontsize=7, frameon=False)
     return save_png(figure, path)
