@@ -39,6 +39,16 @@ def sunk(setup: Setup, scene: mca.Scene, load: float) -> mca.Scene:
     return dataclasses.replace(scene, bodies=(body,))
 
 
+def slid(time: NDArray[np.float64], slip: NDArray[np.float64]) -> float:
+    """Time at which the slip [m/s] would end, by the line through its middle 80 %.
+
+    The end itself is blurred by swings on the contact springs, in which the slip passes zero at any of several rows.
+    """
+    middle = (slip < 0.9 * slip[0]) & (slip > 0.1 * slip[0])
+    slope, start = np.polyfit(time[middle], slip[middle], 1)
+    return float(-start / slope)
+
+
 @case(
     group="friction",
     title="A block slides to rest: over v^2 / (2 mu g), in v / (mu g), and all its energy becomes heat",
@@ -53,7 +63,7 @@ def sliding_block(setup: Setup) -> list[Row]:
         result = setup.run(sunk(setup, setup.scene("sliding_block", cells=count), MASS * GRAVITY))
         speed = SPEED + impulse(result) / MASS
         distance.append(float(np.trapezoid(speed, result.time)))
-        time.append(float(crossings(result.time, speed, 0.0)[0]))
+        time.append(slid(result.time, speed))
         heat.append(float(result["E_friction"][-1]))
     springs = "the tangential springs stretch by 0.015 % of the way, and the block swings on them in the end"
     return [
@@ -70,8 +80,8 @@ def sliding_block(setup: Setup) -> list[Row]:
             exact=SPEED / (MU * GRAVITY),
             measured=tuple(time),
             unit="s",
-            tolerance=0.002,
-            why="the block swings on its contact springs as it stops, at 0.5 % of its speed",
+            tolerance=0.001,
+            why="of the line through the middle 80 % of the speed; the block bounces a little as it slides",
         ),
         Row(
             quantity="heat",
@@ -99,7 +109,7 @@ def block_on_belt(setup: Setup) -> list[Row]:
         result = setup.run(sunk(setup, setup.scene("block_on_belt", cells=count), MASS * GRAVITY))
         of_block = impulse(result) / MASS
         caught = crossings(result.time, of_block, SPEED)
-        time.append(float(caught[0]))
+        time.append(slid(result.time, SPEED - of_block))
         carried = (result.time > caught[0]) & (result.time < caught[2 * ((len(caught) - 1) // 2)])  # whole swings
         speed.append(float(of_block[carried].mean()))
         rest.append(float(result.F_t[carried].mean()))
@@ -107,8 +117,22 @@ def block_on_belt(setup: Setup) -> list[Row]:
         work.append(float(result.summary["energy"]["external_work"]))
     swing = "the block swings on its contact springs"
     return [
-        Row(quantity="time", exact=exact, measured=tuple(time), unit="s", tolerance=0.002, why=swing),
-        Row(quantity="speed then", exact=SPEED, measured=tuple(speed), unit="m/s", tolerance=0.0005, why=swing),
+        Row(
+            quantity="time",
+            exact=exact,
+            measured=tuple(time),
+            unit="s",
+            tolerance=0.001,
+            why="of the line through the middle 80 % of the slip; the block bounces a little as it slides",
+        ),
+        Row(
+            quantity="speed then",
+            exact=SPEED,
+            measured=tuple(speed),
+            unit="m/s",
+            tolerance=setup.by_element(0.0005, tet4=0.0015),
+            why=setup.by_element(swing, tet4=swing + ", in more than one mode: the mean is not over whole ones"),
+        ),
         Row(
             quantity="friction F_t then",
             exact=0.0,
