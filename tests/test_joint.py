@@ -75,6 +75,7 @@ def test_spinning_bar_pulls_its_ground_hinge(monkeypatch):
         (mca.Box(**SIZE, divisions=(10, 2, 4), origin=(0.0, -0.01, -0.01)), (0.1, 0, 0), "coincide"),
         (mca.Box(**SIZE, divisions=(10, 2, 2), origin=(0.0, -0.01, -0.012)), (0.1, 0, 0), "0.002 m apart"),
         (BAR, (0.103, 0.0, 0.0), "0 nodes of a lie on this axis"),
+        (mca.Box(**SIZE, divisions=(10, 2, 2), origin=(0.0, -0.03, -0.01)), (0.1, 0, 0), "0 of b"),
     ],
 )
 def test_hinge_that_finds_no_pairs_is_refused(other, at, match):

@@ -93,11 +93,11 @@ def join_bodies(parts: Assembly) -> tuple[Index, Index, tuple[Hinge, ...]]:
         a = a + parts.node_start[joint.body]
         b = np.full(len(a), GROUND, dtype=np.int32)
         if joint.other is not None:
-            b, other_along = _axis_nodes(parts.meshes[joint.other], np.asarray(joint.other_at), axis, ends)
+            b, _ = _axis_nodes(parts.meshes[joint.other], np.asarray(joint.other_at), axis, ends)
             b = b + parts.node_start[joint.other]
             alike = len(a) == len(b)
             apart = float(np.linalg.norm(parts.X[a] - parts.X[b], axis=1).max()) if alike else np.inf
-            if apart > 1e-6 * max(np.ptp(along), np.ptp(other_along)):
+            if apart > 1e-6 * np.ptp(along):
                 what = f"{len(a)} nodes of {joint.body} and {len(b)} of {joint.other}, up to {apart:.3g} m apart"
                 raise bad_value(
                     f"Revolute {joint.name}.nodes",
