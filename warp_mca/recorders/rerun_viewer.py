@@ -105,13 +105,19 @@ class Viewer:
             self.problem = f"the rerun viewer took nothing for {FLUSH_TIMEOUT:g} s; it may lack the last frames"
 
     def _serve(self) -> None:
-        if self._wait_until_open():
-            import rerun as rr
+        try:
+            if self._wait_until_open():
+                self._stream()
+        except Exception as error:  # nobody else would hear of it
+            self.problem = f"the rerun viewer could not be reached ({error})"
 
-            sink = rr.GrpcSink(f"rerun+http://{LOOPBACK}:{self.port}/proxy")
-            self.stream.set_sinks(sink, default_blueprint=self.blueprint)
-            while self.open and not self._pass_on():
-                time.sleep(0.0 if self._closing.is_set() else 0.5)
+    def _stream(self) -> None:
+        import rerun as rr
+
+        sink = rr.GrpcSink(f"rerun+http://{LOOPBACK}:{self.port}/proxy")
+        self.stream.set_sinks(sink, default_blueprint=self.blueprint)
+        while self.open and not self._pass_on():
+            time.sleep(0.0 if self._closing.is_set() else 0.5)
 
     def _wait_until_open(self) -> bool:
         end = time.monotonic() + START_TIMEOUT
