@@ -87,7 +87,8 @@ def main(words: list[str] | None = None) -> dict[str, Any]:
     if "flops" in args.parts:
         kinds = [(e, p, b) for e in args.elements for p in args.precision for b in (False, True)]
         rows = [
-            {"element": e, "precision": p, "case": "plastic" if b else "elastic"} | flops(e, p, b) for e, p, b in kinds
+            {"element": e, "precision": p, "case": "plastic" if b else "elastic"} | flops(e, p, b, cuda)
+            for e, p, b in kinds
         ]
         keep("flops", rows)
         print("flops  ", ", ".join(f"{r['element']} {r['precision']} {r['case']} {r['f32']}+{r['f64']}" for r in rows))

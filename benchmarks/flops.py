@@ -44,12 +44,13 @@ def count(kernel: Any) -> dict[str, int]:
     return {"f32": found["f32"], "f64": found["f64"]}
 
 
-def flops(element: str, precision: str, plastic: bool) -> dict[str, int]:
-    """Operations for each element and step, in float32 and float64."""
+def flops(element: str, precision: str, plastic: bool, patches: bool) -> dict[str, int]:
+    """Operations for each element and step, in float32 and float64; with `patches`, of the kernels of a GPU."""
     import importlib
 
-    kernels = importlib.import_module(f"warp_mca.kernels.{element}")
-    total: Counter[str] = Counter(count(kernels.force_kernel(precision, plastic, False)))
+    patches = patches and element != "tet4"
+    kernels = importlib.import_module(f"warp_mca.kernels.{element}{'_patch' if patches else ''}")
+    total: Counter[str] = Counter(count(kernels.force_kernel(precision, plastic)))
     if element == "tet4":
         total.update(count(kernels.dilation_kernel(precision, False)))
     return dict(total)

@@ -7,6 +7,12 @@ from typing import Any
 import warp as wp
 
 from benchmarks.blocks import Held, pool
+from warp_mca.elements.patch_stage import PatchStage
+
+
+def size(array: wp.array) -> int:
+    """Bytes of an array's entries, also where it is a transposed view."""
+    return array.size * wp.types.type_size_in_bytes(array.dtype)
 
 
 def arrays(owner: Any, seen: dict[int, wp.array]) -> dict[int, wp.array]:
@@ -19,7 +25,7 @@ def arrays(owner: Any, seen: dict[int, wp.array]) -> dict[int, wp.array]:
         elif type(value).__module__.startswith("warp_mca.") or isinstance(value, list | tuple):
             if not type(value).__module__.startswith("warp_mca.model"):
                 arrays(value, seen)
-        elif type(value).__name__ in ("StructInstance", "Spring"):
+        elif type(value).__name__ in ("StructInstance", "NewStructInstance"):
             for name in value._cls.vars:
                 item = getattr(value, name)
                 if isinstance(item, wp.array) and item.ptr:
@@ -31,21 +37,25 @@ def step_bytes(held: Held) -> float:
     """Bytes of a step in element and node kernels: an estimate that counts each needed array once.
 
     Positions and displacements are counted once for each kernel, as if the cache kept them for all elements around a
-    node; history is read and written for elements that yield only.
+    node, or once for each patch around it; history is read and written for elements that yield only.
     """
     s = held.solver
     total = 0.0
     nodes = s.model.node_count
     for stage in s.elements:
-        mesh = stage.conn.capacity + stage.material.capacity + 2 * 24 * nodes
-        total += mesh + s.force.capacity
+        if isinstance(stage, PatchStage):
+            lists = stage.patches
+            total += size(lists.corner) + size(lists.node) + size(lists.places) + 2 * 24 * len(lists.node)
+        else:
+            total += size(stage.conn) + 2 * 24 * nodes
+        total += size(stage.material) + size(s.force)
         if held.case.yielding is not None:
-            total += stage.yielded.capacity + 2.0 * held.case.yielding * stage.history.capacity
+            total += size(stage.yielded) + 2.0 * held.case.yielding * size(stage.history)
         if hasattr(stage, "group"):  # two kernels more: dilatation, and its mean at nodes
-            total += stage.conn.capacity + 2 * 24 * nodes + 2 * stage.growth.capacity + stage.element.capacity
-            total += stage.offset.capacity + stage.inverse_volume.capacity + 2 * stage.dilation.capacity
-            total += stage.group.capacity
-    total += s.force.capacity + s.slot.capacity + s.offset.capacity
+            total += size(stage.conn) + 2 * 24 * nodes + 2 * size(stage.growth) + size(stage.element)
+            total += size(stage.offset) + size(stage.inverse_volume) + 2 * size(stage.dilation)
+            total += size(stage.group)
+    total += size(s.force) + size(s.slot) + size(s.offset)
     return total + (8 + 4 * 24) * nodes  # inverse mass; u and v read and written
 
 
@@ -53,7 +63,7 @@ def memory(held: Held) -> dict[str, float]:
     """Bytes of the solver's arrays and of a step, for each element; what it took off the device's pool [B]."""
     count = held.solver.model.element_count
     found = {
-        "bytes_per_element": sum(a.capacity for a in arrays(held.solver, {}).values()) / count,
+        "bytes_per_element": sum(size(a) for a in arrays(held.solver, {}).values()) / count,
         "step_bytes_per_element": step_bytes(held) / count,
     }
     if held.pool_before is not None:

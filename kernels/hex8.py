@@ -159,8 +159,8 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         u: wp.array(dtype=wp.vec3d),
         slot: int,
         count: int,
-        yielded_out: wp.array(dtype=wp.int32),
-        history_out: wp.array2d(dtype=R),
+        yielded: wp.array(dtype=wp.int32),
+        history: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()

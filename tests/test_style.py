@@ -111,7 +111,9 @@ def test_kernel_files_allocate_nothing(path: Path):
         if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation
         for inner in ast.walk(node.annotation)
     }
-    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call) and id(node) not in types]
+    views = {id(n) for n in ast.walk(tree) if isinstance(n, ast.Call) and "ptr" in {k.arg for k in n.keywords}}
+    skip = types | views
+    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call) and id(node) not in skip]
     assert not [f"line {f.lineno}" for f in calls if isinstance(f, ast.Attribute) and f.attr in ALLOCATE]
     assert not [f"line {f.lineno}" for f in calls if ast.unparse(f) == "wp.launch"]
 

@@ -178,6 +178,8 @@ class Solver:
         self.offset, self.slot = wp.array(offset, dtype=wp.int32), wp.array(slot, dtype=wp.int32)
         self.force = wp.zeros(len(slot), dtype=t.vec3)
         self.contacts = [ContactStage(p, model, PASS + PASS_COLUMNS * k) for k, p in enumerate(model.passes)]
+        # contact has few threads and waits long for memory
+        self.side = wp.Stream() if self.contacts and wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros(3, dtype=wp.int32)
         self._allocate_constraints()
@@ -207,10 +209,13 @@ class Solver:
         self.step_count = wp.zeros(1, dtype=wp.int32)
 
     def _forces(self, split: Split = whole) -> None:
+        with wp.ScopedStream(self.side):  # beside the elements, where there is a stream for it
+            for stage in self.contacts:
+                stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
         for stage in self.elements:
             stage.forces(self.X, self.law, self.u, self.force, split)
-        for stage in self.contacts:
-            stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
+        if self.side:
+            wp.wait_stream(self.side)
 
     def _integrate(self, kick: float, drift: float, split: Split = whole) -> None:
         gravity = wp.vec3d(*self.model.gravity)

@@ -1,0 +1,85 @@
+"""Patches of elements: compact, complete, and their sums are those of all elements around a node."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.patches import NOWHERE, PATCH, SLOTS, SUMMED, Patches, compact_order, make_patches
+
+
+def halves(words: np.ndarray) -> np.ndarray:
+    """Two entries of each word, shape (columns, 2 rows)."""
+    return np.ascontiguousarray(words.T).view("<u2").astype(int)
+
+
+def patch_of_elements(patches: Patches) -> np.ndarray:
+    return np.repeat(np.arange(len(patches.start) - 1), np.diff(patches.start))
+
+
+def nodal_sums(patches: Patches, force: np.ndarray, node_count: int) -> np.ndarray:
+    """What a GPU makes of one number for each corner, shape (corners, element_count)."""
+    places = halves(patches.places)
+    owner = np.repeat(np.arange(len(patches.start) - 1), np.diff(patches.slot_start))
+    used = places != NOWHERE
+    corner = np.where(used, places // (3 * PATCH), 0)
+    element = np.where(used, patches.start[owner][:, None] + places % PATCH, 0)
+    total = np.zeros(node_count)
+    np.add.at(total, patches.node, np.where(used, force[corner, element], 0.0).sum(axis=1))
+    return total
+
+
+def meshes() -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(0)
+    box = mca.Box(size=(1.0, 2.0, 1.0), divisions=(9, 17, 8)).build().hexahedra.T
+    fan = np.array([[0, k, k + 1, 0, 500, 500 + k, 501 + k, 500] for k in range(1, 41)]).T  # wedges around a line
+    return {"box": box, "fan": fan, "scattered": rng.permuted(np.arange(8 * 300)).reshape(8, 300), "one": box[:, :1]}
+
+
+@pytest.mark.parametrize("name", meshes())
+def test_corners_and_sums_are_those_of_the_mesh(name: str):
+    """Also where more than eight elements meet, where corners coincide, and where no two elements share a node."""
+    conn = np.ascontiguousarray(meshes()[name].astype(np.int32))
+    patches = make_patches(conn)
+    assert np.diff(patches.start).max() <= PATCH
+    assert np.diff(patches.slot_start).max() <= SLOTS
+    first = patches.slot_start[patch_of_elements(patches)]
+    np.testing.assert_array_equal(patches.node[halves(patches.corner) + first[:, None]], conn.T)
+    force = np.random.default_rng(1).normal(size=conn.shape)
+    expected = np.bincount(conn.ravel(), force.ravel(), minlength=conn.max() + 1)
+    np.testing.assert_allclose(nodal_sums(patches, force, conn.max() + 1), expected, atol=1e-13)
+    if name == "fan":
+        assert np.bincount(patches.node).max() > 1  # more than SUMMED corners take a second slot
+        assert SUMMED < 40
+
+
+def test_compact_order_keeps_most_nodes_of_a_patch_inside_it():
+    """Layers of 16 x 16 would leave 2.26 slots for each element; cubes of 128 elements 1.76 to 2."""
+    mesh = mca.Box(size=(1.0, 1.0, 1.0), divisions=(16, 16, 16)).build()
+    order = compact_order(mesh.points[mesh.hexahedra], PATCH)
+    np.testing.assert_array_equal(np.sort(order), np.arange(len(order)))
+    slots = len(make_patches(np.ascontiguousarray(mesh.hexahedra[order].T)).node) / len(order)
+    as_it_comes = len(make_patches(np.ascontiguousarray(mesh.hexahedra.T)).node) / len(order)
+    assert slots < 1.8 < as_it_comes
+
+
+def test_elements_of_a_model_come_patch_by_patch():
+    scene = mca.Scene(
+        name="bar",
+        bodies=(
+            mca.Body(
+                name="bar",
+                geometry=mca.Box(size=(0.1, 0.1, 0.1), divisions=(8, 8, 8)),
+                material=mca.Elastic(E=2e11, nu=0.3, rho=7850.0),
+            ),
+        ),
+        impact=mca.ImpactPhase(duration=1e-6),
+    )
+    from warp_mca.model import build_model
+
+    meshes = mca.mesh(scene)
+    X = meshes["bar"].points
+    model = build_model(scene, meshes, {"bar": X}, {"bar": np.zeros_like(X)})
+    np.testing.assert_array_equal(model.blocks[0].conn.T, meshes["bar"].hexahedra[model.element_of])
+    assert not np.array_equal(model.element_of, np.arange(512))
