@@ -41,8 +41,15 @@ class Ledger:
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
 
+    @property
+    def _width(self) -> int:
+        """Columns of a record."""
+        from warp_mca.solver import PASS, PASS_COLUMNS
+
+        return PASS + PASS_COLUMNS * len(self.model.passes)
+
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
-        """Take in the first `written` of the device's `records`, see `Solver.records`, and hold them to the guards.
+        """Take in the first `written` of a scene's `records`, see `Layout.records`, and hold them to the guards.
 
         Raises:
             GuardError: a record breaks a guard.
@@ -69,24 +76,26 @@ class Ledger:
         self.max_strain = max(self.max_strain, float(sums[STRAIN]))
         self._balance(sums, t)
 
-    def _energies(self, sums: Array) -> dict[str, float]:
+    def _energies(self, sums: Array) -> dict[str, Array]:
+        """The ledger [J] of a row of sums, or of each row."""
         from warp_mca.solver import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, KINETIC, PASS, PASS_COLUMNS, PLASTIC
 
-        springs = sums[PASS:].reshape(-1, PASS_COLUMNS)
+        springs = sums[..., PASS:].reshape(*sums.shape[:-1], -1, PASS_COLUMNS)
+        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
         return {
-            "kinetic": float(sums[KINETIC]),
-            "elastic": float(sums[ELASTIC]),
-            "plastic": float(sums[PLASTIC]),
-            "hourglass": float(sums[HOURGLASS]),
-            "contact": float(springs[:, 0].sum()),
-            "friction": float(springs[:, 1].sum()),
-            "damping": 0.0,
-            "joint": 0.0,
-            "external_work": float(sums[GRAVITY_WORK] + sums[DRIVE_WORK] + springs[:, 2].sum()) - self.initial_work,
+            "kinetic": sums[..., KINETIC],
+            "elastic": sums[..., ELASTIC],
+            "plastic": sums[..., PLASTIC],
+            "hourglass": sums[..., HOURGLASS],
+            "contact": springs[..., 0].sum(axis=-1),
+            "friction": springs[..., 1].sum(axis=-1),
+            "damping": np.zeros(sums.shape[:-1]),
+            "joint": np.zeros(sums.shape[:-1]),
+            "external_work": work - self.initial_work,
         }
 
     def _balance(self, sums: Array, t: float) -> None:
-        energy = self._energies(sums)
+        energy = {key: float(value) for key, value in self._energies(sums).items()}
         work = energy.pop("external_work")
         if self.initial_energy is None:
             self.initial_energy, self.initial_work = sum(energy.values()), work
@@ -102,8 +111,9 @@ class Ledger:
             )
 
     def energy(self) -> dict[str, float]:
-        """The ledger at the end [J]."""
-        last = self._energies(self.columns[-1])
+        """The ledger at the end [J]; not numbers where no record was taken in."""
+        sums = self.columns[-1] if self.columns else np.full(self._width, np.nan)
+        last = {key: float(value) for key, value in self._energies(sums).items()}
         error = sum(value for key, value in last.items() if key != "external_work")
         initial = self.initial_energy or 0.0
         return {"initial": initial, **last, "error": error - last["external_work"] - initial}
@@ -115,9 +125,8 @@ class Ledger:
         """
         from warp_mca.solver import PASS, PASS_COLUMNS
 
-        table = np.array(self.columns[first:])
-        energies = [self._energies(row) for row in table]
-        energy = {key: np.array([item[key] for item in energies]) for key in energies[0]}
+        table = np.array(self.columns[first:]).reshape(-1, self._width)
+        energy = self._energies(table)
         springs = table[:, PASS:].reshape(len(table), -1, PASS_COLUMNS)
         share = self.dt / self.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
@@ -129,7 +138,7 @@ class Ledger:
         pressed, stuck = springs[:, :, 6].sum(axis=1), springs[:, :, 7].sum(axis=1)
         stick: Array = np.zeros(len(table))
         np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
-        velocity = np.array(self.velocities[first:])
+        velocity = np.array(self.velocities[first:]).reshape(-1, 2, 3)
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
             velocity[:, 1] = self.model.passes[0].plane.velocity

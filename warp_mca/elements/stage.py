@@ -97,7 +97,7 @@ class ElementStage:
         self.yielded.zero_()
         self.history.zero_()
 
-    def max_plastic_strain(self) -> float:
-        """Greatest equivalent plastic strain of any point [-]."""
+    def max_plastic_strain(self, part: slice = slice(None)) -> float:
+        """Greatest equivalent plastic strain of any point of a range of elements [-]."""
         last = self.history.numpy()[: self.points * j2.HISTORY_SIZE][j2.HISTORY_SIZE - 1 :: j2.HISTORY_SIZE]
-        return float(last.max(initial=0.0))
+        return float(last[:, part].max(initial=0.0))
