@@ -80,7 +80,7 @@ class Ledger:
         """The ledger [J] of a row of sums, or of each row."""
         from warp_mca.solver import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, KINETIC, PASS, PASS_COLUMNS, PLASTIC
 
-        springs = sums[..., PASS:].reshape(*sums.shape[:-1], -1, PASS_COLUMNS)
+        springs = sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
         return {
             "kinetic": sums[..., KINETIC],
@@ -127,7 +127,7 @@ class Ledger:
 
         table = np.array(self.columns[first:]).reshape(-1, self._width)
         energy = self._energies(table)
-        springs = table[:, PASS:].reshape(len(table), -1, PASS_COLUMNS)
+        springs = table[:, PASS:].reshape(len(table), len(self.model.passes), PASS_COLUMNS)
         share = self.dt / self.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):

@@ -84,7 +84,7 @@ def mesh(scene: Scene, made: dict[object, Mesh] | None = None) -> dict[str, Mesh
     made = {} if made is None else made
     for body in scene.bodies:
         geometry = body.geometry
-        key = id(geometry) if isinstance(geometry, Mesh) else geometry
+        key = _key(geometry)
         if key not in made:
             made[key] = geometry if isinstance(geometry, Mesh) else geometry.build()
             check(made[key], body.name)
@@ -94,6 +94,15 @@ def mesh(scene: Scene, made: dict[object, Mesh] | None = None) -> dict[str, Mesh
         if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
             check(item, name)
     return cut
+
+
+def _key(geometry: object) -> object:
+    """What equal recipes share; a mesh, and a recipe that cannot be hashed, is like itself alone."""
+    try:
+        hash(geometry)
+    except TypeError:
+        return id(geometry)
+    return geometry
 
 
 def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
