@@ -16,6 +16,7 @@ from warp_mca.errors import GuardError, RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.join import join_models, join_probes
 from warp_mca.layout import offsets
+from warp_mca.paths import Found
 from warp_mca.results import Result, check_output, save
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.simulation import Clock, Progress, advance, divide_alike, mesh, prepare
@@ -152,17 +153,17 @@ def _folders(out: str | os.PathLike[str] | None, count: int, force: bool) -> lis
     return [check_output(Path(out) / f"{k:0{digits}d}", force=force) for k in range(count)]
 
 
-def _prepare(
-    scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Clock, tell: Progress
-) -> list[Prepared]:
+def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Clock, tell: Progress) -> list[Prepared]:
     """Every scene at the start of its impact phase."""
     if meshes is not None and len(meshes) != len(scenes):
         raise bad_value("number of meshes", len(meshes), f"give the meshes of each of the {len(scenes)} scenes")
     made: dict[object, Mesh] = {}
-    found = []
+    places: Found = {}
+    ready = []
     for k, scene in enumerate(scenes):
         try:
-            found.append(prepare(scene, mesh(scene, made) if meshes is None else meshes[k], clock, tell))
+            own = mesh(scene, made) if meshes is None else meshes[k]
+            ready.append(prepare(scene, own, clock, tell, places))
         except RequestError as error:
             raise RequestError(f"scenes[{k}]: {error}") from error
-    return found
+    return ready

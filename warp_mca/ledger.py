@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Columns of a record, then eight for each contact pass (`kernels.contact.sum_springs`).
+KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
+PASS_COLUMNS = 8
+
 _FLAGS = (
     "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike",
     "a node outran the contact search; choose a smaller output_interval",
@@ -44,8 +48,6 @@ class Ledger:
     @property
     def _width(self) -> int:
         """Columns of a record."""
-        from warp_mca.solver import PASS, PASS_COLUMNS
-
         return PASS + PASS_COLUMNS * len(self.model.passes)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
@@ -57,29 +59,38 @@ class Ledger:
         for raised, message in zip(records["flag"], _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
                 raise GuardError(f"stopped before t = {(self.count + written) * self.interval:.4g} s: {message}")
-        for row in range(written):
-            self._add(records["partial"][row], records["point_velocity"][row].copy())
-
-    def _add(self, partial: Array, velocity: Array) -> None:
-        from warp_mca.solver import JACOBIAN, STRAIN
-
-        sums = partial.sum(axis=1)
-        sums[STRAIN], sums[JACOBIAN] = partial[STRAIN].max(), partial[JACOBIAN].min()
+        sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
+        sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
+        good = written if sound.all() else int(np.argmin(sound))
+        share = self._balance(sums[:good])
+        over = share > self.tolerance
+        end = int(np.argmax(over)) + 1 if over.any() else good
+        self.columns.extend(sums[:end])
+        self.velocities.extend(velocity[:end].copy())
+        self.count += end
+        self.max_strain = max(self.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
+        self.energy_error = max(self.energy_error, float(share[:end].max(initial=0.0)))
         t = self.count * self.interval
-        if not np.isfinite(sums).all():
+        if over.any():
+            raise GuardError(
+                f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
+                f"{self.tolerance:g}: lower time_step_scale or a contact's penalty, or raise the tolerance if that "
+                "much is acceptable"
+            )
+        if good < written and not np.isfinite(sums[good]).all():
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
-        if sums[JACOBIAN] <= 0.0:
+        if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
-        self.columns.append(sums)
-        self.velocities.append(velocity)
-        self.count += 1
-        self.max_strain = max(self.max_strain, float(sums[STRAIN]))
-        self._balance(sums, t)
+
+    def _sums(self, partial: Array) -> Array:
+        """Columns of each record from its partial sums, shape (row_count, column_count)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is found out
+            sums = partial.sum(axis=2)
+        sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
+        return sums
 
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
-        from warp_mca.solver import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, KINETIC, PASS, PASS_COLUMNS, PLASTIC
-
         springs = sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
         return {
@@ -94,21 +105,20 @@ class Ledger:
             "external_work": work - self.initial_work,
         }
 
-    def _balance(self, sums: Array, t: float) -> None:
-        energy = {key: float(value) for key, value in self._energies(sums).items()}
+    def _balance(self, sums: Array) -> Array:
+        """Imbalance of each row of sums, as a share of initial energy and external work [-]."""
+        energy = self._energies(sums)
         work = energy.pop("external_work")
-        if self.initial_energy is None:
-            self.initial_energy, self.initial_work = sum(energy.values()), work
-            work = 0.0
-        error = sum(energy.values()) - work - self.initial_energy
-        self.energy_scale = max(self.energy_scale, abs(self.initial_energy) + abs(work))
-        share = abs(error) / self.energy_scale if self.energy_scale > 0.0 else 0.0
-        self.energy_error = max(self.energy_error, share)
-        if share > self.tolerance:
-            raise GuardError(
-                f"energy imbalance {share:.2%} at t = {t:.4g} s exceeds energy_tolerance = {self.tolerance:g}: "
-                "lower time_step_scale or a contact's penalty, or raise the tolerance if that much is acceptable"
-            )
+        stored = sum(energy.values(), np.zeros(len(sums)))
+        if self.initial_energy is None and len(sums):
+            self.initial_energy, self.initial_work = float(stored[0]), float(work[0])
+            work = work - self.initial_work
+        initial = self.initial_energy or 0.0
+        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.energy_scale))
+        self.energy_scale = float(scale.max(initial=self.energy_scale))
+        share: Array = np.zeros(len(sums))
+        np.divide(np.abs(stored - work - initial), scale, out=share, where=scale > 0.0)
+        return share
 
     def energy(self) -> dict[str, float]:
         """The ledger at the end [J]; not numbers where no record was taken in."""
@@ -123,8 +133,6 @@ class Ledger:
 
         Forces are means over the interval before.
         """
-        from warp_mca.solver import PASS, PASS_COLUMNS
-
         table = np.array(self.columns[first:]).reshape(-1, self._width)
         energy = self._energies(table)
         springs = table[:, PASS:].reshape(len(table), len(self.model.passes), PASS_COLUMNS)

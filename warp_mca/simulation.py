@@ -19,7 +19,7 @@ from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
-from warp_mca.paths import locate
+from warp_mca.paths import Found, locate
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results import Result, check_output, save
 from warp_mca.scene import Scene
@@ -250,8 +250,10 @@ def run(
     return result if out is None else save(result, out, force=force)
 
 
-def prepare(scene: Scene, meshes: Mapping[str, Mesh] | None, clock: Clock, tell: Progress) -> Prepared:
-    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model.
+def prepare(
+    scene: Scene, meshes: Mapping[str, Mesh] | None, clock: Clock, tell: Progress, found: Found | None = None
+) -> Prepared:
+    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model; `found` as in `locate`.
 
     Raises:
         RequestError: the scene cannot be built as written.
@@ -263,7 +265,7 @@ def prepare(scene: Scene, meshes: Mapping[str, Mesh] | None, clock: Clock, tell:
     start = hand_off(scene, meshes, nodal_masses(scene, meshes))
     clock.lap("rigid")
     model = build_model(scene, meshes, start.positions, start.velocities)
-    probes = locate(scene, model, meshes)
+    probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
     return Prepared(scene, meshes, start, model, probes)
 

@@ -30,6 +30,7 @@ from warp_mca.errors import bad_value
 from warp_mca.kernels import constraint, contact, ledger, node
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
+from warp_mca.ledger import DRIVE_WORK, HOURGLASS, PASS, PASS_COLUMNS
 from warp_mca.model import Model
 from warp_mca.threads import ELEMENTS as RANGE
 from warp_mca.threads import NODES, Pool, Split, Stages, whole
@@ -41,9 +42,6 @@ SUM_WIDTH = 256  # partial sums of a record, in a fixed order
 SHARE = 16  # elements for each thread that sums them at first, while there are at most SPREAD threads for a partial sum
 SPREAD = 64
 ROWS = 32  # records kept on the device before the host reads them
-# Columns of a record, then eight for each contact pass (`contact.sum_springs`).
-KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 8
 
 
 def check_device(name: str) -> str:
