@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.account import Account, Prepared

@@ -26,7 +26,7 @@ def per_scene(first: NDArray[np.int32]) -> Any:
 
 def _numbers(values: Sequence[float]) -> Any:
     """A number of each scene, as kernels take it."""
-    return values[0] if len(values) == 1 else wp.array(values, dtype=wp.float64)
+    return values[0] if len(values) == 1 else wp.array(list(values), dtype=wp.float64)
 
 
 def _vectors(values: Sequence[Any]) -> Any:

@@ -160,4 +160,5 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         element_start=parts.element_start,
         element_of=order,
         stable=stable,
+        batch=None,
     )
