@@ -162,7 +162,12 @@ def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Cl
     for k, scene in enumerate(scenes):
         try:
             own = mesh(scene, made) if meshes is None else meshes[k]
-            ready.append(prepare(scene, own, clock, tell, places))
+            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places))
         except RequestError as error:
             raise RequestError(f"scenes[{k}]: {error}") from error
     return ready
+
+
+def _share(tell: Progress, done: float) -> Progress:
+    """Tells of every stage that this share of the scenes is done with it."""
+    return lambda stage, _: tell(stage, done)
