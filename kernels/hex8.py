@@ -62,17 +62,123 @@ def stress_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str = "every") -> Any:
+def elastic_function(precision: str) -> Any:
+    """The function (corners, local displacements, frame W, K, G) -> (corner forces, greatest S : S of a point).
+
+    Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli: K, G and stresses are
+    those of the material times that.
+    """
+    t = scalars(precision)
+    R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
+    edges, to_lines = line_functions(precision)
+    edge_to_node = node_force_function(precision)
+    add_traction, symmetric_gradient = stress_functions(precision)
+
+    @wp.func
+    def elastic_forces(Xl: mat83, ul: mat83, W: mat33, K: R, G: R):
+        gx = to_lines(edges(Xl, 0))
+        gy = to_lines(edges(Xl, 1))
+        gz = to_lines(edges(Xl, 2))
+        lx = to_lines(edges(ul, 0))
+        ly = to_lines(edges(ul, 1))
+        lz = to_lines(edges(ul, 2))
+        Sx = mat43()  # stress times cofactor, summed over the two points of each Gauss line
+        Sy = mat43()
+        Sz = mat43()
+        Bx = mat43()  # cofactors alone, which carry the element's one pressure
+        By = mat43()
+        Bz = mat43()
+        volume = R(0.0)
+        dilation = R(0.0)
+        largest = R(0.0)
+        for g in range(8):
+            i = g & 1
+            j = (g >> 1) & 1
+            k = g >> 2
+            jx = j + 2 * k
+            jy = i + 2 * k
+            jz = i + 2 * j
+            b0 = wp.cross(gy[jy], gz[jz])
+            b1 = wp.cross(gz[jz], gx[jx])
+            b2 = wp.cross(gx[jx], gy[jy])
+            det = wp.dot(gx[jx], b0)
+            xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
+            trace = xx + yy + zz
+            volume += det
+            dilation += trace
+            shear = G / det
+            direct = shear + shear
+            mean = R(_THIRD) * trace
+            xx = direct * (xx - mean)
+            yy = direct * (yy - mean)
+            zz = direct * (zz - mean)
+            xy = shear * xy
+            yz = shear * yz
+            xz = shear * xz
+            largest = wp.max(largest, xx * xx + yy * yy + zz * zz + R(2.0) * (xy * xy + yz * yz + xz * xz))
+            Sx[jx] = add_traction(xx, yy, zz, xy, yz, xz, b0, Sx[jx])
+            Sy[jy] = add_traction(xx, yy, zz, xy, yz, xz, b1, Sy[jy])
+            Sz[jz] = add_traction(xx, yy, zz, xy, yz, xz, b2, Sz[jz])
+            Bx[jx] = Bx[jx] + b0
+            By[jy] = By[jy] + b1
+            Bz[jz] = Bz[jz] + b2
+        pressure = K * dilation / volume
+        Fx = to_lines(Sx + pressure * Bx)
+        Fy = to_lines(Sy + pressure * By)
+        Fz = to_lines(Sz + pressure * Bz)
+        return edge_to_node(Fx, Fy, Fz, W), largest
+
+    return elastic_forces
+
+
+@cache
+def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where `plastic`.
 
-    With turn "every", every plastic element takes the return map. That suits a CPU, which computes several elements
-    side by side; on a GPU the others of a warp would wait for one that yields, and elements that never yielded need
-    neither history nor registers for it. There, two launches follow each other: "elastic" computes the elements that
-    have not yielded, and lists those that turn out to yield now; "plastic" works through the list. Forces go to
-    entries of their own, so that the order of the list does not matter.
+    Every plastic element takes the return map, which suits a CPU that computes several elements side by side; a GPU
+    runs `kernels.hex8_patch`.
     """
     if finite:
         return _finite_force_kernel(precision, plastic)
+    if plastic:
+        return _plastic_force_kernel(precision)
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    element_rotation, local_displacement = frame_functions(precision)
+    load_element = load_function(precision)
+    elastic_forces = elastic_function(precision)
+    store_force = store_function(precision)
+    scale = LINE_SCALE**3
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
+    def hex8_elastic_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        count: int,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        e = wp.tid()
+        Xl = load_element(X, conn, e)
+        ul = load_element(u, conn, e)
+        W = element_rotation(Xl, ul)
+        ul = local_displacement(Xl, ul, W)
+        m = material[e]
+        f, _largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], R(scale) * law[m, 1])
+        for a in range(8):
+            store_force(force_out, slot + a * count + e, f, a)
+
+    return hex8_elastic_force
+
+
+@cache
+def _plastic_force_kernel(precision: str) -> Any:
+    """The force kernel with a return map at each point."""
     t = scalars(precision)
     R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
     edges, to_lines = line_functions(precision)
@@ -85,11 +191,8 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str 
     j2_return = j2.return_map(precision)
     scale = LINE_SCALE**3
 
-    # The list of the plastic turn is short as a rule: few blocks stride over all of its room.
-    strided = turn == "plastic"
-
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=strided, module_options={"fast_math": True})
-    def hex8_force(
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
+    def hex8_plastic_force(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
         material: wp.array(dtype=wp.int32),
@@ -98,18 +201,10 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str 
         slot: int,
         count: int,
         yielded_out: wp.array(dtype=wp.int32),
-        list_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
-        if wp.static(plastic and turn == "elastic"):
-            if yielded_out[e] != 0:
-                return
-        if wp.static(turn == "plastic"):
-            if e >= list_out[count]:
-                return
-            e = list_out[e]
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
         W = element_rotation(Xl, ul)
@@ -121,116 +216,72 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False, turn: str 
         ly = to_lines(edges(ul, 1))
         lz = to_lines(edges(ul, 2))
         m = material[e]
-        # Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli.
+        # as in `elastic_function`
         K = R(scale) * law[m, 0]
         G = R(scale) * law[m, 1]
-        Sx = mat43()  # stress times cofactor, summed over the two points of each Gauss line
+        limit = R(scale) * law[m, 2]
+        H = R(scale) * law[m, 3]
+        beta = law[m, 4]
+        Sx = mat43()
         Sy = mat43()
         Sz = mat43()
-        Bx = mat43()  # cofactors alone, which carry the element's one pressure
+        Bx = mat43()
         By = mat43()
         Bz = mat43()
         volume = R(0.0)
         dilation = R(0.0)
-        largest = R(0.0)
-        if wp.static(not plastic or turn == "elastic"):
-            for g in range(8):
-                i = g & 1
-                j = (g >> 1) & 1
-                k = g >> 2
-                jx = j + 2 * k
-                jy = i + 2 * k
-                jz = i + 2 * j
-                b0 = wp.cross(gy[jy], gz[jz])
-                b1 = wp.cross(gz[jz], gx[jx])
-                b2 = wp.cross(gx[jx], gy[jy])
-                det = wp.dot(gx[jx], b0)
-                xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
-                trace = xx + yy + zz
-                volume += det
-                dilation += trace
-                shear = G / det
-                direct = shear + shear
-                mean = R(_THIRD) * trace
-                xx = direct * (xx - mean)
-                yy = direct * (yy - mean)
-                zz = direct * (zz - mean)
-                xy = shear * xy
-                yz = shear * yz
-                xz = shear * xz
-                if wp.static(plastic):
-                    size = xx * xx + yy * yy + zz * zz + R(2.0) * (xy * xy + yz * yz + xz * xz)
-                    largest = wp.max(largest, size)
-                Sx[jx] = add_traction(xx, yy, zz, xy, yz, xz, b0, Sx[jx])
-                Sy[jy] = add_traction(xx, yy, zz, xy, yz, xz, b1, Sy[jy])
-                Sz[jz] = add_traction(xx, yy, zz, xy, yz, xz, b2, Sz[jz])
-                Bx[jx] = Bx[jx] + b0
-                By[jy] = By[jy] + b1
-                Bz[jz] = Bz[jz] + b2
-        if wp.static(plastic and turn == "elastic"):
-            if R(1.5) * largest > R(scale * scale) * law[m, 2] * law[m, 2]:
-                yielded_out[e] = 1
-                list_out[wp.atomic_add(list_out, count, 1)] = e
-                return
-        if wp.static(plastic and turn != "elastic"):
-            limit = R(scale) * law[m, 2]
-            H = R(scale) * law[m, 3]
-            beta = law[m, 4]
-            flag = int(1)
-            if wp.static(turn == "every"):
-                flag = yielded_out[e]
-            flag_new = flag
-            for g in range(8):
-                i = g & 1
-                j = (g >> 1) & 1
-                k = g >> 2
-                jx = j + 2 * k
-                jy = i + 2 * k
-                jz = i + 2 * j
-                eps_p = mat33()
-                p = R(0.0)
-                if flag != 0:
-                    eps_p, p = read_plastic_strain(history_out, g, e)
-                b0 = wp.cross(gy[jy], gz[jz])
-                b1 = wp.cross(gz[jz], gx[jx])
-                b2 = wp.cross(gx[jx], gy[jy])
-                det = wp.dot(gx[jx], b0)
-                xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
-                trace = xx + yy + zz
-                volume += det
-                dilation += trace
-                shear = R(0.5) / det
-                direct = shear + shear
-                mean = R(_THIRD) * trace
-                xx = direct * (xx - mean)
-                yy = direct * (yy - mean)
-                zz = direct * (zz - mean)
-                xy = shear * xy
-                yz = shear * yz
-                xz = shear * xz
-                strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-                S, eps_new, p_new = j2_return(strain, eps_p, p, G, limit, H, beta)
-                if p_new > p:
-                    write_plastic_strain(history_out, g, e, eps_new, p_new)
-                    flag_new = int(1)
-                Sx[jx] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b0, Sx[jx])
-                Sy[jy] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b1, Sy[jy])
-                Sz[jz] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b2, Sz[jz])
-                Bx[jx] = Bx[jx] + b0
-                By[jy] = By[jy] + b1
-                Bz[jz] = Bz[jz] + b2
-            if wp.static(turn == "every"):
-                if flag_new != flag:
-                    yielded_out[e] = flag_new
+        flag = yielded_out[e]
+        flag_new = flag
+        for g in range(8):
+            i = g & 1
+            j = (g >> 1) & 1
+            k = g >> 2
+            jx = j + 2 * k
+            jy = i + 2 * k
+            jz = i + 2 * j
+            eps_p = mat33()
+            p = R(0.0)
+            if flag != 0:
+                eps_p, p = read_plastic_strain(history_out, g, e)
+            b0 = wp.cross(gy[jy], gz[jz])
+            b1 = wp.cross(gz[jz], gx[jx])
+            b2 = wp.cross(gx[jx], gy[jy])
+            det = wp.dot(gx[jx], b0)
+            xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
+            trace = xx + yy + zz
+            volume += det
+            dilation += trace
+            shear = R(0.5) / det
+            direct = shear + shear
+            mean = R(_THIRD) * trace
+            xx = direct * (xx - mean)
+            yy = direct * (yy - mean)
+            zz = direct * (zz - mean)
+            xy = shear * xy
+            yz = shear * yz
+            xz = shear * xz
+            strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+            S, eps_new, p_new = j2_return(strain, eps_p, p, G, limit, H, beta)
+            if p_new > p:
+                write_plastic_strain(history_out, g, e, eps_new, p_new)
+                flag_new = int(1)
+            Sx[jx] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b0, Sx[jx])
+            Sy[jy] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b1, Sy[jy])
+            Sz[jz] = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b2, Sz[jz])
+            Bx[jx] = Bx[jx] + b0
+            By[jy] = By[jy] + b1
+            Bz[jz] = Bz[jz] + b2
+        if flag_new != flag:
+            yielded_out[e] = flag_new
         pressure = K * dilation / volume
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)
         Fz = to_lines(Sz + pressure * Bz)
-        f = edge_to_node(Fx, Fy, Fz)
+        f = edge_to_node(Fx, Fy, Fz, W)
         for a in range(8):
-            store_force(force_out, slot + a * count + e, f, W, a)
+            store_force(force_out, slot + a * count + e, f, a)
 
-    return hex8_force
+    return hex8_plastic_force
 
 
 @cache
@@ -316,9 +367,9 @@ def _finite_force_kernel(precision: str, plastic: bool) -> Any:
             if flag_new != flag:
                 yielded_out[e] = flag_new
         half = R(0.5)
-        f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz))
+        f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz), W)
         for a in range(8):
-            store_force(force_out, slot + a * count + e, f, W, a)
+            store_force(force_out, slot + a * count + e, f, a)
 
     return hex8_finite_force
 

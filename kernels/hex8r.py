@@ -13,16 +13,9 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
-from warp_mca.kernels.hexahedron import (
-    edge_functions,
-    frame_functions,
-    history_functions,
-    load_function,
-    node_force_function,
-    store_function,
-    stress_function,
-)
+from warp_mca.kernels.hexahedron import history_functions, load_function, store_function, stress_function
 from warp_mca.kernels.kinematics import kinematics
+from warp_mca.kernels.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
@@ -34,114 +27,57 @@ HISTORY_ROWS = _DISSIPATED + 1
 
 
 @cache
-def mean_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (corners -> node gradients times volume, and volume; displacement gradient)."""
+def hourglass_functions(precision: str) -> tuple[Any, Any]:
+    """Functions (hourglass amplitudes; generalised forces and energy)."""
     t = scalars(precision)
-    R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
-    half_edges, to_gauss = edge_functions(precision)
-    edge_to_node = node_force_function(precision)
+    R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
 
     @wp.func
-    def mean_gradients(x: mat83):
-        gx = to_gauss(half_edges(x, 0))
-        gy = to_gauss(half_edges(x, 1))
-        gz = to_gauss(half_edges(x, 2))
-        Bx = mat43()
-        By = mat43()
-        Bz = mat43()
-        volume = R(0.0)
-        for g in range(8):
-            i = g & 1
-            j = (g >> 1) & 1
-            k = g >> 2
-            jx = j + 2 * k
-            jy = i + 2 * k
-            jz = i + 2 * j
-            b0 = wp.cross(gy[jy], gz[jz])
-            volume += wp.dot(gx[jx], b0)
-            Bx[jx] = Bx[jx] + b0
-            By[jy] = By[jy] + wp.cross(gz[jz], gx[jx])
-            Bz[jz] = Bz[jz] + wp.cross(gx[jx], gy[jy])
-        half = R(0.5)
-        b = edge_to_node(to_gauss(half * Bx), to_gauss(half * By), to_gauss(half * Bz))
-        return b, volume  # with the sign of forces: minus the gradients
+    def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
+        """What the mean displacement gradient H leaves of the hourglass patterns, one row for each, in frame W."""
+        Wt = wp.transpose(W)
+        q = mat43()
+        for m in range(4):
+            left = R(0.125) * (u[3 + m] - H * x[3 + m])
+            q[m] = left + Wt * left
+        return q
 
     @wp.func
-    def mean_gradient_of(u: mat83, b: mat83, volume: R):
-        H = mat33()
-        for a in range(8):
-            H = H - wp.outer(u[a], b[a])
-        return H / volume
+    def hourglass(q: mat43, x: mat73, volume: R, K: R, G: R):
+        """Forces conjugate to the amplitudes q, one row for each pattern, and the energy.
 
-    return mean_gradients, mean_gradient_of
-
-
-@cache
-def hourglass_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions (pattern sums of a field over the corners, moduli of a brick, generalised forces and energy)."""
-    t = scalars(precision)
-    R, vec3, mat33, mat43, mat83 = t.real, t.vec3, t.mat33, t.mat43, t.mat83
-    half_edges, _ = edge_functions(precision)
-
-    @wp.func
-    def hourglass_sums(x: mat83):
-        h = mat43()  # rows: patterns eta zeta, zeta xi, xi eta, xi eta zeta of the corners
-        bottom_even = x[0] + x[2]
-        bottom_odd = x[1] + x[3]
-        top_even = x[4] + x[6]
-        top_odd = x[5] + x[7]
-        h[0] = (x[0] + x[1] - x[2] - x[3]) - (x[4] + x[5] - x[6] - x[7])
-        h[1] = (x[0] - x[1] - x[2] + x[3]) - (x[4] - x[5] - x[6] + x[7])
-        h[2] = (bottom_even - bottom_odd) + (top_even - top_odd)
-        h[3] = (top_even - top_odd) - (bottom_even - bottom_odd)
-        return h
-
-    @wp.func
-    def brick(x: mat83):
-        """Unit edge directions as rows, and half edge lengths, at the centre."""
-        directions = mat33()
-        lengths = vec3()
-        for k in range(3):
-            e = half_edges(x, k)
-            mean = R(0.25) * (e[0] + e[1] + e[2] + e[3])
-            size = wp.length(mean)
-            lengths[k] = size
-            directions[k] = mean / size
-        return directions, lengths
-
-    @wp.func
-    def hourglass(q: mat43, directions: mat33, a: vec3, volume: R, K: R, G: R):
-        """Forces conjugate to the amplitudes q, one row for each pattern, and the energy."""
+        The brick has the element's mean edges, along x[k] and |x[k]| / 4 long.
+        """
         one = R(1.0)
         nu = (R(3.0) * K - R(2.0) * G) / (R(6.0) * K + R(2.0) * G)
-        E = R(2.0) * G * (one + nu)
-        plane = R(2.0) * G / (one - nu)
         third = volume / R(3.0)
-        # amplitudes along the brick's edges: rows as patterns, columns as edges
-        p = q * wp.transpose(directions)
+        plane = third * R(2.0) * G / (one - nu)
+        E = third * R(2.0) / R(3.0) * G * (one + nu)
+        inverse = vec3(one / wp.length(x[0]), one / wp.length(x[1]), one / wp.length(x[2]))
         F = mat43()
         energy = R(0.0)
         for k in range(3):  # strains that vary along edge k, in the plane of the two others
             i = (k + 1) % 3
             j = (k + 2) % 3
             # pattern number m varies along the two edges other than m
-            ei = p[j, i] / a[i]
-            ej = p[i, j] / a[j]
-            shear = p[j, j] / a[i] + p[i, i] / a[j]
-            si = third * plane * (ei + nu * ej)
-            sj = third * plane * (ej + nu * ei)
+            ii = R(8.0) * inverse[i] * inverse[i]
+            jj = R(8.0) * inverse[j] * inverse[j]
+            kk = R(8.0) * inverse[k] * inverse[k]
+            ij = R(8.0) * inverse[i] * inverse[j]
+            ei = ii * wp.dot(q[j], x[i])
+            ej = jj * wp.dot(q[i], x[j])
+            shear = ij * (wp.dot(q[j], x[j]) + wp.dot(q[i], x[i]))
+            last = kk * wp.dot(q[3], x[k])
+            si = plane * (ei + nu * ej)
+            sj = plane * (ej + nu * ei)
             sij = third * G * shear
-            F[j, i] = F[j, i] + si / a[i]
-            F[i, j] = F[i, j] + sj / a[j]
-            F[j, j] = F[j, j] + sij / a[i]
-            F[i, i] = F[i, i] + sij / a[j]
-            energy += R(0.5) * (si * ei + sj * ej + sij * shear)
-            last = p[3, k] / a[k]
-            F[3, k] = volume / R(9.0) * E * last / a[k]
-            energy += R(0.5) * F[3, k] * p[3, k]
-        return F * directions, energy
+            F[j] = F[j] + (ii * si) * x[i] + (ij * sij) * x[j]
+            F[i] = F[i] + (jj * sj) * x[j] + (ij * sij) * x[i]
+            F[3] = F[3] + (kk * E * last) * x[k]
+            energy += R(0.5) * (si * ei + sj * ej + sij * shear + E * last * last)
+        return F, energy
 
-    return hourglass_sums, brick, hourglass
+    return amplitudes, hourglass
 
 
 @cache
@@ -168,49 +104,39 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
-    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`."""
+def element_function(precision: str, plastic: bool, finite: bool) -> Any:
+    """The function (corners, displacements, e, m, law, yielded, history) -> corner forces; flows where `plastic`."""
     t = scalars(precision)
-    R, vec3, mat33, mat43, mat83 = t.real, t.vec3, t.mat33, t.mat43, t.mat83
-    element_rotation, local_displacement = frame_functions(precision, finite)
-    load_element = load_function(precision)
-    store_force = store_function(precision)
+    R, mat33, mat43, mat73, mat83 = t.real, t.mat33, t.mat43, t.mat73, t.mat83
+    to_patterns, to_corners = pattern_functions(precision)
+    rotated = mean_frame(precision, finite)
     mean_gradients, mean_gradient_of = mean_functions(precision)
-    hourglass_sums, brick, hourglass = hourglass_functions(precision)
+    amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
     j2_return = j2.return_map(precision)
     k = kinematics(precision, finite)
     dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
 
-    # ln(1 + x) of small x needs the rounding that fast math gives away
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
-    def hex8r_force(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
+    @wp.func
+    def element_forces(
+        X: mat83,
+        u: mat83,
+        e: int,
+        m: int,
         law: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        slot: int,
-        count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
-        force_out: wp.array(dtype=vec3),
     ):
-        e = wp.tid()
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, W)
-        b, volume = mean_gradients(Xl)
-        H = mean_gradient_of(ul, b, volume)
-        m = material[e]
+        x = to_patterns(X)
+        du = to_patterns(u)
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
+        volume = R(VOLUME_SCALE) * scaled_volume
         K = law[m, 0]
         G = law[m, 1]
-        hx = hourglass_sums(Xl)
-        directions, lengths = brick(Xl)
-        eighth = R(0.125)
-        q = eighth * (hourglass_sums(ul) - hx * wp.transpose(H))
+        q = amplitudes(x, du, H_world, W)
         kept = R(1.0)
         strain, N, d = deviator(H)
         S = R(2.0) * G * strain
@@ -233,28 +159,54 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
                 if flag == 0:
                     yielded_out[e] = int(1)
         P = nominal(H, S, N, d) + pressure_of(K, dilation_of(H)) * cofactor(H)
-        Q, stored = hourglass(q, directions, lengths, volume, K, G)
+        Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):
             if kept < R(1.0):
                 row = wp.static(_DISSIPATED)
                 history_out[row, e] = history_out[row, e] + (R(1.0) - kept * kept) * stored
                 Q = kept * Q
-        P = P - (eighth / volume) * (wp.transpose(Q) * hx)
-        Q = eighth * Q
-        f = mat83()
+        for n in range(4):  # amplitudes feel the mean gradient too
+            P = P - (R(0.125) / volume) * wp.outer(Q[n], x[3 + n])
+        P = -R(VOLUME_SCALE) * (P + W * P)
+        f = mat73()
+        for n in range(6):
+            f[n] = P * b[n]
+        for n in range(4):
+            f[3 + n] = f[3 + n] - R(0.125) * (Q[n] + W * Q[n])
+        return to_corners(f)
+
+    return element_forces
+
+
+@cache
+def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    load_element = load_function(precision)
+    element_forces = element_function(precision, plastic, finite)
+    store_force = store_function(precision)
+
+    # ln(1 + x) of small x needs the rounding that fast math gives away
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
+    def hex8r_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        count: int,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        e = wp.tid()
+        Xl = load_element(X, conn, e)
+        ul = load_element(u, conn, e)
+        f = element_forces(Xl, ul, e, material[e], law, yielded_out, history_out)
         for a in range(8):
-            f[a] = P * b[a]
-        # corner a carries the patterns with the signs of (eta zeta, zeta xi, xi eta, xi eta zeta)
-        f[0] = f[0] - Q[0] - Q[1] - Q[2] + Q[3]
-        f[1] = f[1] - Q[0] + Q[1] + Q[2] - Q[3]
-        f[2] = f[2] + Q[0] + Q[1] - Q[2] + Q[3]
-        f[3] = f[3] + Q[0] - Q[1] + Q[2] - Q[3]
-        f[4] = f[4] + Q[0] + Q[1] - Q[2] - Q[3]
-        f[5] = f[5] + Q[0] - Q[1] + Q[2] + Q[3]
-        f[6] = f[6] - Q[0] - Q[1] - Q[2] - Q[3]
-        f[7] = f[7] - Q[0] + Q[1] + Q[2] + Q[3]
-        for a in range(8):
-            store_force(force_out, slot + a * count + e, f, W, a)
+            store_force(force_out, slot + a * count + e, f, a)
 
     return hex8r_force
 
@@ -264,10 +216,11 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    element_rotation, local_displacement = frame_functions(precision, finite)
+    to_patterns, _ = pattern_functions(precision)
+    rotated = mean_frame(precision, finite)
     load_element = load_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
-    hourglass_sums, brick, hourglass = hourglass_functions(precision)
+    amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
     read_amplitudes, _ = amplitude_functions(precision)
     plastic_energy = j2.plastic_energy(precision)
@@ -287,12 +240,12 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         energy_out: wp.array2d(dtype=R),
     ):
         e = wp.tid()
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, W)
-        b, volume = mean_gradients(Xl)
-        H = mean_gradient_of(ul, b, volume)
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
+        volume = R(VOLUME_SCALE) * scaled_volume
         m = material[e]
         K = law[m, 0]
         G = law[m, 1]
@@ -304,12 +257,11 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
                 eps_p, p = read_plastic_strain(history, 0, e)
                 dissipated = volume * plastic_energy(eps_p, p, law[m, 2], law[m, 3], law[m, 4])
                 dissipated += history[wp.static(_DISSIPATED), e]
-        directions, lengths = brick(Xl)
-        q = R(0.125) * (hourglass_sums(ul) - hourglass_sums(Xl) * wp.transpose(H))
+        q = amplitudes(x, du, H_world, W)
         if wp.static(plastic):
             if yielded[e] != 0:
                 q = q - read_amplitudes(history, e)
-        _Q, stored = hourglass(q, directions, lengths, volume, K, G)
+        _Q, stored = hourglass(q, x, volume, K, G)
         identity = wp.identity(n=3, dtype=R)
         elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))
         energy_out[0, first + e] = volume * elastic
@@ -326,7 +278,8 @@ def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    element_rotation, local_displacement = frame_functions(precision, finite)
+    to_patterns, _ = pattern_functions(precision)
+    rotated = mean_frame(precision, finite)
     load_element = load_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
@@ -349,12 +302,11 @@ def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     ):
         item = wp.tid()
         e = element[item]
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, W)
-        b, volume = mean_gradients(Xl)
-        H = mean_gradient_of(ul, b, volume)
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
         m = material[e]
         eps_p = mat33()
         p = R(0.0)

@@ -64,6 +64,7 @@ def edge_functions(precision: str) -> tuple[Any, Any]:
     return half_edges, to_gauss
 
 
+LINE_RATIO = _FAR / _NEAR
 LINE_SCALE = 0.5 * _NEAR * _NEAR  # of half edges at the Gauss lines over what `line_functions` gives
 
 
@@ -75,7 +76,6 @@ def line_functions(precision: str) -> tuple[Any, Any]:
     """
     t = scalars(precision)
     R, mat43, mat83 = t.real, t.mat43, t.mat83
-    ratio = _FAR / _NEAR
 
     @wp.func
     def edges(x: mat83, direction: int):
@@ -99,7 +99,7 @@ def line_functions(precision: str) -> tuple[Any, Any]:
 
     @wp.func
     def to_lines(e: mat43):
-        r = R(ratio)
+        r = R(LINE_RATIO)
         f = mat43()
         f[0] = e[0] + r * e[1]
         f[1] = e[1] + r * e[0]
@@ -176,12 +176,12 @@ def gradient_function(precision: str) -> Any:
 
 @cache
 def node_force_function(precision: str) -> Any:
-    """The function that turns edge forces, one 4 x 3 matrix for each direction, into the node forces of an element."""
+    """The function that turns edge forces, one 4 x 3 matrix for each direction, into node forces, out of frame W."""
     t = scalars(precision)
-    mat43, mat83 = t.mat43, t.mat83
+    mat33, mat43, mat83 = t.mat33, t.mat43, t.mat83
 
     @wp.func
-    def edge_to_node(Fx: mat43, Fy: mat43, Fz: mat43):
+    def edge_to_node(Fx: mat43, Fy: mat43, Fz: mat43, W: mat33):
         f = mat83()
         f[0] = Fx[0] + Fy[0] + Fz[0]
         f[1] = Fy[1] + Fz[1] - Fx[0]
@@ -191,6 +191,8 @@ def node_force_function(precision: str) -> Any:
         f[5] = Fy[3] - Fx[2] - Fz[1]
         f[6] = -Fx[3] - Fy[3] - Fz[3]
         f[7] = Fx[3] - Fy[2] - Fz[2]
+        for a in range(8):
+            f[a] = f[a] + W * f[a]
         return f
 
     return edge_to_node
@@ -198,17 +200,17 @@ def node_force_function(precision: str) -> Any:
 
 @cache
 def store_function(precision: str) -> Any:
-    """The function (force_out, n, f, W, a) that stores the force on corner a, turned back by Q = I + W, in entry n.
+    """The function (force_out, n, f, a) that stores the force on corner a in entry n.
 
     Component by component: as a whole, a vector of three would keep the CPU from computing elements side by side.
     """
     t = scalars(precision)
-    vec3, mat33, mat83 = t.vec3, t.mat33, t.mat83
+    vec3, mat83 = t.vec3, t.mat83
 
     @wp.func
-    def store_force(force_out: wp.array(dtype=vec3), n: int, f: mat83, W: mat33, a: int):
+    def store_force(force_out: wp.array(dtype=vec3), n: int, f: mat83, a: int):
         for i in range(3):
-            force_out[n][i] = f[a, i] + (W[i, 0] * f[a, 0] + W[i, 1] * f[a, 1] + W[i, 2] * f[a, 2])
+            force_out[n][i] = f[a, i]
 
     return store_force
 

@@ -15,6 +15,7 @@ class Scalars:
         real: Warp scalar type of element arithmetic and history.
         vec3, mat33: three-vector and 3 x 3 matrix of it.
         mat43, mat83: one row for each edge of a direction, and one for each node of a hexahedron.
+        mat63, mat73: one row for each monomial of a hexahedron that changes its volume, and for each but the constant.
     """
 
     real: Any
@@ -22,6 +23,8 @@ class Scalars:
     mat33: Any
     mat43: Any
     mat83: Any
+    mat63: Any
+    mat73: Any
 
 
 @cache
@@ -31,4 +34,5 @@ def scalars(precision: str) -> Scalars:
         real, vec3, mat33 = wp.float32, wp.vec3f, wp.mat33f
     else:
         real, vec3, mat33 = wp.float64, wp.vec3d, wp.mat33d
-    return Scalars(real, vec3, mat33, wp.types.matrix((4, 3), real), wp.types.matrix((8, 3), real))
+    rows = (wp.types.matrix((count, 3), real) for count in (4, 8, 6, 7))
+    return Scalars(real, vec3, mat33, *rows)

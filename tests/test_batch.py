@@ -7,6 +7,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.kernels.lanes import LANES
+from warp_mca.patches import PATCH, make_patches
 from warp_mca.results import FILES, PATH_FILES
 from warp_mca.solver import Solver
 
@@ -105,6 +106,23 @@ def test_scenes_may_differ_in_all_that_is_data(scenes):
             np.testing.assert_allclose(result[name], one[name], atol=1e-9 * np.nanmax(np.abs(one[name])), err_msg=name)
         stress = one.paths[0].stress
         np.testing.assert_allclose(result.paths[0].stress, stress, atol=1e-5 * np.abs(stress).max())
+
+
+def test_patches_of_a_gpu_are_those_of_each_scene_alone():
+    """So that sums over a patch have the order that they have without the other scenes."""
+    meshes = [mca.Box(size=(1.0, 1.0, 1.0), divisions=n).build() for n in ((7, 6, 7), (5, 5, 5), (8, 8, 4))]
+    conns = [mesh.hexahedra.T.astype(np.int32) for mesh in meshes]
+    nodes, ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes)]), np.cumsum([conn.shape[1] for conn in conns])
+    assert ends[0] % PATCH and ends[1] % PATCH
+    shifted = [conn + np.int32(first) for conn, first in zip(conns, nodes, strict=False)]
+    joined, slot_node = make_patches(np.concatenate(shifted, axis=1), ends.tolist())
+    single = [make_patches(conn) for conn in conns]
+    assert np.array_equal(joined.places, np.concatenate([patches.places for patches, _ in single], axis=1))
+    own = [nodes_of + first for (_, nodes_of), first in zip(single, nodes, strict=False)]
+    assert np.array_equal(slot_node, np.concatenate(own))
+    sizes = np.concatenate([np.diff(patches.slot_start) for patches, _ in single])
+    assert np.array_equal(np.diff(joined.slot_start), sizes)
+    assert set(ends) <= set(joined.start) and np.diff(joined.start).max() <= PATCH
 
 
 def test_bars_of_a_batch_follow_wave_theory_each_with_its_own_speed():

@@ -37,9 +37,8 @@ def forces(solver: Solver, u: np.ndarray) -> np.ndarray:
     with wp.ScopedDevice("cpu"):
         solver._forces()
     force, total = solver.force.numpy().astype(float), np.zeros_like(u)
-    for block in solver.model.blocks:
-        part = force[block.slot : block.slot + block.conn.size]
-        np.add.at(total, block.conn.ravel(), part)
+    for stage in solver.elements:
+        np.add.at(total, stage.slot_node, force[stage.slot : stage.slot + len(stage.slot_node)])
     return total
 
 

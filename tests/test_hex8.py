@@ -46,14 +46,11 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         ]
         law = wp.array(np.array([[K, G, sigma_y or 0.0, 40e9, 0.0]]), dtype=t.real)
         history = [wp.zeros(count * plastic, dtype=int), wp.zeros((48, count * plastic), dtype=t.real)]
-        unlisted = wp.zeros(0, dtype=int)
         field = wp.array(u, dtype=wp.vec3d)
         force = wp.full(8 * count, np.nan, dtype=t.vec3)
         energy = wp.full((5, count), np.nan, dtype=t.real)
         kernel = hex8.force_kernel(precision, plastic)
-        wp.launch(
-            kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[history[0], unlisted, history[1], force]
-        )
+        wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[*history, force])
         kernel = hex8.energy_kernel(precision, plastic)
         wp.launch(kernel, count, inputs=[*arrays, law, *history, field, 0], outputs=[energy])
     total = np.zeros_like(X)

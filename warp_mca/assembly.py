@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.elements import ELEMENTS, Element
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.patches import PATCH, compact_order
 from warp_mca.scene import Body, Elastic, J2Bilinear, Point, Scene, Surface
 from warp_mca.surfaces import Faces, make_faces
 from warp_mca.timestep import StableStep, stable_step
@@ -32,7 +33,7 @@ class Block:
         conn: nodes of each element, shape (corners, element_count), int32.
         material: row of `Model.law`, shape (element_count,), int32.
         first: index of the first element in the model.
-        slot: where the block's element forces start in the force array, corner by corner.
+        ends: where the elements of each scene of a batch end in the block; empty for one scene.
     """
 
     element: str
@@ -41,7 +42,7 @@ class Block:
     conn: Index
     material: Index
     first: int
-    slot: int
+    ends: tuple[int, ...] = ()
 
 
 def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
@@ -193,28 +194,27 @@ class Assembly:
         return np.array(rows)
 
     def blocks(self) -> tuple[tuple[Block, ...], Index]:
-        """Elements grouped by kernels, and the order that this gives them."""
+        """Elements grouped by kernels, those of a patch together, and the order that this gives them."""
         plastic = np.array([isinstance(m, J2Bilinear) for m in self.materials])[self.material]
-        blocks, order, first, slot = [], [], 0, 0
+        blocks, order, first = [], [], 0
         for flag in (True, False):
             for part in self.cells:
-                mine = plastic[part.index] == flag
-                if mine.any():
-                    conn = np.ascontiguousarray(part.conn[mine].T)
-                    material = self.material[part.index[mine]]
+                mine = np.flatnonzero(plastic[part.index] == flag)
+                if len(mine):
+                    mine = mine[compact_order(self.X[part.conn[mine]], PATCH)]
+                    index = part.index[mine]
                     blocks.append(
                         Block(
                             element=part.element.name,
                             plastic=flag,
                             finite=part.finite,
-                            conn=conn,
-                            material=material,
+                            conn=np.ascontiguousarray(part.conn[mine].T),
+                            material=self.material[index],
                             first=first,
-                            slot=slot,
                         )
                     )
-                    order.append(part.index[mine])
-                    first, slot = first + conn.shape[1], slot + conn.size
+                    order.append(index)
+                    first += len(index)
         return tuple(blocks), np.concatenate(order)
 
     def stable(self, added: Array) -> StableStep:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.account import Prepared
 from warp_mca.assembly import GROUND, Block
 from warp_mca.layout import Layout, offsets
-from warp_mca.model import Model, gather
+from warp_mca.model import Model
 from warp_mca.paths import Probes
 
 Index = NDArray[np.int32]
@@ -29,7 +29,6 @@ def join_models(models: Sequence[Model]) -> Model:
     elements = offsets([model.element_count for model in models])
     pairs = offsets([len(model.joint_first) for model in models])
     blocks, order, ranges = _blocks(models, nodes, elements)
-    offset, slot = gather(blocks, int(nodes[-1]))
     fastest = int(np.argmin([model.stable.dt for model in models]))
     stable = models[fastest].stable
 
@@ -44,8 +43,6 @@ def join_models(models: Sequence[Model]) -> Model:
         mass=np.concatenate([model.mass for model in models]),
         blocks=blocks,
         law=np.concatenate([model.law for model in models]),
-        gather_offset=offset,
-        gather_slot=slot,
         fixed_axes=np.concatenate([model.fixed_axes for model in models]),
         prescribed_node=shifted("prescribed_node", nodes),
         prescribed_axis=np.concatenate([model.prescribed_axis for model in models]),
@@ -82,7 +79,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
     """Blocks of all scenes, the order of the elements in the joined meshes, and `Layout.elements`."""
     laws = offsets([len(model.law) for model in models])
     kinds = dict.fromkeys((b.element, b.plastic, b.finite) for model in models for b in model.blocks)
-    blocks, order, first, slot = [], [], 0, 0
+    blocks, order, first = [], [], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
         conn, material, end = [], [], first
@@ -96,20 +93,19 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
-        joined = np.ascontiguousarray(np.concatenate(conn, axis=1))
         element, plastic, finite = kind
         blocks.append(
             Block(
                 element=element,
                 plastic=plastic,
                 finite=finite,
-                conn=joined,
+                conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),
                 first=first,
-                slot=slot,
+                ends=tuple((ranges[:, column, 1] - first).tolist()),
             )
         )
-        first, slot = end, slot + joined.size
+        first = end
     return tuple(blocks), np.concatenate(order), ranges
 
 

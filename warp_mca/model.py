@@ -32,7 +32,6 @@ class Model:
         mass: lumped masses [kg], shape (node_count,), float64.
         blocks: elements by kernel.
         law: K, G, sigma_y, H [Pa] and beta [-] of each material, shape (material_count, 5), float64.
-        gather_offset, gather_slot: element forces of each node, compressed rows, int32.
         fixed_axes: bits 0, 1, 2 hold the axes x, y, z of each node, shape (node_count,), int32.
         prescribed_node, prescribed_axis, prescribed_table: one entry for each driven axis of a node, int32.
         table_offset: start of each table, shape (table_count + 1,), int32.
@@ -55,8 +54,6 @@ class Model:
     mass: Array
     blocks: tuple[Block, ...]
     law: Array
-    gather_offset: Index
-    gather_slot: Index
     fixed_axes: Index
     prescribed_node: Index
     prescribed_axis: Index
@@ -86,15 +83,6 @@ class Model:
     def element_count(self) -> int:
         """Number of elements."""
         return len(self.element_of)
-
-
-def gather(blocks: tuple[Block, ...], node_count: int) -> tuple[Index, Index]:
-    """Slots of the element forces of each node as compressed rows."""
-    node = np.concatenate([block.conn.ravel() for block in blocks])
-    slot = np.concatenate([block.slot + np.arange(block.conn.size) for block in blocks])
-    order = np.argsort(node, kind="stable")
-    offset = np.searchsorted(node[order], np.arange(node_count + 1))
-    return offset.astype(np.int32), slot[order].astype(np.int32)
 
 
 def _contacts(parts: Assembly) -> tuple[tuple[ContactPass, ...], Array, Array]:
@@ -134,7 +122,6 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
     parts = Assembly(scene, meshes, X)
     first, second, hinges = join_bodies(parts)
     blocks, order = parts.blocks()
-    offset, slot = gather(blocks, len(parts.X))
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
     check_bindings(held, first, second)
@@ -146,8 +133,6 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         mass=parts.mass,
         blocks=blocks,
         law=parts.law(),
-        gather_offset=offset,
-        gather_slot=slot,
         **held,
         joint_first=first,
         joint_second=second,

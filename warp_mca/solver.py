@@ -2,7 +2,7 @@
 
 | stage | kernel | runs |
 |---|---|---|
-| 1 element forces | `hex8_force`, `hex8r_force`, `tet4_force`, … | every step, for each block of like elements |
+| 1 element forces | `hex8_patch_force`, `tet4_force`, … | every step, for each block of like elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
 | 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval |
 | 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | the same, where a scene has paths or a frame is due |
@@ -26,6 +26,7 @@ import warp as wp
 
 from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
+from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
 from warp_mca.kernels import constraint, contact, ledger, node
 from warp_mca.kernels.scalars import scalars
@@ -92,11 +93,11 @@ class Solver:
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
         self.law = wp.array(model.law, dtype=t.real)
-        self.force = wp.zeros(sum(block.conn.size for block in model.blocks), dtype=t.vec3)
-        self.offset = wp.array(model.gather_offset, dtype=wp.int32)
-        self.slot = wp.array(model.gather_slot, dtype=wp.int32)
         self.fixed_axes = wp.array(model.fixed_axes if model.fixed_axes.any() else model.fixed_axes[:0], dtype=wp.int32)
         self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
+        offset, slot = gather_lists(self.elements, model.node_count)
+        self.offset, self.slot = wp.array(offset, dtype=wp.int32), wp.array(slot, dtype=wp.int32)
+        self.force = wp.zeros(len(slot), dtype=t.vec3)
         scenes, passes = self.layout.count, len(model.passes) // self.layout.count
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)

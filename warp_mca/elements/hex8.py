@@ -24,8 +24,7 @@ class Hex8:
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
-        from warp_mca.elements.hex8_stage import Hex8Stage
-        from warp_mca.elements.stage import ElementStage
-        from warp_mca.kernels import hex8
+        from warp_mca.elements.patch_stage import hexahedral_stage
+        from warp_mca.kernels import hex8, hex8_patch, j2
 
-        return ElementStage(block, precision, hex8, points=8) if block.finite else Hex8Stage(block, precision)
+        return hexahedral_stage(block, precision, hex8, hex8_patch, points=8, rows=8 * j2.HISTORY_SIZE)

@@ -92,7 +92,7 @@ class Hex8r:
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
-        from warp_mca.elements.stage import ElementStage
-        from warp_mca.kernels import hex8r
+        from warp_mca.elements.patch_stage import hexahedral_stage
+        from warp_mca.kernels import hex8r, hex8r_patch
 
-        return ElementStage(block, precision, hex8r, points=1, rows=hex8r.HISTORY_ROWS)
+        return hexahedral_stage(block, precision, hex8r, hex8r_patch, points=1, rows=hex8r.HISTORY_ROWS)

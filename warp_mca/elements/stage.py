@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.kernels import j2
 from warp_mca.kernels.lanes import side_by_side
@@ -13,6 +16,8 @@ from warp_mca.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Block
+
+Index = NDArray[np.int32]
 
 BLOCK_DIM = 64  # threads of a block: these kernels fill the register file
 
@@ -26,6 +31,8 @@ class ElementStage:
         yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
         history: plastic strain and equivalent plastic strain of each point in turn, then what the element keeps more;
             empty where elastic.
+        slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
+        slot: where the block's slots start in the force array.
     """
 
     def __init__(self, block: Block, precision: str, kernels: Any, points: int, rows: int | None = None) -> None:
@@ -42,6 +49,8 @@ class ElementStage:
         self.conn = wp.array(block.conn, dtype=wp.int32)
         self.material = wp.array(block.material, dtype=wp.int32)
         self.count = block.conn.shape[1]
+        self.slot_node: Index = block.conn.ravel()
+        self.slot = 0
         kept = self.count if block.plastic else 0
         self.yielded = wp.zeros(kept, dtype=wp.int32)
         self.points = points
@@ -67,7 +76,7 @@ class ElementStage:
         """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
 
         def launch(part: slice) -> None:
-            inputs = [X, self.conn[:, part], self.material[part], law, u, self.block.slot + part.start, self.count]
+            inputs = [X, self.conn[:, part], self.material[part], law, u, self.slot + part.start, self.count]
             outputs = [*self._history(part), force]
             inputs += self.more(part)
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
@@ -103,3 +112,15 @@ class ElementStage:
             return 0.0
         last = self.history[j2.HISTORY_SIZE - 1 : self.points * j2.HISTORY_SIZE : j2.HISTORY_SIZE, part]
         return float(last.numpy().max())
+
+
+def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index, Index]:
+    """Give each stage its slots; slots of the forces on each node as compressed rows (offset, slot), int32."""
+    first = 0
+    for stage in stages:
+        stage.slot = first
+        first += len(stage.slot_node)
+    node = np.concatenate([stage.slot_node for stage in stages])
+    offset = np.zeros(node_count + 1, dtype=np.int32)
+    np.cumsum(np.bincount(node, minlength=node_count), out=offset[1:])
+    return offset, np.argsort(node, kind="stable").astype(np.int32)

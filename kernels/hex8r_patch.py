@@ -1,0 +1,49 @@
+"""Owns the force kernel of `hex8r` on a GPU, at small strain: one thread for each element of a patch."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.hex8r import element_function
+from warp_mca.kernels.patch import Patches, load_functions, shared_functions, sum_functions
+from warp_mca.kernels.scalars import scalars
+from warp_mca.patches import PATCH
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def force_kernel(precision: str, plastic: bool) -> Any:
+    """Kernel: forces of each patch on its nodes, and the plastic history where `plastic`."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    force_pool, _ = shared_functions(precision)
+    load_element, _ = load_functions(precision)
+    keep_forces, sum_patch = sum_functions(precision)
+    element_forces = element_function(precision, plastic, False)
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
+    def hex8r_patch_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        patches: Patches,
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        lane = wp.tid() % wp.static(PATCH)
+        patch = wp.tid() // wp.static(PATCH)
+        forces = wp.array(ptr=force_pool(), shape=(24 * PATCH,), dtype=R)
+        e = patches.start[patch] + lane
+        if e < patches.start[patch + 1]:
+            Xl = load_element(X, conn, e)
+            ul = load_element(u, conn, e)
+            keep_forces(forces, lane, element_forces(Xl, ul, e, material[e], law, yielded_out, history_out))
+        sum_patch(forces, patches, patch, lane, slot, force_out)
+
+    return hex8r_patch_force

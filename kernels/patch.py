@@ -1,0 +1,152 @@
+"""Owns what force kernels of a GPU share: a block of threads sums the forces of a patch of elements.
+
+A patch is up to PATCH elements, one for each thread. Their forces are summed in shared memory in a fixed order, so that
+what leaves the multiprocessor is one force for each node of a patch in place of eight for each element, and runs repeat
+bit for bit. Shared memory, barriers and the exchange between the lanes of a warp are CUDA's own; nothing of this module
+runs on a CPU.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.scalars import scalars
+from warp_mca.patches import NOWHERE, PATCH
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func_native("__syncthreads();")
+def barrier():
+    """Wait for all threads of the block."""
+    ...
+
+
+@wp.func_native("__syncwarp();")
+def warp_barrier():
+    """Wait for all lanes of the warp."""
+    ...
+
+
+@wp.func_native(f"__shared__ int pool[{PATCH + 1}]; return (unsigned long long)pool;")
+def list_pool() -> wp.uint64:
+    """Address of shared memory for a list of elements of a patch, its length first."""
+    ...
+
+
+@wp.struct
+class Patches:
+    """Patches of a block of elements.
+
+    Attributes:
+        start: first element of each patch, and the end of the last, shape (patch_count + 1,), int32.
+        slot_start: the same of its slots, one for each of its nodes, shape (patch_count + 1,), int32.
+        places: where the first components of the forces of a slot lie in shared memory, two in a word and eight at
+            most, NOWHERE where there are fewer, shape (4, slot_count), uint32.
+    """
+
+    start: wp.array(dtype=wp.int32)
+    slot_start: wp.array(dtype=wp.int32)
+    places: wp.array2d(dtype=wp.uint32)
+
+
+@cache
+def shared_functions(precision: str) -> tuple[Any, Any]:
+    """Functions (address of shared memory for the forces of a patch; value of the lane that differs in `mask`)."""
+    R = scalars(precision).real
+    name = "float" if precision == "mixed" else "double"
+
+    @wp.func_native(f"__shared__ {name} pool[{24 * PATCH}]; return (unsigned long long)pool;")
+    def force_pool() -> wp.uint64: ...
+
+    @wp.func_native("return __shfl_xor_sync(0xffffffffu, value, mask);")
+    def exchange(value: R, mask: int) -> R: ...
+
+    return force_pool, exchange
+
+
+@cache
+def load_functions(precision: str) -> tuple[Any, Any]:
+    """Functions (an element's nodes relative to its first, as `hexahedron.load_function`; one node so)."""
+    t = scalars(precision)
+    R, vec3, mat83 = t.real, t.vec3, t.mat83
+    # Fast math would also flush what is too small, in three instructions for each number.
+    convert = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
+
+    @wp.func_native(convert if precision == "mixed" else "return value;")
+    def rounded(value: wp.float64) -> R: ...
+
+    @wp.func
+    def difference(field: wp.array(dtype=wp.vec3d), node: int, origin: wp.vec3d):
+        d = field[node] - origin
+        return vec3(rounded(d[0]), rounded(d[1]), rounded(d[2]))
+
+    @wp.func
+    def load_element(field: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+        local = mat83()
+        origin = field[conn[0, e]]
+        for a in range(1, 8):
+            local[a] = difference(field, conn[a, e], origin)
+        return local
+
+    @wp.func
+    def load_node(field: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int, a: int):
+        return difference(field, conn[a, e], field[conn[0, e]])
+
+    return load_element, load_node
+
+
+@wp.func
+def places_of(patches: Patches, n: int, end: int):
+    """Where the forces of slot n lie, two places in a word."""
+    w = wp.vec4ui()
+    if n < end:
+        for k in range(4):
+            w[k] = patches.places[k, n]
+    return w
+
+
+@cache
+def sum_functions(precision: str) -> tuple[Any, Any]:
+    """Functions that store the forces of a thread's element in shared memory, and that sum those of a patch."""
+    t = scalars(precision)
+    R, vec3, mat83 = t.real, t.vec3, t.mat83
+
+    @wp.func
+    def keep_forces(pool_out: wp.array(dtype=R), lane: int, f: mat83):
+        """Component i of the force on corner a lies at (3 a + i) PATCH + lane."""
+        for a in range(8):
+            for i in range(3):
+                pool_out[(3 * a + i) * wp.static(PATCH) + lane] = f[a, i]
+
+    @wp.func
+    def add(pool: wp.array(dtype=R), places: wp.uint32, total: vec3):
+        """Adds the forces at two places, the low and the high half of a word."""
+        low = int(places & wp.uint32(0xFFFF))
+        high = int(places >> wp.uint32(16))
+        if low != wp.static(NOWHERE):
+            total += vec3(pool[low], pool[low + wp.static(PATCH)], pool[low + wp.static(2 * PATCH)])
+        if high != wp.static(NOWHERE):
+            total += vec3(pool[high], pool[high + wp.static(PATCH)], pool[high + wp.static(2 * PATCH)])
+        return total
+
+    @wp.func
+    def sum_patch(
+        pool: wp.array(dtype=R), patches: Patches, patch: int, lane: int, slot: int, force_out: wp.array(dtype=vec3)
+    ):
+        """Forces of a patch into its slots, when all threads have kept theirs."""
+        n = patches.slot_start[patch] + lane
+        end = patches.slot_start[patch + 1]
+        w = places_of(patches, n, end)  # on its way while others still compute
+        barrier()
+        while n < end:
+            coming = places_of(patches, n + wp.static(PATCH), end)
+            total = vec3()
+            for k in range(4):
+                total = add(pool, w[k], total)
+            force_out[slot + n] = total
+            w = coming
+            n += wp.static(PATCH)
+
+    return keep_forces, sum_patch

@@ -1,0 +1,52 @@
+"""Owns the device side of elements that a GPU computes by patches, and the choice between that and one by one."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import warp as wp
+
+from warp_mca.elements.stage import ElementStage
+from warp_mca.kernels import patch
+from warp_mca.patches import PATCH, Patches, make_patches
+from warp_mca.threads import Split, whole
+
+if TYPE_CHECKING:
+    from warp_mca.model import Block
+
+
+class PatchStage(ElementStage):
+    """Patches of the block on the device; a slot for each node of a patch.
+
+    Attributes:
+        patches: on the device.
+    """
+
+    def __init__(self, block: Block, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int) -> None:
+        """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
+        super().__init__(block, precision, kernels, points, rows)
+        self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
+        host, self.slot_node = make_patches(block.conn, block.ends)
+        self.patch_count = len(host.start) - 1
+        self.patches = patch.Patches()
+        for field in fields(Patches):
+            setattr(self.patches, field.name, wp.array(getattr(host, field.name)))
+        if points > 1:  # eight lanes read the points of one element together
+            self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
+
+    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
+        """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
+        inputs = [X, self.conn, self.patches, self.material, law, u, self.slot]
+        outputs = [self.yielded, self.history, force]
+        threads = self.patch_count * PATCH
+        wp.launch(self.force_kernel, threads, inputs=inputs, outputs=outputs, block_dim=PATCH)
+
+
+def hexahedral_stage(
+    block: Block, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
+) -> ElementStage:
+    """By patches on a GPU at small strain, one by one otherwise; arguments as `PatchStage`."""
+    if block.finite or not wp.get_device().is_cuda:
+        return ElementStage(block, precision, kernels, points, rows)
+    return PatchStage(block, precision, kernels, patch_kernels, points, rows)
