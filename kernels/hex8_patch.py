@@ -16,14 +16,17 @@ from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions,
 from warp_mca.kernels.patch import (
     Patches,
     barrier,
+    corners_of,
     list_pool,
     load_functions,
+    load_patch,
+    node_pool,
     shared_functions,
     sum_functions,
     warp_barrier,
 )
 from warp_mca.kernels.scalars import scalars
-from warp_mca.patches import PATCH
+from warp_mca.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -102,9 +105,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
 
     @wp.func
     def flow(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
+        pool: wp.array(dtype=wp.vec3d),
+        patches: Patches,
         law: wp.array2d(dtype=R),
         e: int,
         m: int,
@@ -117,8 +119,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         """Eight lanes, q = 0 to 7, compute element e, whose rotation W stands where its forces will."""
         a = q ^ ((q >> 1) & 1)  # corners run around the faces
         eps_p, p = read_plastic_strain(history_out, q, e)
-        x = load_node(X, conn, e, a)
-        d = load_node(u, conn, e, a)
+        x = load_node(pool, 0, patches, e, a)
+        d = load_node(pool, wp.static(SLOTS), patches, e, a)
         W = mat33()
         for k in range(9):
             W[k // 3, k % 3] = force_out[k * wp.static(PATCH) + thread]
@@ -156,10 +158,18 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             for i in range(3):
                 force_out[(3 * a + i) * wp.static(PATCH) + thread] = f[i]
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
+    # in float32, a few registers spilled cost less than a quarter of the threads
+    bounds = (PATCH, 4) if precision == "mixed" else None
+
+    @wp.kernel(
+        enable_backward=False,
+        module="unique",
+        grid_stride=False,
+        launch_bounds=bounds,
+        module_options={"fast_math": True},
+    )
     def hex8_patch_force(
         X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
         patches: Patches,
         material: wp.array(dtype=wp.int32),
         law: wp.array2d(dtype=R),
@@ -177,11 +187,15 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         if wp.static(plastic):
             if lane == 0:
                 todo[0] = 0
-            barrier()
+        pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
         e = start + lane
-        if e < patches.start[patch + 1]:
-            Xl = load_element(X, conn, e)
-            ul = load_element(u, conn, e)
+        end = patches.start[patch + 1]
+        corners = corners_of(patches, wp.min(e, end - 1))
+        load_patch(X, u, patches, patch, lane, pool)
+        barrier()
+        if e < end:
+            Xl = load_element(pool, 0, corners)
+            ul = load_element(pool, wp.static(SLOTS), corners)
             W = element_rotation(Xl, ul)
             m = material[e]
             flows = bool(False)
@@ -207,9 +221,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                 item = (turn * wp.static(PATCH) + lane) // 8
                 mine = todo[1 + wp.min(item, count - 1)]
                 flow(
-                    X,
-                    u,
-                    conn,
+                    pool,
+                    patches,
                     law,
                     start + mine,
                     material[start + mine],

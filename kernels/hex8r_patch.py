@@ -6,9 +6,18 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hex8r import element_function
-from warp_mca.kernels.patch import Patches, load_functions, shared_functions, sum_functions
+from warp_mca.kernels.patch import (
+    Patches,
+    barrier,
+    corners_of,
+    load_functions,
+    load_patch,
+    node_pool,
+    shared_functions,
+    sum_functions,
+)
 from warp_mca.kernels.scalars import scalars
-from warp_mca.patches import PATCH
+from warp_mca.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -23,10 +32,17 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     keep_forces, sum_patch = sum_functions(precision)
     element_forces = element_function(precision, plastic, False)
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
+    bounds = (PATCH, 4 if plastic else 5) if precision == "mixed" else None
+
+    @wp.kernel(
+        enable_backward=False,
+        module="unique",
+        grid_stride=False,
+        launch_bounds=bounds,
+        module_options={"fast_math": True},
+    )
     def hex8r_patch_force(
         X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
         patches: Patches,
         material: wp.array(dtype=wp.int32),
         law: wp.array2d(dtype=R),
@@ -39,10 +55,15 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         lane = wp.tid() % wp.static(PATCH)
         patch = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(24 * PATCH,), dtype=R)
+        pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
         e = patches.start[patch] + lane
-        if e < patches.start[patch + 1]:
-            Xl = load_element(X, conn, e)
-            ul = load_element(u, conn, e)
+        end = patches.start[patch + 1]
+        corners = corners_of(patches, wp.min(e, end - 1))
+        load_patch(X, u, patches, patch, lane, pool)
+        barrier()
+        if e < end:
+            Xl = load_element(pool, 0, corners)
+            ul = load_element(pool, wp.static(SLOTS), corners)
             keep_forces(forces, lane, element_forces(Xl, ul, e, material[e], law, yielded_out, history_out))
         sum_patch(forces, patches, patch, lane, slot, force_out)
 

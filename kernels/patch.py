@@ -1,9 +1,9 @@
-"""Owns what force kernels of a GPU share: a block of threads sums the forces of a patch of elements.
+"""Owns what force kernels of a GPU share: a block of threads loads a patch of elements and sums its forces.
 
-A patch is up to PATCH elements, one for each thread. Their forces are summed in shared memory in a fixed order, so that
-what leaves the multiprocessor is one force for each node of a patch in place of eight for each element, and runs repeat
-bit for bit. Shared memory, barriers and the exchange between the lanes of a warp are CUDA's own; nothing of this module
-runs on a CPU.
+A patch is up to PATCH elements, one for each thread. Its nodes are read once, into shared memory; its forces are summed
+there in a fixed order, so that what leaves the multiprocessor is one force for each node of a patch in place of eight
+for each element, and runs repeat bit for bit. Shared memory, barriers and the exchange between the lanes of a warp are
+CUDA's own; nothing of this module runs on a CPU.
 """
 
 from functools import cache
@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.scalars import scalars
-from warp_mca.patches import NOWHERE, PATCH
+from warp_mca.patches import NOWHERE, PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -29,6 +29,12 @@ def warp_barrier():
     ...
 
 
+@wp.func_native(f"__shared__ double pool[{6 * SLOTS}]; return (unsigned long long)pool;")
+def node_pool() -> wp.uint64:
+    """Address of shared memory for reference positions, then displacements, of the slots of a patch."""
+    ...
+
+
 @wp.func_native(f"__shared__ int pool[{PATCH + 1}]; return (unsigned long long)pool;")
 def list_pool() -> wp.uint64:
     """Address of shared memory for a list of elements of a patch, its length first."""
@@ -42,12 +48,17 @@ class Patches:
     Attributes:
         start: first element of each patch, and the end of the last, shape (patch_count + 1,), int32.
         slot_start: the same of its slots, one for each of its nodes, shape (patch_count + 1,), int32.
+        node: of each slot, shape (slot_count,), int32.
+        corner: slots of the corners of each element, counted from the first of its patch, two in a word, shape
+            (4, element_count), uint32.
         places: where the first components of the forces of a slot lie in shared memory, two in a word and eight at
             most, NOWHERE where there are fewer, shape (4, slot_count), uint32.
     """
 
     start: wp.array(dtype=wp.int32)
     slot_start: wp.array(dtype=wp.int32)
+    node: wp.array(dtype=wp.int32)
+    corner: wp.array2d(dtype=wp.uint32)
     places: wp.array2d(dtype=wp.uint32)
 
 
@@ -66,6 +77,44 @@ def shared_functions(precision: str) -> tuple[Any, Any]:
     return force_pool, exchange
 
 
+@wp.func
+def load_patch(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    patches: Patches,
+    patch: int,
+    lane: int,
+    pool_out: wp.array(dtype=wp.vec3d),
+):
+    """Positions and displacements of a patch into shared memory; wait before they are read."""
+    begin = patches.slot_start[patch]
+    count = patches.slot_start[patch + 1] - begin
+    # two slots for each thread at once, because a thread waits long for each: first for the node, then for its place
+    second = lane + wp.static(PATCH)
+    i = patches.node[begin + wp.min(lane, count - 1)]
+    j = patches.node[begin + wp.min(second, count - 1)]
+    X_i = X[i]
+    u_i = u[i]
+    X_j = X[j]
+    u_j = u[j]
+    if lane < count:
+        pool_out[lane] = X_i
+        pool_out[lane + wp.static(SLOTS)] = u_i
+    if second < count:
+        pool_out[second] = X_j
+        pool_out[second + wp.static(SLOTS)] = u_j
+    for n in range(lane + wp.static(2 * PATCH), count, wp.static(PATCH)):
+        k = patches.node[begin + n]
+        pool_out[n] = X[k]
+        pool_out[n + wp.static(SLOTS)] = u[k]
+
+
+@wp.func
+def corners_of(patches: Patches, e: int):
+    """Slots of an element's corners within its patch, two in a word."""
+    return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
+
+
 @cache
 def load_functions(precision: str) -> tuple[Any, Any]:
     """Functions (an element's nodes relative to its first, as `hexahedron.load_function`; one node so)."""
@@ -78,21 +127,25 @@ def load_functions(precision: str) -> tuple[Any, Any]:
     def rounded(value: wp.float64) -> R: ...
 
     @wp.func
-    def difference(field: wp.array(dtype=wp.vec3d), node: int, origin: wp.vec3d):
-        d = field[node] - origin
+    def difference(pool: wp.array(dtype=wp.vec3d), slot: int, origin: wp.vec3d):
+        d = pool[slot] - origin
         return vec3(rounded(d[0]), rounded(d[1]), rounded(d[2]))
 
     @wp.func
-    def load_element(field: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+    def load_element(pool: wp.array(dtype=wp.vec3d), first: int, corners: wp.vec4ui):
         local = mat83()
-        origin = field[conn[0, e]]
-        for a in range(1, 8):
-            local[a] = difference(field, conn[a, e], origin)
+        origin = pool[first + int(corners[0] & wp.uint32(0xFFFF))]
+        for k in range(4):
+            if k > 0:
+                local[2 * k] = difference(pool, first + int(corners[k] & wp.uint32(0xFFFF)), origin)
+            local[2 * k + 1] = difference(pool, first + int(corners[k] >> wp.uint32(16)), origin)
         return local
 
     @wp.func
-    def load_node(field: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int, a: int):
-        return difference(field, conn[a, e], field[conn[0, e]])
+    def load_node(pool: wp.array(dtype=wp.vec3d), first: int, patches: Patches, e: int, a: int):
+        word = patches.corner[a // 2, e]
+        slot = int(wp.where(a % 2 == 0, word & wp.uint32(0xFFFF), word >> wp.uint32(16)))
+        return difference(pool, first + slot, pool[first + int(patches.corner[0, e] & wp.uint32(0xFFFF))])
 
     return load_element, load_node
 

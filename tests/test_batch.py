@@ -115,14 +115,16 @@ def test_patches_of_a_gpu_are_those_of_each_scene_alone():
     nodes, ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes)]), np.cumsum([conn.shape[1] for conn in conns])
     assert ends[0] % PATCH and ends[1] % PATCH
     shifted = [conn + np.int32(first) for conn, first in zip(conns, nodes, strict=False)]
-    joined, slot_node = make_patches(np.concatenate(shifted, axis=1), ends.tolist())
+    joined = make_patches(np.concatenate(shifted, axis=1), ends.tolist())
     single = [make_patches(conn) for conn in conns]
-    assert np.array_equal(joined.places, np.concatenate([patches.places for patches, _ in single], axis=1))
-    own = [nodes_of + first for (_, nodes_of), first in zip(single, nodes, strict=False)]
-    assert np.array_equal(slot_node, np.concatenate(own))
-    sizes = np.concatenate([np.diff(patches.slot_start) for patches, _ in single])
-    assert np.array_equal(np.diff(joined.slot_start), sizes)
-    assert set(ends) <= set(joined.start) and np.diff(joined.start).max() <= PATCH
+    for name in ("places", "corner"):
+        assert np.array_equal(getattr(joined, name), np.concatenate([getattr(p, name) for p in single], axis=1))
+    own = [patches.node + first for patches, first in zip(single, nodes, strict=False)]
+    assert np.array_equal(joined.node, np.concatenate(own))
+    for name in ("start", "slot_start"):
+        sizes = np.concatenate([np.diff(getattr(patches, name)) for patches in single])
+        assert np.array_equal(np.diff(getattr(joined, name)), sizes)
+    assert len(sizes) > len(meshes)
 
 
 def test_bars_of_a_batch_follow_wave_theory_each_with_its_own_speed():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PATCH = 128  # elements of a patch, and threads of its block
+SLOTS = 320  # that a patch may have
 SUMMED = 8  # forces that a slot sums at most
 NOWHERE = 0xFFFF
 
@@ -59,17 +60,30 @@ class Patches:
     Attributes:
         start: first element of each patch, and the end of the last, shape (patch_count + 1,), int32.
         slot_start: the same of its slots, one for each of its nodes, shape (patch_count + 1,), int32.
+        node: of each slot, shape (slot_count,), int32.
+        corner: slots of the corners of each element, counted from the first of its patch, two in a word, shape
+            (corners / 2, element_count), uint32.
         places: where the first components of the forces of a slot lie in shared memory, two in a word and SUMMED at
             most, NOWHERE where there are fewer, shape (SUMMED / 2, slot_count), uint32.
     """
 
     start: Index
     slot_start: Index
+    node: Index
+    corner: NDArray[np.uint32]
     places: NDArray[np.uint32]
 
 
-def make_patches(conn: Index, ends: Sequence[int] = ()) -> tuple[Patches, Index]:
-    """Patches of elements that stand in a compact order, and the node of each slot, shape (slot_count,), int32.
+def _slots(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]:
+    """Of sorted keys: the place of each among its equals, whether it opens a slot of SUMMED of them, and its slot."""
+    begin = np.flatnonzero(np.append(True, key[1:] != key[:-1]))
+    rank = np.arange(len(key)) - np.repeat(begin, np.diff(np.append(begin, len(key))))
+    head = rank % SUMMED == 0
+    return rank % SUMMED, head, np.cumsum(head) - 1
+
+
+def make_patches(conn: Index, ends: Sequence[int] = ()) -> Patches:
+    """Patches of elements that stand in a compact order; those with too many nodes are halved.
 
     A node has a slot in each patch around it, and one more for every SUMMED corners that meet there.
 
@@ -79,23 +93,29 @@ def make_patches(conn: Index, ends: Sequence[int] = ()) -> tuple[Patches, Index]
     """
     corners, count = conn.shape
     ends = sorted({0, *ends, count})
-    start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
-    patch = np.repeat(np.arange(len(start) - 1), np.diff(start))
     span = int(conn.max()) + 1
-    key = (patch * span + conn).ravel()
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    fresh = np.append(True, key[1:] != key[:-1])
-    begin = np.flatnonzero(fresh)
-    rank = np.arange(len(key)) - np.repeat(begin, np.diff(np.append(begin, len(key))))
-    head = rank % SUMMED == 0
-    slot = np.cumsum(head) - 1
-    place = (3 * np.arange(corners)[:, None] * PATCH + np.arange(count) - start[patch]).ravel()[order]
-    places = np.full((slot[-1] + 1, SUMMED), NOWHERE, dtype="<u2")
-    places[slot, rank % SUMMED] = place
-    patches = Patches(
+    start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
+    while True:
+        patch = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        key = (patch * span + conn).ravel()
+        order = np.argsort(key, kind="stable")
+        rank, head, slot = _slots(key[order])
+        opened = key[order][head]
+        slot_start = np.searchsorted(opened, np.arange(len(start)) * span)
+        large = np.flatnonzero(np.diff(slot_start) > SLOTS)
+        if not len(large):
+            break
+        start = np.sort(np.append(start, (start[large] + start[large + 1]) // 2))
+    place = (3 * np.arange(corners)[:, None] * PATCH + (np.arange(count) - start[patch])).ravel()
+    places = np.full((len(opened), SUMMED), NOWHERE, dtype="<u2")
+    places[slot, rank] = place[order]
+    corner = np.empty(conn.size, dtype=np.int64)
+    corner[order] = slot
+    corner = (corner.reshape(conn.shape) - slot_start[patch]).astype("<u2")
+    return Patches(
         start=start.astype(np.int32),
-        slot_start=np.searchsorted(key[head], np.arange(len(start)) * span).astype(np.int32),
-        places=np.ascontiguousarray(places.view("<u4").T),
+        slot_start=slot_start.astype(np.int32),
+        node=(opened % span).astype(np.int32),
+        corner=np.ascontiguousarray(corner.T).view("<u4").T.copy(),
+        places=places.view("<u4").T.copy(),
     )
-    return patches, (key[head] % span).astype(np.int32)

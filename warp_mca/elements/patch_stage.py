@@ -27,7 +27,8 @@ class PatchStage(ElementStage):
         """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
-        host, self.slot_node = make_patches(block.conn, block.ends)
+        host = make_patches(block.conn, block.ends)
+        self.slot_node = host.node
         self.patch_count = len(host.start) - 1
         self.patches = patch.Patches()
         for field in fields(Patches):
@@ -37,7 +38,7 @@ class PatchStage(ElementStage):
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.conn, self.patches, self.material, law, u, self.slot]
+        inputs = [X, self.patches, self.material, law, u, self.slot]
         outputs = [self.yielded, self.history, force]
         threads = self.patch_count * PATCH
         wp.launch(self.force_kernel, threads, inputs=inputs, outputs=outputs, block_dim=PATCH)
