@@ -2,7 +2,7 @@
 
 Runs the two-link impact with as many speeds of the plate as scenes, one after the other and then in batches of them,
 and prints the wall time of both. Models come from `--models DIR` as in `benchmarks.results` where gmsh is not. On a
-CPU, cores are busy with one scene already: what a batch saves there is little.
+CPU a batch saves nothing: one scene keeps the cores busy.
 """
 
 from __future__ import annotations
