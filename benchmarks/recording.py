@@ -40,7 +40,7 @@ def measure(args: argparse.Namespace) -> dict[str, object]:
         stored = scene_file.load(args.models / f"{args.preset}.mca")
         scene, meshes = stored.scene, stored.meshes
     else:
-        scene = mca.make_scene("two_link", args.preset)
+        scene = mca.make_scene("two_link", preset=args.preset)
         meshes = mca.mesh(scene)
     run(scene, meshes, args.device, [])  # warms the kernel cache
     table: dict[str, object] = {}

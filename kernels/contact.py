@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.projection import interpolate, project
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
@@ -54,7 +55,7 @@ def spring_function(friction: bool) -> Any:
             energy += wp.float64(0.5) * wp.dot(Ft, Ft) / k
             spring.tangential[s] = Ft
             spring.friction[s] = spring.friction[s] + work
-            if stick == 1:
+            if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
                 spring.stick_impulse[s] = spring.stick_impulse[s] + Fn
         spring.energy[s] = energy
         spring.force[s] = force
@@ -91,10 +92,14 @@ def master_velocity(
 
 
 @cache
-def surface_kernel(friction: bool) -> Any:
-    """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal."""
+def surface_kernel(friction: bool, each: bool) -> Any:
+    """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
+
+    With `each`, scenes of a batch have values of their own, and slaves know their scene.
+    """
     press = spring_function(friction)
     open_contact = open_function(friction)
+    of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
     def touch_surface(
@@ -107,17 +112,19 @@ def surface_kernel(friction: bool) -> Any:
         face: wp.array2d(dtype=wp.int32),
         count: wp.array(dtype=wp.int32),
         candidate: wp.array2d(dtype=wp.int32),
-        mu: wp.float64,
-        margin: wp.float64,
+        scene: Index,
+        mu: Real,
+        margin: Real,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
-        flag_out: wp.array(dtype=wp.int32),
+        flag_out: wp.array2d(dtype=wp.int32),
     ):
         s = wp.tid()
         i = slave[s]
-        if moved_too_far(u[i], u_search[i], margin):
-            flag_out[STALE] = 1
+        k = of(scene, s)
+        if moved_too_far(u[i], u_search[i], of(margin, k)):
+            flag_out[k, STALE] = 1
         best = int(-1)
         best_gap = wp.float64(0.0)
         best_size = wp.float64(0.0)
@@ -150,9 +157,9 @@ def surface_kernel(friction: bool) -> Any:
                         best_size = size
         if best >= 0:
             if best_gap < wp.float64(-0.5) * best_size:
-                flag_out[TOO_DEEP] = 1
+                flag_out[k, TOO_DEEP] = 1
             du = dt * (v[i] - master_velocity(v, face, best, best_weight))
-            force = press(s, best_gap, best_normal, du, stiffness[s], mu, spring)
+            force = press(s, best_gap, best_normal, du, stiffness[s], of(mu, k), spring)
             spring.face[s] = best
             spring.weight[s] = best_weight
             contact_force_out[i] = contact_force_out[i] + force
@@ -163,47 +170,59 @@ def surface_kernel(friction: bool) -> Any:
     return touch_surface
 
 
-@wp.kernel(enable_backward=False)
-def react(
-    u: wp.array(dtype=wp.vec3d),
-    u_search: wp.array(dtype=wp.vec3d),
-    master: wp.array(dtype=wp.int32),
-    face_offset: wp.array(dtype=wp.int32),
-    face_of_node: wp.array(dtype=wp.int32),
-    face: wp.array2d(dtype=wp.int32),
-    face_count: wp.array(dtype=wp.int32),
-    face_slave: wp.array2d(dtype=wp.int32),
-    margin: wp.float64,
-    spring: Spring,
-    contact_force_out: wp.array(dtype=wp.vec3d),
-    flag_out: wp.array(dtype=wp.int32),
-):
-    """Each master node gathers its share of the reactions on the faces around it, in a fixed order."""
-    m = wp.tid()
-    i = master[m]
-    if moved_too_far(u[i], u_search[i], margin):
-        flag_out[STALE] = 1
-    total = wp.vec3d()
-    touched = int(0)
-    for j in range(face_offset[m], face_offset[m + 1]):
-        f = face_of_node[j]
-        for q in range(wp.min(face_count[f], face_slave.shape[1])):
-            s = face_slave[f, q]
-            if spring.face[s] == f:
-                touched = int(1)
-                for c in range(4):
-                    if face[f, c] == i:
-                        w = spring.weight[s]
-                        total -= w[c] * spring.force[s]
-    if touched == 1:
-        contact_force_out[i] = contact_force_out[i] + total
+@cache
+def react_kernel(each: bool) -> Any:
+    """Kernel: each master node gathers its share of the reactions on the faces around it, in a fixed order."""
+    of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
+
+    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    def react(
+        u: wp.array(dtype=wp.vec3d),
+        u_search: wp.array(dtype=wp.vec3d),
+        master: wp.array(dtype=wp.int32),
+        face_offset: wp.array(dtype=wp.int32),
+        face_of_node: wp.array(dtype=wp.int32),
+        face: wp.array2d(dtype=wp.int32),
+        face_count: wp.array(dtype=wp.int32),
+        face_slave: wp.array2d(dtype=wp.int32),
+        scene: Index,
+        margin: Real,
+        spring: Spring,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        m = wp.tid()
+        i = master[m]
+        k = of(scene, m)
+        if moved_too_far(u[i], u_search[i], of(margin, k)):
+            flag_out[k, STALE] = 1
+        total = wp.vec3d()
+        touched = int(0)
+        for j in range(face_offset[m], face_offset[m + 1]):
+            f = face_of_node[j]
+            for q in range(wp.min(face_count[f], face_slave.shape[1])):
+                s = face_slave[f, q]
+                if spring.face[s] == f:
+                    touched = int(1)
+                    for c in range(4):
+                        if face[f, c] == i:
+                            w = spring.weight[s]
+                            total -= w[c] * spring.force[s]
+        if touched == 1:
+            contact_force_out[i] = contact_force_out[i] + total
+
+    return react
+
+
+react_kernel(False)  # belongs to this module, so it is made before that is loaded; a batch has one of its own
 
 
 @cache
-def plane_kernel(friction: bool) -> Any:
-    """Kernel: contact of slave nodes with an analytic plane that may move along itself."""
+def plane_kernel(friction: bool, each: bool) -> Any:
+    """Kernel: contact of slave nodes with an analytic plane that may move along itself; `each` as for surfaces."""
     press = spring_function(friction)
     open_contact = open_function(friction)
+    of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
     def touch_plane(
@@ -212,25 +231,29 @@ def plane_kernel(friction: bool) -> Any:
         v: wp.array(dtype=wp.vec3d),
         slave: wp.array(dtype=wp.int32),
         stiffness: wp.array(dtype=wp.float64),
-        point: wp.vec3d,
-        normal: wp.vec3d,
-        velocity: wp.vec3d,
-        mu: wp.float64,
-        deepest: wp.float64,
+        scene: Index,
+        plane_point: Vector,
+        plane_normal: Vector,
+        plane_velocity: Vector,
+        mu: Real,
+        deepest: Real,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
-        flag_out: wp.array(dtype=wp.int32),
+        flag_out: wp.array2d(dtype=wp.int32),
     ):
         s = wp.tid()
         i = slave[s]
-        gap = wp.dot(X[i] - point + u[i], normal)
+        k = of(scene, s)
+        normal = of(plane_normal, k)
+        velocity = of(plane_velocity, k)
+        gap = wp.dot(X[i] - of(plane_point, k) + u[i], normal)
         before = spring.tangential[s]
         du = dt * (v[i] - velocity)
-        if gap < -deepest:
-            flag_out[TOO_DEEP] = 1
+        if gap < -of(deepest, k):
+            flag_out[k, TOO_DEEP] = 1
         if gap < wp.float64(0.0):
-            force = press(s, gap, normal, du, stiffness[s], mu, spring)
+            force = press(s, gap, normal, du, stiffness[s], of(mu, k), spring)
             spring.face[s] = 0
             contact_force_out[i] = contact_force_out[i] + force
         elif spring.face[s] >= 0:
@@ -247,18 +270,22 @@ def sum_springs(
     row: wp.array(dtype=wp.int32),
     column: int,
     width: int,
+    first: wp.array(dtype=wp.int32),
     spring: Spring,
-    partial_out: wp.array3d(dtype=wp.float64),
+    partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves into eight columns, and a fresh start for what is summed over the record interval."""
-    k = wp.tid()
+    """Sums over the slaves of each scene, which begin at `first`, into eight columns.
+
+    What is summed over the record interval then starts afresh.
+    """
+    scene, k = wp.tid()
     energy = wp.float64(0.0)
     friction = wp.float64(0.0)
     drive = wp.float64(0.0)
     impulse = wp.vec3d()
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
-    for s in range(k, spring.energy.shape[0], width):
+    for s in range(first[scene] + k, first[scene + 1], width):
         energy += spring.energy[s]
         friction += spring.friction[s]
         drive += spring.drive[s]
@@ -269,11 +296,11 @@ def sum_springs(
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
     r = row[0]
-    partial_out[r, column, k] = energy
-    partial_out[r, column + 1, k] = friction
-    partial_out[r, column + 2, k] = drive
-    partial_out[r, column + 3, k] = impulse[0]
-    partial_out[r, column + 4, k] = impulse[1]
-    partial_out[r, column + 5, k] = impulse[2]
-    partial_out[r, column + 6, k] = normal
-    partial_out[r, column + 7, k] = stick
+    partial_out[r, scene, column, k] = energy
+    partial_out[r, scene, column + 1, k] = friction
+    partial_out[r, scene, column + 2, k] = drive
+    partial_out[r, scene, column + 3, k] = impulse[0]
+    partial_out[r, scene, column + 4, k] = impulse[1]
+    partial_out[r, scene, column + 5, k] = impulse[2]
+    partial_out[r, scene, column + 6, k] = normal
+    partial_out[r, scene, column + 7, k] = stick

@@ -1,4 +1,4 @@
-"""Owns the sums of the energy ledger: each thread adds every `width`-th entry, so that the order never changes."""
+"""Owns the sums of the energy ledger, of each scene apart: each thread adds every `width`-th entry, in fixed order."""
 
 from functools import cache
 from typing import Any
@@ -13,23 +13,27 @@ wp.set_module_options({"enable_backward": False})
 @wp.kernel(enable_backward=False)
 def sum_nodes(
     mass: wp.array(dtype=wp.float64),
-    gravity: wp.vec3d,
+    gravity: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     v_before: wp.array(dtype=wp.vec3d),
     v: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
     width: int,
-    wide_out: wp.array2d(dtype=wp.float64),
+    first: wp.array(dtype=wp.int32),
+    wide_out: wp.array3d(dtype=wp.float64),
 ):
-    """Kinetic energy v(n-1/2) . M v(n+1/2) / 2, which central differences keep exactly, and gravity's work at t(n)."""
-    k = wp.tid()
+    """Kinetic energy v(n-1/2) . M v(n+1/2) / 2, which central differences keep exactly, and gravity's work at t(n).
+
+    `first` is the first node of each scene.
+    """
+    scene, k = wp.tid()
     kinetic = wp.float64(0.0)
     work = wp.float64(0.0)
-    for i in range(k, mass.shape[0], width):
+    for i in range(first[scene] + k, first[scene + 1], width):
         kinetic += wp.float64(0.5) * mass[i] * wp.dot(v_before[i], v[i])
-        work += mass[i] * wp.dot(gravity, u[i] - dt * v[i])
-    wide_out[0, k] = kinetic
-    wide_out[1, k] = work
+        work += mass[i] * wp.dot(gravity[scene], u[i] - dt * v[i])
+    wide_out[scene, 0, k] = kinetic
+    wide_out[scene, 1, k] = work
 
 
 @wp.kernel(enable_backward=False)
@@ -38,67 +42,78 @@ def sum_scalars(
     row: wp.array(dtype=wp.int32),
     column: int,
     width: int,
-    partial_out: wp.array3d(dtype=wp.float64),
+    first: wp.array(dtype=wp.int32),
+    partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sum of one array."""
-    k = wp.tid()
+    """Sum of one array, whose entries of each scene begin at `first`."""
+    scene, k = wp.tid()
     total = wp.float64(0.0)
-    for i in range(k, value.shape[0], width):
+    for i in range(first[scene] + k, first[scene + 1], width):
         total += value[i]
-    partial_out[row[0], column, k] = total
+    partial_out[row[0], scene, column, k] = total
 
 
 @cache
 def sum_elements_kernel(precision: str) -> Any:
-    """Kernel: sums of elastic, plastic and hourglass energy; extremes of strain and Jacobian ratio."""
+    """Kernel: sums of elastic, plastic and hourglass energy; extremes of strain and Jacobian ratio.
+
+    `ranges` are first and end of the elements of each scene in each block. The order is that of the scene alone.
+    """
     R = scalars(precision).real
 
     @wp.kernel(enable_backward=False, module="unique")
     def sum_elements(
         energy: wp.array2d(dtype=R),
         width: int,
-        wide_out: wp.array2d(dtype=wp.float64),
+        ranges: wp.array3d(dtype=wp.int32),
+        wide_out: wp.array3d(dtype=wp.float64),
     ):
-        k = wp.tid()
+        scene, k = wp.tid()
         elastic = wp.float64(0.0)
         plastic = wp.float64(0.0)
         hourglass = wp.float64(0.0)
         largest = wp.float64(0.0)
         smallest = wp.float64(1.0)
-        for e in range(k, energy.shape[1], width):
-            elastic += wp.float64(energy[0, e])
-            plastic += wp.float64(energy[1, e])
-            hourglass += wp.float64(energy[4, e])
-            largest = wp.max(largest, wp.float64(energy[2, e]))
-            smallest = wp.min(smallest, wp.float64(energy[3, e]))
-        wide_out[2, k] = elastic
-        wide_out[3, k] = plastic
-        wide_out[4, k] = largest
-        wide_out[5, k] = smallest
-        wide_out[6, k] = hourglass
+        start = int(k)  # of this thread's entries in a block
+        for b in range(ranges.shape[1]):
+            end = ranges[scene, b, 1]
+            for e in range(ranges[scene, b, 0] + start, end, width):
+                elastic += wp.float64(energy[0, e])
+                plastic += wp.float64(energy[1, e])
+                hourglass += wp.float64(energy[4, e])
+                largest = wp.max(largest, wp.float64(energy[2, e]))
+                smallest = wp.min(smallest, wp.float64(energy[3, e]))
+            start -= (end - ranges[scene, b, 0]) % width
+            if start < 0:
+                start += width
+        wide_out[scene, 2, k] = elastic
+        wide_out[scene, 3, k] = plastic
+        wide_out[scene, 4, k] = largest
+        wide_out[scene, 5, k] = smallest
+        wide_out[scene, 6, k] = hourglass
 
     return sum_elements
 
 
 @wp.kernel(enable_backward=False)
 def fold(
-    wide: wp.array2d(dtype=wp.float64),
+    wide: wp.array3d(dtype=wp.float64),
     row: wp.array(dtype=wp.int32),
     width: int,
-    partial_out: wp.array3d(dtype=wp.float64),
+    partial_out: wp.array4d(dtype=wp.float64),
 ):
     """Fold the sums and extremes of many threads into those of `width`: the first columns of a record."""
-    k = wp.tid()
-    for column in range(wide.shape[0]):
-        value = wide[column, k]
-        for j in range(k + width, wide.shape[1], width):
+    scene, k = wp.tid()
+    for column in range(wide.shape[1]):
+        value = wide[scene, column, k]
+        for j in range(k + width, wide.shape[2], width):
             if column == 4:
-                value = wp.max(value, wide[column, j])
+                value = wp.max(value, wide[scene, column, j])
             elif column == 5:
-                value = wp.min(value, wide[column, j])
+                value = wp.min(value, wide[scene, column, j])
             else:
-                value += wide[column, j]
-        partial_out[row[0], column, k] = value
+                value += wide[scene, column, j]
+        partial_out[row[0], scene, column, k] = value
 
 
 @wp.kernel(enable_backward=False)

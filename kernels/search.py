@@ -1,6 +1,11 @@
 """Owns the broad phase of contact: which master faces each slave node may touch before the next search."""
 
+from functools import cache
+from typing import Any
+
 import warp as wp
+
+from warp_mca.kernels.each import kind, value_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -8,72 +13,101 @@ wp.set_module_options({"enable_backward": False})
 OVERFLOW, STALE, TOO_DEEP = 0, 1, 2
 
 
-@wp.kernel(enable_backward=False)
-def face_bounds(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    origin: wp.vec3d,
-    margin: wp.float64,
-    lower_out: wp.array(dtype=wp.vec3f),
-    upper_out: wp.array(dtype=wp.vec3f),
-    face_count_out: wp.array(dtype=wp.int32),
-):
-    """Box of each face, deepened inwards by the face's size and widened by the margin; relative to `origin`,
+@cache
+def bounds_kernel(each: bool) -> Any:
+    """Kernel: box of each face, deepened inwards by the face's size and widened by the margin; relative to `origin`,
     so that float32 bounds stay fine. Clears the counts of the lists that `find_candidates` fills."""
-    f = wp.tid()
-    a = X[face[f, 0]] + u[face[f, 0]] - origin
-    b = X[face[f, 1]] + u[face[f, 1]] - origin
-    c = X[face[f, 2]] + u[face[f, 2]] - origin
-    d = X[face[f, 3]] + u[face[f, 3]] - origin
-    normal = wp.float64(0.5) * wp.cross(c - a, d - b)  # its length is the area
-    area = wp.length(normal)
-    inward = (-wp.sqrt(area) / area) * normal
-    lower = wp.min(wp.min(a, b), wp.min(c, d))
-    upper = wp.max(wp.max(a, b), wp.max(c, d))
-    reach = wp.vec3d(margin, margin, margin)
-    lower = wp.min(lower, lower + inward) - reach
-    upper = wp.max(upper, upper + inward) + reach
-    lower_out[f] = wp.vec3f(wp.float32(lower[0]), wp.float32(lower[1]), wp.float32(lower[2]))
-    upper_out[f] = wp.vec3f(wp.float32(upper[0]), wp.float32(upper[1]), wp.float32(upper[2]))
-    face_count_out[f] = 0
+    of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
+
+    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    def face_bounds(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        face: wp.array2d(dtype=wp.int32),
+        scene: Index,
+        scene_origin: Vector,
+        scene_margin: Real,
+        lower_out: wp.array(dtype=wp.vec3f),
+        upper_out: wp.array(dtype=wp.vec3f),
+        face_count_out: wp.array(dtype=wp.int32),
+    ):
+        f = wp.tid()
+        k = of(scene, f)
+        origin = of(scene_origin, k)
+        margin = of(scene_margin, k)
+        a = X[face[f, 0]] + u[face[f, 0]] - origin
+        b = X[face[f, 1]] + u[face[f, 1]] - origin
+        c = X[face[f, 2]] + u[face[f, 2]] - origin
+        d = X[face[f, 3]] + u[face[f, 3]] - origin
+        normal = wp.float64(0.5) * wp.cross(c - a, d - b)  # its length is the area
+        area = wp.length(normal)
+        inward = (-wp.sqrt(area) / area) * normal
+        lower = wp.min(wp.min(a, b), wp.min(c, d))
+        upper = wp.max(wp.max(a, b), wp.max(c, d))
+        reach = wp.vec3d(margin, margin, margin)
+        lower = wp.min(lower, lower + inward) - reach
+        upper = wp.max(upper, upper + inward) + reach
+        lower_out[f] = wp.vec3f(wp.float32(lower[0]), wp.float32(lower[1]), wp.float32(lower[2]))
+        upper_out[f] = wp.vec3f(wp.float32(upper[0]), wp.float32(upper[1]), wp.float32(upper[2]))
+        face_count_out[f] = 0
+
+    return face_bounds
 
 
-@wp.kernel(enable_backward=False)
-def find_candidates(
-    bvh: wp.uint64,
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    slave: wp.array(dtype=wp.int32),
-    origin: wp.vec3d,
-    count_out: wp.array(dtype=wp.int32),
-    candidate_out: wp.array2d(dtype=wp.int32),
-    face_count_out: wp.array(dtype=wp.int32),
-    face_slave_out: wp.array2d(dtype=wp.int32),
-    u_search_out: wp.array(dtype=wp.vec3d),
-    flag_out: wp.array(dtype=wp.int32),
-):
-    """List the faces near each slave node, and the slaves near each face; a full list raises the overflow flag."""
-    s = wp.tid()
-    i = slave[s]
-    u_search_out[i] = u[i]
-    x = X[i] + u[i] - origin
-    point = wp.vec3f(wp.float32(x[0]), wp.float32(x[1]), wp.float32(x[2]))
-    query = wp.bvh_query_aabb(bvh, point, point)
-    f = int(0)
-    found = int(0)
-    while wp.bvh_query_next(query, f):
-        if found < candidate_out.shape[1]:
-            candidate_out[s, found] = f
-            place = wp.atomic_add(face_count_out, f, 1)
-            if place < face_slave_out.shape[1]:
-                face_slave_out[f, place] = s
+@cache
+def candidates_kernel(each: bool) -> Any:
+    """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
+
+    With `each`, faces are grouped by scene, and a slave looks among those of its own.
+    """
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+
+    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    def find_candidates(
+        bvh: wp.uint64,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        slave: wp.array(dtype=wp.int32),
+        scene: Index,
+        origin: Vector,
+        count_out: wp.array(dtype=wp.int32),
+        candidate_out: wp.array2d(dtype=wp.int32),
+        face_count_out: wp.array(dtype=wp.int32),
+        face_slave_out: wp.array2d(dtype=wp.int32),
+        u_search_out: wp.array(dtype=wp.vec3d),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        s = wp.tid()
+        i = slave[s]
+        u_search_out[i] = u[i]
+        k = of(scene, s)
+        x = X[i] + u[i] - of(origin, k)
+        point = wp.vec3f(wp.float32(x[0]), wp.float32(x[1]), wp.float32(x[2]))
+        root = int(-1)  # of all faces
+        if wp.static(each):
+            root = wp.bvh_get_group_root(bvh, k)
+        query = wp.bvh_query_aabb(bvh, point, point, root)
+        f = int(0)
+        found = int(0)
+        while wp.bvh_query_next(query, f):
+            if found < candidate_out.shape[1]:
+                candidate_out[s, found] = f
+                place = wp.atomic_add(face_count_out, f, 1)
+                if place < face_slave_out.shape[1]:
+                    face_slave_out[f, place] = s
+                else:
+                    flag_out[k, OVERFLOW] = 1
             else:
-                flag_out[OVERFLOW] = 1
-        else:
-            flag_out[OVERFLOW] = 1
-        found += 1
-    count_out[s] = wp.min(found, candidate_out.shape[1])
+                flag_out[k, OVERFLOW] = 1
+            found += 1
+        count_out[s] = wp.min(found, candidate_out.shape[1])
+
+    return find_candidates
+
+
+# Those of a lone scene belong to this module, so they are made before it is loaded; a batch has its own modules.
+bounds_kernel(False)
+candidates_kernel(False)
 
 
 @wp.kernel(enable_backward=False)

@@ -101,7 +101,7 @@ def two_boxes(**contact):
 def test_collision_keeps_momentum_and_impulse_is_its_change(two_way, monkeypatch):
     final = {}
 
-    def keep(self):
+    def keep(self, scene):
         final["v"], final["mass"] = self.v.numpy(), self.model.mass
         return 0.0
 
@@ -212,7 +212,8 @@ def test_force_is_smooth_where_a_node_slides_from_face_to_face(mu):
 
 def test_without_friction_nothing_tangential_is_left(monkeypatch):
     asked, kernel = [], solver.contact.plane_kernel
-    monkeypatch.setattr(solver.contact, "plane_kernel", lambda friction: (asked.append(friction), kernel(friction))[1])
+    note = lambda friction, each: (asked.append(friction), kernel(friction, each))[1]  # noqa: E731
+    monkeypatch.setattr(solver.contact, "plane_kernel", note)
     result = mca.run(sliding_block(0.0, duration=1e-3))
     assert np.abs(result.F_t).max() == 0.0
     assert result["E_friction"].max() == 0.0
@@ -223,7 +224,7 @@ def test_without_friction_nothing_tangential_is_left(monkeypatch):
 def test_springs_are_empty_after_a_bounce(monkeypatch):
     """What they held is paid back or dissipated; nothing waits for the next touch."""
     last = {}
-    monkeypatch.setattr(solver.Solver, "max_plastic_strain", lambda self: last.update(solver=self) or 0.0)
+    monkeypatch.setattr(solver.Solver, "max_plastic_strain", lambda self, scene: last.update(solver=self) or 0.0)
     result = mca.run(sliding_block(0.4, velocity=(1.0, 5.0, 0.0), duration=1e-3))
     (stage,) = last["solver"].contacts
     assert (stage.spring.face.numpy() == -1).all()
@@ -242,7 +243,7 @@ def test_lists_of_slaves_are_sorted():
 
 
 def test_full_candidate_list_stops_the_run(monkeypatch):
-    monkeypatch.setattr(solver, "LIST_LENGTH", 1)
+    monkeypatch.setattr("warp_mca.contact_stage.LIST_LENGTH", 1)
     with pytest.raises(mca.GuardError, match="contact lists overflowed"):
         mca.run(two_boxes())
 

@@ -1,5 +1,7 @@
 """What only a CUDA device can show: the same figures as on the CPU, bit for bit from run to run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -92,3 +94,17 @@ def test_elements_that_yield_are_listed_once_and_give_the_same_forces():
     assert host.summary["max_plastic_strain"] > 1e-4
     assert device.summary["max_plastic_strain"] == pytest.approx(host.summary["max_plastic_strain"], rel=1e-6)
     np.testing.assert_allclose(device["E_plastic"], host["E_plastic"], rtol=1e-6, atol=1e-12)
+
+
+def test_scenes_of_a_batch_give_the_bits_that_they_give_alone():
+    """All have the same step; a scene that breaks changes nothing for the others."""
+    scenes = [oblique(mu) for mu in (0.4, 0.0, 0.1)]
+    tight = replace(scenes[0], impact=replace(scenes[0].impact, energy_tolerance=1e-12))
+    results = mca.run_batch([*scenes, tight], device="cuda:0")
+    assert results[-1].stopped
+    for scene, result in zip(scenes, results, strict=False):
+        one = mca.run(scene, device="cuda:0")
+        assert one.summary["dt"] == result.summary["dt"]
+        assert all(np.array_equal(one[name], result[name], equal_nan=True) for name in one.history)
+        assert one.summary["max_plastic_strain"] == result.summary["max_plastic_strain"]
+    assert len({float(result.F_t.max()) for result in results[:3]}) == 3

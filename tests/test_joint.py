@@ -19,7 +19,7 @@ def final_state(monkeypatch):
     """Displacements and velocities at the end of the next run."""
     state = {}
 
-    def keep(self):
+    def keep(self, scene):
         state.update(u=self.u.numpy().copy(), v=self.v.numpy().copy(), model=self.model)
         return 0.0
 

@@ -29,6 +29,7 @@ from warp_mca.scene import (
 )
 
 if TYPE_CHECKING:
+    from warp_mca.batch import run_batch
     from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
     from warp_mca.registry import Param, make_scene
     from warp_mca.report.quality import quality_table
@@ -51,6 +52,7 @@ _LAZY = {
     "quality_table": "warp_mca.report.quality",
     "mesh": "warp_mca.simulation",
     "run": "warp_mca.simulation",
+    "run_batch": "warp_mca.batch",
 }
 
 __all__ = [
@@ -81,6 +83,7 @@ __all__ = [
     "mesh",
     "quality_table",
     "run",
+    "run_batch",
     "load",
     "Result",
     "McaError",

@@ -33,6 +33,7 @@ class Block:
         conn: nodes of each element, shape (corners, element_count), int32.
         material: row of `Model.law`, shape (element_count,), int32.
         first: index of the first element in the model.
+        ends: where the elements of each scene of a batch end in the block; empty for one scene.
     """
 
     element: str
@@ -41,6 +42,7 @@ class Block:
     conn: Index
     material: Index
     first: int
+    ends: tuple[int, ...] = ()
 
 
 def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:

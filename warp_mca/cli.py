@@ -9,7 +9,7 @@ import argparse
 import dataclasses
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 import warp_mca as mca
 from warp_mca import registry
 from warp_mca.elements import ELEMENTS
-from warp_mca.errors import McaError, bad_value
+from warp_mca.errors import GuardError, McaError, bad_value
 from warp_mca.scene import Scene
 from warp_mca.scene_file import SUFFIX, Origin
 
@@ -98,6 +98,14 @@ def _parser() -> argparse.ArgumentParser:
     _add_device(run)
     run.add_argument("--threads", type=int, metavar="N", help="of a run on the CPU (default: all cores)")
     run.add_argument("--duration", type=float, metavar="SECONDS", help="of the impact phase (default: the scene's)")
+    run.add_argument(
+        "--sweep",
+        dest="sweeps",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE,…",
+        help="run a scene for each value, all at once, to folders 0, 1, … in DIR; several times: all combinations",
+    )
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     run.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(run)
@@ -180,11 +188,11 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     return found + [SnapshotFile(out / f"snapshot-{1e6 * t:g}us.png", time=t) for t in args.snapshots]
 
 
-def _request(args: argparse.Namespace) -> Request:
-    """Build the scene that the arguments ask for."""
+def _request(args: argparse.Namespace, more: Mapping[str, str] | None = None) -> Request:
+    """Build the scene that the arguments ask for, with `more` parameters changed."""
     from warp_mca import scene_file
 
-    overrides = registry.parse_overrides(args.settings)
+    overrides = registry.parse_overrides(args.settings) | dict(more or {})
     if Path(args.scene).suffix != SUFFIX:
         source = registry.load_source(args.scene)
         values = source.resolve(args.preset, overrides)
@@ -210,6 +218,9 @@ def _run(args: argparse.Namespace) -> None:
     from warp_mca.report.console import print_summary, progress_bar
     from warp_mca.results import FILES, PATH_FILES
 
+    if args.sweeps:
+        _sweep(args)
+        return
     request = _request(args)
     out = args.out or Path(request.label)
     recorders = _recorders(args, out)
@@ -234,6 +245,35 @@ def _run(args: argparse.Namespace) -> None:
     if request.source and request.source.check and as_designed:
         for message in request.source.check(result):
             print(f"check: {message}")
+
+
+def _sweep(args: argparse.Namespace) -> None:
+    from warp_mca.report.console import progress_bar
+    from warp_mca.sweep import parse_sweep, print_sweep
+
+    settings = parse_sweep(args.sweeps)
+    requests = [_request(args, more) for more in settings]
+    out = args.out or Path(f"{requests[0].label}-sweep")
+    if _recorders(args, out):
+        raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
+    meshes = requests[0].meshes
+    _start_warp()
+    with progress_bar() as progress:
+        results = mca.run_batch(
+            [request.scene for request in requests],
+            device=args.device,
+            precision=args.precision,
+            threads=args.threads,
+            duration=args.duration,
+            out=out,
+            force=args.force,
+            meshes=[meshes] * len(requests) if meshes else None,
+            progress=progress,
+        )
+    print_sweep(settings, results)
+    stopped = sum(result.stopped is not None for result in results)
+    if stopped:
+        raise GuardError(f"guards stopped {stopped} of {len(results)} scenes")
 
 
 def _start_warp() -> None:

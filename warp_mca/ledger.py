@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Columns of a record, then eight for each contact pass (`kernels.contact.sum_springs`).
+KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
+PASS_COLUMNS = 8
+
 _FLAGS = (
     "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike",
     "a node outran the contact search; choose a smaller output_interval",
@@ -41,8 +45,13 @@ class Ledger:
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
 
+    @property
+    def _width(self) -> int:
+        """Columns of a record."""
+        return PASS + PASS_COLUMNS * len(self.model.passes)
+
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
-        """Take in the first `written` of the device's `records`, see `Solver.records`, and hold them to the guards.
+        """Take in the first `written` of a scene's `records`, see `Layout.records`, and hold them to the guards.
 
         Raises:
             GuardError: a record breaks a guard.
@@ -50,60 +59,71 @@ class Ledger:
         for raised, message in zip(records["flag"], _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
                 raise GuardError(f"stopped before t = {(self.count + written) * self.interval:.4g} s: {message}")
-        for row in range(written):
-            self._add(records["partial"][row], records["point_velocity"][row].copy())
-
-    def _add(self, partial: Array, velocity: Array) -> None:
-        from warp_mca.solver import JACOBIAN, STRAIN
-
-        sums = partial.sum(axis=1)
-        sums[STRAIN], sums[JACOBIAN] = partial[STRAIN].max(), partial[JACOBIAN].min()
+        sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
+        sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
+        good = written if sound.all() else int(np.argmin(sound))
+        share = self._balance(sums[:good])
+        over = share > self.tolerance
+        end = int(np.argmax(over)) + 1 if over.any() else good
+        self.columns.extend(sums[:end])
+        self.velocities.extend(velocity[:end].copy())
+        self.count += end
+        self.max_strain = max(self.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
+        self.energy_error = max(self.energy_error, float(share[:end].max(initial=0.0)))
         t = self.count * self.interval
-        if not np.isfinite(sums).all():
+        if over.any():
+            raise GuardError(
+                f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
+                f"{self.tolerance:g}: lower time_step_scale or a contact's penalty, or raise the tolerance if that "
+                "much is acceptable"
+            )
+        if good < written and not np.isfinite(sums[good]).all():
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
-        if sums[JACOBIAN] <= 0.0:
+        if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
-        self.columns.append(sums)
-        self.velocities.append(velocity)
-        self.count += 1
-        self.max_strain = max(self.max_strain, float(sums[STRAIN]))
-        self._balance(sums, t)
 
-    def _energies(self, sums: Array) -> dict[str, float]:
-        from warp_mca.solver import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, KINETIC, PASS, PASS_COLUMNS, PLASTIC
+    def _sums(self, partial: Array) -> Array:
+        """Columns of each record from its partial sums, shape (row_count, column_count)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is found out
+            sums = partial.sum(axis=2)
+        sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
+        return sums
 
-        springs = sums[PASS:].reshape(-1, PASS_COLUMNS)
+    def _energies(self, sums: Array) -> dict[str, Array]:
+        """The ledger [J] of a row of sums, or of each row."""
+        springs = sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
         return {
-            "kinetic": float(sums[KINETIC]),
-            "elastic": float(sums[ELASTIC]),
-            "plastic": float(sums[PLASTIC]),
-            "hourglass": float(sums[HOURGLASS]),
-            "contact": float(springs[:, 0].sum()),
-            "friction": float(springs[:, 1].sum()),
-            "damping": 0.0,
-            "joint": 0.0,
-            "external_work": float(sums[GRAVITY_WORK] + sums[DRIVE_WORK] + springs[:, 2].sum()) - self.initial_work,
+            "kinetic": sums[..., KINETIC],
+            "elastic": sums[..., ELASTIC],
+            "plastic": sums[..., PLASTIC],
+            "hourglass": sums[..., HOURGLASS],
+            "contact": springs[..., 0].sum(axis=-1),
+            "friction": springs[..., 1].sum(axis=-1),
+            "damping": np.zeros(sums.shape[:-1]),
+            "joint": np.zeros(sums.shape[:-1]),
+            "external_work": work - self.initial_work,
         }
 
-    def _balance(self, sums: Array, t: float) -> None:
+    def _balance(self, sums: Array) -> Array:
+        """Imbalance of each row of sums, as a share of initial energy and external work [-]."""
         energy = self._energies(sums)
         work = energy.pop("external_work")
-        if self.initial_energy is None:
-            self.initial_energy, self.initial_work = sum(energy.values()), work
-            work = 0.0
-        error = sum(energy.values()) - work - self.initial_energy
-        self.energy_scale = max(self.energy_scale, abs(self.initial_energy) + abs(work))
-        share = abs(error) / self.energy_scale if self.energy_scale > 0.0 else 0.0
-        self.energy_error = max(self.energy_error, share)
-        if share > self.tolerance:
-            raise GuardError(
-                f"energy imbalance {share:.2%} at t = {t:.4g} s exceeds energy_tolerance = {self.tolerance:g}: "
-                "lower time_step_scale or a contact's penalty, or raise the tolerance if that much is acceptable"
-            )
+        stored = sum(energy.values(), np.zeros(len(sums)))
+        if self.initial_energy is None and len(sums):
+            self.initial_energy, self.initial_work = float(stored[0]), float(work[0])
+            work = work - self.initial_work
+        initial = self.initial_energy or 0.0
+        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.energy_scale))
+        self.energy_scale = float(scale.max(initial=self.energy_scale))
+        share: Array = np.zeros(len(sums))
+        np.divide(np.abs(stored - work - initial), scale, out=share, where=scale > 0.0)
+        return share
 
     def energy(self) -> dict[str, float]:
-        """The ledger at the end [J]."""
-        last = self._energies(self.columns[-1])
+        """The ledger at the end [J]; not numbers where no record was taken in."""
+        sums = self.columns[-1] if self.columns else np.full(self._width, np.nan)
+        last = {key: float(value) for key, value in self._energies(sums).items()}
         error = sum(value for key, value in last.items() if key != "external_work")
         initial = self.initial_energy or 0.0
         return {"initial": initial, **last, "error": error - last["external_work"] - initial}
@@ -113,12 +133,9 @@ class Ledger:
 
         Forces are means over the interval before.
         """
-        from warp_mca.solver import PASS, PASS_COLUMNS
-
-        table = np.array(self.columns[first:])
-        energies = [self._energies(row) for row in table]
-        energy = {key: np.array([item[key] for item in energies]) for key in energies[0]}
-        springs = table[:, PASS:].reshape(len(table), -1, PASS_COLUMNS)
+        table = np.array(self.columns[first:]).reshape(-1, self._width)
+        energy = self._energies(table)
+        springs = table[:, PASS:].reshape(len(table), len(self.model.passes), PASS_COLUMNS)
         share = self.dt / self.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
@@ -129,7 +146,7 @@ class Ledger:
         pressed, stuck = springs[:, :, 6].sum(axis=1), springs[:, :, 7].sum(axis=1)
         stick: Array = np.zeros(len(table))
         np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
-        velocity = np.array(self.velocities[first:])
+        velocity = np.array(self.velocities[first:]).reshape(-1, 2, 3)
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
             velocity[:, 1] = self.model.passes[0].plane.velocity

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.bindings import Hinge, check_bindings, constraints, join_bodies
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.layout import Layout
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.surfaces import ContactPass, contact_eigenvalues, contact_passes, face_geometry
 from warp_mca.timestep import StableStep
@@ -37,13 +38,15 @@ class Model:
         table_time, table_value: [s] and [m/s], float64.
         joint_first, joint_second: tied nodes, shape (pair_count,), int32; GROUND has no second node.
         hinges: the joints that own the pairs.
-        passes: contact passes.
+        passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent of each contact [-], shape (contact_count, 2, 3), float64.
-        gravity: [m/s^2], shape (3,), float64.
-        points: nodes whose velocity is recorded (tip, target), shape (2,), int32; GROUND where there is none.
+        gravity: of each scene [m/s^2], shape (scene_count, 3), float64.
+        points: nodes whose velocity is recorded (tip, target; those of each scene in turn), shape (2 scene_count,),
+            int32; GROUND where there is none.
         node_start, element_start: first node and element of each body in the concatenated meshes, by name.
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
+        batch: where the scenes of a batch lie, or None for a model of one scene.
     """
 
     X: Array
@@ -69,6 +72,7 @@ class Model:
     element_start: Mapping[str, int]
     element_of: Index
     stable: StableStep
+    batch: Layout | None = None
 
     @property
     def node_count(self) -> int:
@@ -135,10 +139,11 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         hinges=hinges,
         passes=passes,
         contact_axes=axes,
-        gravity=np.asarray(scene.gravity, dtype=np.float64),
+        gravity=np.array([scene.gravity], dtype=np.float64),
         points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target)], dtype=np.int32),
         node_start=parts.node_start,
         element_start=parts.element_start,
         element_of=order,
         stable=stable,
+        batch=None,
     )

@@ -78,7 +78,7 @@ class Output:
             if SURFACE in needs:
                 self._make_skin(np.concatenate([skin.nodes for skin in skins.values()]))
             if CONTACT in needs:
-                count = sum(len(stage.item.slave) for stage in solver.contacts)
+                count = sum(len(stage.slave) for stage in solver.contacts)
                 self.arrays[CONTACT] = {
                     "points": wp.zeros(count, dtype=wp.vec3f),
                     "state": wp.zeros(count, dtype=wp.int32),
@@ -136,7 +136,7 @@ class Output:
         if CONTACT in needs:
             first = 0
             for stage in s.contacts:
-                inputs = [s.X, s.u, stage.slave, stage.item.mu, first, stage.spring]
+                inputs = [s.X, s.u, stage.slave, stage.mu, first, stage.spring]
                 outputs = list(self.arrays[CONTACT].values())
                 wp.launch(output.contact_points, len(stage.slave), inputs=inputs, outputs=outputs)
                 first += len(stage.slave)

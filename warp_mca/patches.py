@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,17 +82,19 @@ def _slots(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]
     return rank % SUMMED, head, np.cumsum(head) - 1
 
 
-def make_patches(conn: Index) -> Patches:
+def make_patches(conn: Index, ends: Sequence[int] = ()) -> Patches:
     """Patches of elements that stand in a compact order; those with too many nodes are halved.
 
     A node has a slot in each patch around it, and one more for every SUMMED corners that meet there.
 
     Args:
         conn: nodes of each element, shape (corners, element_count), int32.
+        ends: where the elements of each scene of a batch end; each has patches of its own, as if it were alone.
     """
     corners, count = conn.shape
+    ends = sorted({0, *ends, count})
     span = int(conn.max()) + 1
-    start = np.append(np.arange(0, count, PATCH), count)
+    start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
     while True:
         patch = np.repeat(np.arange(len(start) - 1), np.diff(start))
         key = (patch * span + conn).ravel()

@@ -15,7 +15,7 @@ from warp_mca.elements.hexahedron import shape_functions
 from warp_mca.elements.tet4 import gradients
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.scene import Path, Scene
+from warp_mca.scene import Line, Path, Scene
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
@@ -63,20 +63,32 @@ class PathHistory:
         return np.sqrt(direct + 3.0 * (xy**2 + yz**2 + xz**2))
 
 
-def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
+Place = tuple[NDArray[np.int32], Array]  # corners of the cells around the probes of a line, and their weights
+Found = dict[tuple[int, Line, float], Place]  # by mesh, line and spacing
+
+
+def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found | None = None) -> Probes:
     """Find the elements that the scene's paths run through.
+
+    Args:
+        scene, model, meshes: of one run.
+        found: places found before, for scenes that share meshes; those found here are added.
 
     Raises:
         RequestError: a probe lies outside its body.
     """
     position: dict[str, Array] = {}
     corner, weight = [np.zeros((0, 8), np.int32)], [np.zeros((0, 8))]
+    found = {} if found is None else found
     for path in scene.paths:
         along = []
         for line in path.lines:
             share = np.linspace(0.0, 1.0, int(np.ceil(line.length / path.spacing - 1e-9)) + 1)
-            at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
-            nodes, weights = _elements_around(at, meshes[line.body], path)
+            key = (id(meshes[line.body]), line, path.spacing)
+            if key not in found:
+                at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
+                found[key] = _elements_around(at, meshes[line.body], path)
+            nodes, weights = found[key]
             along.append(line.position + share * line.length)
             corner.append((nodes + model.node_start[line.body]).astype(np.int32))
             weight.append(weights)
@@ -84,7 +96,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
     return Probes(position, np.concatenate(corner), np.concatenate(weight))
 
 
-def _elements_around(at: Array, mesh: Mesh, path: Path) -> tuple[NDArray[np.int32], Array]:
+def _elements_around(at: Array, mesh: Mesh, path: Path) -> Place:
     """Corners of the cell around each point, shape (point_count, 8), and their weights there.
 
     Raises:

@@ -49,6 +49,7 @@ class Result:
         path: folder that it was saved in or loaded from, or None.
         warnings: what the run noticed without stopping, one sentence each.
         paths: stress along the scene's paths, with one row for each row of the history.
+        stopped: which guard stopped this scene of a batch, in one sentence; None if none did. Rows end before it.
     """
 
     summary: dict[str, Any]
@@ -56,6 +57,7 @@ class Result:
     path: Path | None = None
     warnings: tuple[str, ...] = ()
     paths: tuple[PathHistory, ...] = ()
+    stopped: str | None = None
 
     @property
     def time(self) -> Array:

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.account import Account, Prepared
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.handoff import HandOff, hand_off
-from warp_mca.ledger import Ledger
-from warp_mca.model import Model, body_materials, build_model, nodal_masses
-from warp_mca.paths import locate, path_histories
+from warp_mca.handoff import hand_off
+from warp_mca.model import Model, build_model, nodal_masses
+from warp_mca.paths import Found, locate
 from warp_mca.recorders.recorder import Recorder, RunInfo
-from warp_mca.results import Result, RunFacts, check_output, save, summarise
+from warp_mca.results import Result, check_output, save
 from warp_mca.scene import Scene
 
 if TYPE_CHECKING:
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+Read = Callable[[int, Mapping[str, NDArray]], None]
 
 # Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
-COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,12 @@ class Steps:
         return self.per_interval * self.intervals
 
 
-def mesh(scene: Scene) -> dict[str, Mesh]:
+def mesh(scene: Scene, made: dict[object, Mesh] | None = None) -> dict[str, Mesh]:
     """The mesh of every body, checked.
+
+    Args:
+        scene: whose bodies to mesh.
+        made: meshes by recipe, for scenes that share some; those made here are added.
 
     Raises:
         RequestError: an element is inverted, or a recipe or file cannot be turned into a mesh.
@@ -77,11 +81,12 @@ def mesh(scene: Scene) -> dict[str, Mesh]:
     from warp_mca.geometry.quality import check
 
     meshes = {}
-    made: dict[int, Mesh] = {}
+    made = {} if made is None else made
     for body in scene.bodies:
-        key = id(body.geometry)
+        geometry = body.geometry
+        key = _key(geometry)
         if key not in made:
-            made[key] = body.geometry if isinstance(body.geometry, Mesh) else body.geometry.build()
+            made[key] = geometry if isinstance(geometry, Mesh) else geometry.build()
             check(made[key], body.name)
         meshes[body.name] = made[key]
     cut = _cut(scene, meshes)
@@ -89,6 +94,15 @@ def mesh(scene: Scene) -> dict[str, Mesh]:
         if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
             check(item, name)
     return cut
+
+
+def _key(geometry: object) -> object:
+    """What equal recipes share; a mesh, and a recipe that cannot be hashed, is like itself alone."""
+    try:
+        hash(geometry)
+    except TypeError:
+        return id(geometry)
+    return geometry
 
 
 def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
@@ -103,10 +117,26 @@ def divide(scene: Scene, model: Model, duration: float) -> Steps:
     Raises:
         RequestError: motion in one step would be lost in the rounding of positions.
     """
-    impact = scene.impact
-    intervals = max(1, round(duration / impact.output_interval))
+    return divide_alike([(scene, model)], duration)
+
+
+def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps:
+    """The steps of scenes that share them, as `divide` chooses them: the smallest of their steps, the most searches.
+
+    Raises:
+        RequestError: as in `divide`.
+    """
+    intervals = max(1, round(duration / parts[0][0].impact.output_interval))
     interval = duration / intervals
-    stable = impact.time_step_scale * model.stable.dt
+    limits = [_limits(scene, model, interval) for scene, model in parts]
+    stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
+    per_search = math.ceil(interval / searches / stable)
+    return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
+
+
+def _limits(scene: Scene, model: Model, interval: float) -> tuple[float, int]:
+    """Longest step [s] of a scene, and how often it must search for contact in an output interval [s]."""
+    stable = scene.impact.time_step_scale * model.stable.dt
     speed = float(np.linalg.norm(model.V, axis=1).max())
     spacing = float(np.spacing(np.abs(model.X).max()))
     if 0.0 < speed * stable < 4.0 * spacing:
@@ -118,14 +148,12 @@ def divide(scene: Scene, model: Model, duration: float) -> Steps:
         )
     margins = [item.margin for item in model.passes if item.plane is None]
     searches = math.ceil(SPEED_RESERVE * speed * interval / (0.5 * min(margins))) if margins else 1
-    searches = max(1, searches)
-    per_search = math.ceil(interval / searches / stable)
-    return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
+    return stable, max(1, searches)
 
 
 @dataclass
-class _Clock:
-    """Wall-clock seconds by stage."""
+class Clock:
+    """Wall-clock seconds by stage, `wall`, and when the `last` one ended."""
 
     wall: dict[str, float] = field(
         default_factory=lambda: dict.fromkeys(("rigid", "mesh", "compile", "fe", "output"), 0.0)
@@ -133,6 +161,7 @@ class _Clock:
     last: float = field(default_factory=time.perf_counter)
 
     def lap(self, stage: str) -> None:
+        """Count the time since the last lap to a stage."""
         now = time.perf_counter()
         self.wall[stage] += now - self.last
         self.last = now
@@ -185,31 +214,31 @@ def run(
     threads = thread_count(threads)
     if out is not None:
         check_output(out, force=force)
-    clock = _Clock()
-    tell("mesh", 0.0)
-    meshes = mesh(scene) if meshes is None else _cut(scene, meshes)
-    clock.lap("mesh")
-    tell("rigid", 0.0)
-    start = hand_off(scene, meshes, nodal_masses(scene, meshes))
-    clock.lap("rigid")
-    model = build_model(scene, meshes, start.positions, start.velocities)
-    steps = divide(scene, model, span)
-    probes = locate(scene, model, meshes)
-    clock.lap("mesh")
+    clock = Clock()
+    ready = prepare(scene, meshes, clock, tell)
+    steps = divide(scene, ready.model, span)
     tell("compile", 0.0)
-    solver = Solver(model, device=device, precision=precision, dt=steps.dt, threads=threads)
+    solver = Solver(ready.model, device=device, precision=precision, dt=steps.dt, threads=threads)
     said: list[str] = []
-    surfaces = skins(model, meshes) if recorders else {}
-    info = RunInfo(scene, model, surfaces, probes.position, steps.dt, steps.interval, span, said.append)
+    surfaces = skins(ready.model, ready.meshes) if recorders else {}
+    paths = ready.probes.position
+    info = RunInfo(scene, ready.model, surfaces, paths, steps.dt, steps.interval, span, said.append)
     if recorders or scene.paths:
-        solver.output = Output(solver, surfaces, probes, frozenset().union(*(r.needs for r in recorders)))
+        solver.output = Output(solver, surfaces, ready.probes, frozenset().union(*(r.needs for r in recorders)))
     solver.compile()
     clock.lap("compile")
-    ledger = Ledger(model, steps.dt, steps.interval, scene.impact.energy_tolerance)
+    account = Account(ready, steps, solver.layout)
     recording = Recording(recorders, info, steps.intervals, steps.per_interval, solver.output)
     solver.start()
+
+    def read(written: int, records: Mapping[str, NDArray]) -> None:
+        first = account.ledger.count
+        account.read(written, records)
+        recording.history(lambda: account.ledger.history(first))
+        tell("impact", account.ledger.count / (steps.intervals + 1))
+
     try:
-        paths = _advance(solver, steps, ledger, recording, tell)
+        advance(solver, steps, read, recording)
     except BaseException:
         recording.finish(False)
         raise
@@ -217,37 +246,46 @@ def run(
     recording.finish(True)
     clock.lap("output")
     tell("impact", 1.0)
-    facts = _facts(scene, meshes, model, start, steps, ledger, solver, clock)
-    history = ledger.history()
-    warnings = (*_warnings(scene, start, ledger), *said)
-    result = Result(summarise(history, facts), history, None, warnings, path_histories(probes, paths))
-    if out is not None:
-        result = save(result, out, force=force)
-    return result
+    result = account.result(solver, clock.wall, said)
+    return result if out is None else save(result, out, force=force)
 
 
-def _advance(solver: Solver, steps: Steps, ledger: Ledger, recording: Recording, tell: Progress) -> list[NDArray]:
-    """Run the finite elements: in each output interval search for contact, record, step. Returns the probes' rings."""
+def prepare(
+    scene: Scene, meshes: Mapping[str, Mesh] | None, clock: Clock, tell: Progress, found: Found | None = None
+) -> Prepared:
+    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model; `found` as in `locate`.
+
+    Raises:
+        RequestError: the scene cannot be built as written.
+    """
+    tell("mesh", 0.0)
+    meshes = mesh(scene) if meshes is None else _cut(scene, meshes)
+    clock.lap("mesh")
+    tell("rigid", 0.0)
+    start = hand_off(scene, meshes, nodal_masses(scene, meshes))
+    clock.lap("rigid")
+    model = build_model(scene, meshes, start.positions, start.velocities)
+    probes = locate(scene, model, meshes, found)
+    clock.lap("mesh")
+    return Prepared(scene, meshes, start, model, probes)
+
+
+def advance(solver: Solver, steps: Steps, read: Read, recording: Recording | None = None) -> None:
+    """Run the finite elements: in each output interval search for contact, record, step.
+
+    `read` gets the number of records that were written since its last call, and `Solver.records` with these first.
+    """
     from warp_mca.solver import ROWS
     from warp_mca.transfer import Transfer
 
-    rings: list[NDArray] = []
     transfer = Transfer(solver.records(), solver.device)
 
-    def read() -> None:
-        written, records = transfer.receive()
-        first = ledger.count
-        ledger.read(written, records)
-        if "path_stress" in records:
-            rings.append(records["path_stress"][:written].copy())
-        recording.history(lambda: ledger.history(first))
-        tell("impact", ledger.count / (steps.intervals + 1))
-
     def record(interval: int, count: int) -> None:
-        needs = recording.needs(interval)
+        needs: frozenset[str] = recording.needs(interval) if recording else frozenset()
         solver.search()
         solver.record_and_step(count, needs)
-        recording.take(interval, needs)
+        if recording:
+            recording.take(interval, needs)
 
     for interval in range(steps.intervals):
         record(interval, steps.per_search)
@@ -256,79 +294,12 @@ def _advance(solver: Solver, steps: Steps, ledger: Ledger, recording: Recording,
             solver.step(steps.per_search)
         if (interval + 1) % ROWS == 0:
             if transfer.full:
-                read()
+                read(*transfer.receive())
             transfer.send(ROWS)
             while transfer.arrived:
-                read()
+                read(*transfer.receive())
     record(steps.intervals, 1)
     while transfer.pending:
-        read()
+        read(*transfer.receive())
     transfer.send(steps.intervals % ROWS + 1)
-    read()
-    return rings
-
-
-def _facts(
-    scene: Scene,
-    meshes: Mapping[str, Mesh],
-    model: Model,
-    start: HandOff,
-    steps: Steps,
-    ledger: Ledger,
-    solver: Solver,
-    clock: _Clock,
-) -> RunFacts:
-    more: dict[str, object] = {
-        "energy_drift_rigid": start.energy_drift,
-        "handoff_mismatch": {
-            "momentum": start.momentum_mismatch,
-            "angular_momentum": start.angular_momentum_mismatch,
-            "kinetic_energy": start.energy_mismatch,
-        },
-        "max_penetration": solver.max_penetration(),
-        "max_strain": ledger.max_strain,
-        "stable_dt": model.stable.dt,
-        "joint_impulse": solver.joint_impulses(),
-        "threads": solver.threads,
-    }
-    if scene.paths:
-        body = scene.body(scene.paths[0].lines[0].body)
-        more["wave_speeds"] = body_materials(body, meshes[body.name])[0][0].wave_speeds
-    return RunFacts(
-        scene=scene.name,
-        n_elements=model.element_count,
-        n_nodes=model.node_count,
-        dt=steps.dt,
-        n_steps=steps.count,
-        simulated_time=steps.dt * steps.count,
-        wall=clock.wall,
-        device=solver.device_name(),
-        precision=solver.precision,
-        element=" ".join(sorted({block.element for block in model.blocks})),
-        energy_error=ledger.energy_error,
-        energy=ledger.energy(),
-        max_plastic_strain=solver.max_plastic_strain(),
-        parameters=scene.parameters,
-        t_contact=start.t_contact if scene.rigid else None,
-        v_n=start.v_n,
-        v_t=start.v_t,
-        theta=tuple(float(x) for x in start.theta),
-        theta_dot=tuple(float(x) for x in start.theta_dot),
-        more=more,
-    )
-
-
-def _warnings(scene: Scene, start: HandOff, ledger: Ledger) -> list[str]:
-    found = []
-    corotational = any(body.kinematics == "corotational" for body in scene.bodies)
-    if corotational and ledger.max_strain > COROTATIONAL_STRAIN:
-        found.append(
-            f"strain reached {ledger.max_strain:.2f}; the co-rotational element takes strains as small, "
-            f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose kinematics='finite'"
-        )
-    if scene.rigid and scene.rigid.inertia == "slender":
-        found.append(
-            f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic energy "
-            f"by {start.energy_mismatch:.1%} at hand-off; rigid_inertia=mesh keeps both"
-        )
-    return found
+    read(*transfer.receive())

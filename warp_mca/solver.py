@@ -24,13 +24,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
-from warp_mca.kernels import constraint, contact, ledger, node, search
+from warp_mca.kernels import constraint, contact, ledger, node
 from warp_mca.kernels.scalars import scalars
+from warp_mca.layout import layout_of
+from warp_mca.ledger import DRIVE_WORK, HOURGLASS, PASS, PASS_COLUMNS
 from warp_mca.model import Model
-from warp_mca.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.threads import ELEMENTS as RANGE
 from warp_mca.threads import NODES, Pool, Split, Stages, whole
 
@@ -41,9 +43,6 @@ SUM_WIDTH = 256  # partial sums of a record, in a fixed order
 SHARE = 16  # elements for each thread that sums them at first, while there are at most SPREAD threads for a partial sum
 SPREAD = 64
 ROWS = 32  # records kept on the device before the host reads them
-# Columns of a record, then eight for each contact pass (`contact.sum_springs`).
-KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 8
 
 
 def check_device(name: str) -> str:
@@ -57,85 +56,6 @@ def check_device(name: str) -> str:
     if name not in known:
         raise bad_value("device", name, f"this machine has {', '.join(known)}")
     return name
-
-
-class ContactStage:
-    """Device side of one contact pass."""
-
-    def __init__(self, item: ContactPass, model: Model, column: int) -> None:
-        self.item = item
-        self.column = column
-        count = len(item.slave)
-        self.slave = wp.array(item.slave, dtype=wp.int32)
-        self.stiffness = wp.array(item.stiffness, dtype=wp.float64)
-        self.spring = contact.Spring()
-        for name in ("tangential", "force", "impulse"):
-            setattr(self.spring, name, wp.zeros(count, dtype=wp.vec3d))
-        for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth"):
-            setattr(self.spring, name, wp.zeros(count, dtype=wp.float64))
-        self.spring.face = wp.full(count, -1, dtype=wp.int32)
-        self.spring.weight = wp.zeros(count, dtype=wp.vec4d)
-        friction = item.mu > 0.0
-        if item.plane is not None:
-            self.kernel = contact.plane_kernel(friction)
-            return
-        self.kernel = contact.surface_kernel(friction)
-        faces = len(item.face)
-        self.face = wp.array(item.face, dtype=wp.int32)
-        self.master = wp.array(item.master, dtype=wp.int32)
-        self.face_offset = wp.array(item.face_offset, dtype=wp.int32)
-        self.face_of_node = wp.array(item.face_of_node, dtype=wp.int32)
-        self.count = wp.zeros(count, dtype=wp.int32)
-        self.candidate = wp.zeros((count, LIST_LENGTH), dtype=wp.int32)
-        self.face_count = wp.zeros(faces, dtype=wp.int32)
-        self.face_slave = wp.zeros((faces, LIST_LENGTH), dtype=wp.int32)
-        self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
-        self.lower = wp.zeros(faces, dtype=wp.vec3f)
-        self.upper = wp.zeros(faces, dtype=wp.vec3f)
-        self.origin = wp.vec3d(*model.X[item.master].mean(axis=0))
-        self.bvh: Any = None
-
-    def search(self, X: wp.array, u: wp.array, flag: wp.array) -> None:
-        """Broad phase: list what each slave may touch until the next search."""
-        if self.item.plane is not None:
-            return
-        margin = self.item.margin
-        outputs = [self.lower, self.upper, self.face_count]
-        wp.launch(
-            search.face_bounds, len(self.item.face), inputs=[X, u, self.face, self.origin, margin], outputs=outputs
-        )
-        if self.bvh is None:
-            self.bvh = wp.Bvh(self.lower, self.upper)
-        else:
-            self.bvh.refit()
-        wp.launch(
-            search.find_candidates,
-            len(self.item.slave),
-            inputs=[self.bvh.id, X, u, self.slave, self.origin],
-            outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
-        )
-        wp.launch(search.sort_lists, len(self.item.face), inputs=[self.face_count], outputs=[self.face_slave])
-        wp.launch(search.mark_masters, len(self.item.master), inputs=[u, self.master], outputs=[self.u_search])
-
-    def touch(self, X: wp.array, u: wp.array, v: wp.array, dt: float, force: wp.array, flag: wp.array) -> None:
-        """Contact forces of this pass, added to `force`."""
-        item = self.item
-        if item.plane is not None:
-            normal = np.asarray(item.plane.normal, dtype=float)
-            frame = [
-                wp.vec3d(*item.plane.point),
-                wp.vec3d(*(normal / np.linalg.norm(normal))),
-                wp.vec3d(*item.plane.velocity),
-            ]
-            inputs = [X, u, v, self.slave, self.stiffness, *frame, item.mu, item.deepest, dt, self.spring]
-            wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force, flag])
-            return
-        inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
-        inputs += [item.mu, item.margin, dt, self.spring]
-        wp.launch(self.kernel, len(item.slave), inputs=inputs, outputs=[force, flag])
-        inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
-        inputs += [self.face_count, self.face_slave, item.margin, self.spring]
-        wp.launch(contact.react, len(item.master), inputs=inputs, outputs=[force, flag])
 
 
 class Solver:
@@ -153,6 +73,7 @@ class Solver:
         if precision not in ("mixed", "float64"):
             raise bad_value("precision", precision, "choose mixed or float64")
         self.model, self.device, self.precision, self.dt = model, check_device(device), precision, dt
+        self.layout = layout_of(model)
         with wp.ScopedDevice(self.device):
             self._allocate()
         self.graphs: dict[str, Any] = {}
@@ -177,21 +98,31 @@ class Solver:
         offset, slot = gather_lists(self.elements, model.node_count)
         self.offset, self.slot = wp.array(offset, dtype=wp.int32), wp.array(slot, dtype=wp.int32)
         self.force = wp.zeros(len(slot), dtype=t.vec3)
-        self.contacts = [ContactStage(p, model, PASS + PASS_COLUMNS * k) for k, p in enumerate(model.passes)]
+        scenes, passes = self.layout.count, len(model.passes) // self.layout.count
+        self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         # contact has few threads and waits long for memory
         self.side = wp.Stream() if self.contacts and wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
-        self.flag = wp.zeros(3, dtype=wp.int32)
+        self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
         self._allocate_constraints()
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.zeros(1, dtype=wp.int32)
         columns = PASS + PASS_COLUMNS * len(self.contacts)
-        self.partial = wp.zeros((ROWS, columns, SUM_WIDTH), dtype=wp.float64)
-        spread = min(max(model.element_count // (SHARE * SUM_WIDTH), 1), SPREAD)
-        self.wide = wp.zeros((HOURGLASS + 1, spread * SUM_WIDTH), dtype=wp.float64)
+        self.partial = wp.zeros((ROWS, scenes, columns, SUM_WIDTH), dtype=wp.float64)
+        largest = int((self.layout.elements[:, :, 1] - self.layout.elements[:, :, 0]).sum(axis=1).max())
+        spread = min(max(largest // (SHARE * SUM_WIDTH), 1), SPREAD)
+        self.wide = wp.zeros((scenes, HOURGLASS + 1, spread * SUM_WIDTH), dtype=wp.float64)
+        self.node_first, self.driven_first, self.element_ranges = (
+            wp.array(value, dtype=wp.int32) for value in (self.layout.nodes, self.layout.driven, self.layout.elements)
+        )
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
-        self.integrate_kernel = node.integrate_kernel(self.precision, bool(self.contacts), bool(model.fixed_axes.any()))
+        self.gravity = wp.array(model.gravity, dtype=wp.vec3d)
+        each = bool((model.gravity != model.gravity[0]).any())
+        self.node_gravity = self.gravity if each else wp.vec3d(*model.gravity[0])
+        self.node_scene = per_scene(self.layout.nodes) if each else 0
+        fixed = bool(model.fixed_axes.any())
+        self.integrate_kernel = node.integrate_kernel(self.precision, bool(self.contacts), fixed, each)
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
     def _allocate_constraints(self) -> None:
@@ -218,13 +149,12 @@ class Solver:
             wp.wait_stream(self.side)
 
     def _integrate(self, kick: float, drift: float, split: Split = whole) -> None:
-        gravity = wp.vec3d(*self.model.gravity)
-
         def launch(part: slice) -> None:
+            scene = 0 if isinstance(self.node_scene, int) else self.node_scene[part]
             fixed_axes = self.fixed_axes[part] if len(self.fixed_axes) else self.fixed_axes
             contact_force = self.contact_force[part] if self.contacts else self.contact_force
             inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot, fixed_axes]
-            inputs += [self.force, gravity, kick, drift]
+            inputs += [self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part]]
             wp.launch(self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=128)
 
@@ -247,7 +177,7 @@ class Solver:
         self._constrain()
 
     def _sum(self, kernel: Any, *inputs: Any) -> None:
-        wp.launch(kernel, SUM_WIDTH, inputs=list(inputs), outputs=[self.partial])
+        wp.launch(kernel, (self.layout.count, SUM_WIDTH), inputs=list(inputs), outputs=[self.partial])
 
     def _record_step(self, needs: frozenset[str], split: Split = whole) -> None:
         """One step that also writes a record of the state at its start, and a frame of `needs`."""
@@ -256,18 +186,19 @@ class Solver:
             self.output.before_step(needs)
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
-        width = self.wide.shape[1]
-        wp.launch(self.sum_elements_kernel, width, inputs=[self.energy, width], outputs=[self.wide])
+        width = self.wide.shape[2]
+        wide = (self.layout.count, width)
+        inputs = [self.energy, width, self.element_ranges]
+        wp.launch(self.sum_elements_kernel, wide, inputs=inputs, outputs=[self.wide])
         for stage in self.contacts:
-            self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.spring)
+            self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.first, stage.spring)
         wp.copy(self.v_before, self.v)
         self._integrate(self.dt, self.dt, split)
         self._constrain()
         if len(self.drive_work):
-            self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH)
-        gravity = wp.vec3d(*self.model.gravity)
-        inputs = [self.mass, gravity, self.u, self.v_before, self.v, self.dt, width]
-        wp.launch(ledger.sum_nodes, width, inputs=inputs, outputs=[self.wide])
+            self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH, self.driven_first)
+        inputs = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, width, self.node_first]
+        wp.launch(ledger.sum_nodes, wide, inputs=inputs, outputs=[self.wide])
         self._sum(ledger.fold, self.wide, self.row, SUM_WIDTH)
         inputs = [self.point_node, self.v_before, self.v, self.row]
         wp.launch(ledger.record_points, len(self.point_node), inputs=inputs, outputs=[self.point_velocity])
@@ -300,11 +231,11 @@ class Solver:
         self.search()
 
     def _kernels(self) -> list[Any]:
-        kernels = [constraint.rejoin, ledger.sum_nodes, contact.react, search.face_bounds]
+        kernels = [constraint.rejoin, ledger.sum_nodes, contact.sum_springs]
         kernels += [self.integrate_kernel, self.sum_elements_kernel]
         kernels += [kernel for stage in self.elements for kernel in stage.kernels()]
         kernels += self.output.kernels() if self.output else []
-        return kernels + [stage.kernel for stage in self.contacts]
+        return kernels + [kernel for stage in self.contacts for kernel in stage.kernels()]
 
     def search(self) -> None:
         """Broad phase of every contact."""
@@ -358,27 +289,29 @@ class Solver:
         """Rings of ROWS records, which wrap, and the flags raised so far.
 
         Returns:
-            `partial`: partial sums, shape (ROWS, columns, SUM_WIDTH), float64; `point_velocity` [m/s], shape
-            (ROWS, point_count), vec3d; `flag`, shape (3,), int32; `path_stress` [Pa], where the scene has paths,
-            shape (ROWS, probe_count), vec6 of float32.
+            `partial`: partial sums, shape (ROWS, scene_count, columns, SUM_WIDTH), float64; `point_velocity` [m/s],
+            shape (ROWS, point_count), vec3d; `flag`, shape (scene_count, 3), int32; `path_stress` [Pa], where the scene
+            has paths, shape (ROWS, probe_count), vec6 of float32.
         """
         found = {"partial": self.partial, "point_velocity": self.point_velocity, "flag": self.flag}
         if self.output and self.output.has_probes:
             found["path_stress"] = self.output.path_stress
         return found
 
-    def max_plastic_strain(self) -> float:
-        """Greatest equivalent plastic strain of any integration point [-]."""
-        return max(stage.max_plastic_strain() for stage in self.elements)
+    def max_plastic_strain(self, scene: int = 0) -> float:
+        """Greatest equivalent plastic strain of any integration point of a scene [-]."""
+        ranges = zip(self.elements, self.layout.elements[scene].tolist(), strict=True)
+        return max(s.max_plastic_strain(slice(a - s.block.first, b - s.block.first)) for s, (a, b) in ranges)
 
-    def max_penetration(self) -> float:
-        """Greatest depth that a slave node reached below its master [m]."""
-        return max((float(stage.spring.depth.numpy().max()) for stage in self.contacts), default=0.0)
+    def max_penetration(self, scene: int = 0) -> float:
+        """Greatest depth that a slave node of a scene reached below its master [m]."""
+        return max((stage.max_depth(scene) for stage in self.contacts), default=0.0)
 
-    def joint_impulses(self) -> dict[str, list[float]]:
-        """Impulse that each joint gave to its first body [N s], by name."""
+    def joint_impulses(self, scene: int = 0) -> dict[str, list[float]]:
+        """Impulse that each joint of a scene gave to its first body [N s], by name."""
         impulse = self.joint_impulse.numpy()
-        return {h.name: impulse[h.start : h.end].sum(axis=0).tolist() for h in self.model.hinges}
+        hinges = self.model.hinges[self.layout.hinges[scene] : self.layout.hinges[scene + 1]]
+        return {h.name: impulse[h.start : h.end].sum(axis=0).tolist() for h in hinges}
 
     def device_name(self) -> str:
         """The device, with what it is."""

@@ -27,7 +27,7 @@ class PatchStage(ElementStage):
         """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
-        host = make_patches(block.conn)
+        host = make_patches(block.conn, block.ends)
         self.slot_node = host.node
         self.patch_count = len(host.start) - 1
         self.patches = patch.Patches()

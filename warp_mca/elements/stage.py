@@ -106,10 +106,12 @@ class ElementStage:
         self.yielded.zero_()
         self.history.zero_()
 
-    def max_plastic_strain(self) -> float:
-        """Greatest equivalent plastic strain of any point [-]."""
-        last = self.history.numpy()[: self.points * j2.HISTORY_SIZE][j2.HISTORY_SIZE - 1 :: j2.HISTORY_SIZE]
-        return float(last.max(initial=0.0))
+    def max_plastic_strain(self, part: slice) -> float:
+        """Greatest equivalent plastic strain of any point of a range of elements [-]."""
+        if not self.block.plastic or part.start == part.stop:
+            return 0.0
+        last = self.history[j2.HISTORY_SIZE - 1 : self.points * j2.HISTORY_SIZE : j2.HISTORY_SIZE, part]
+        return float(last.numpy().max())
 
 
 def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index, Index]:

@@ -1,0 +1,249 @@
+"""Batches: each scene as if it were alone, whatever the others do; what they must share; files."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.kernels.lanes import LANES
+from warp_mca.patches import PATCH, make_patches
+from warp_mca.results import FILES, PATH_FILES
+from warp_mca.solver import Solver
+
+
+def hinged(
+    E: float = 70e9,
+    mu: float = 0.4,
+    speed: float = 3.0,
+    gravity: float = 9.8,
+    element: str = "hex8",
+    cells: int = 4,
+    penalty: float = 1.0,
+    **impact: float,
+) -> mca.Scene:
+    """Two hinged bars that yield fly aslant into a rough plate, which holds on to some of its friction."""
+    metal = mca.J2Bilinear(E=E, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=0.1 * E, beta=0.3)
+    flight = {"material": metal, "velocity": (1.0, -speed, 0.5), "element": element}
+    bar = mca.Box(size=(0.02, 0.06, 0.02), divisions=(cells, 4 * cells, cells), origin=(-0.011, 0.0, -0.012))
+    plate = mca.Box(size=(0.06, 0.03, 0.06), divisions=(8, 4, 8), origin=(-0.03, -0.03, -0.03))
+    top = mca.Surface(body="plate", nodes="ymax")
+    middle = mca.Line(body="low", start=(0.0, 0.001, 0.0), end=(0.0, 0.05, 0.0))
+    return mca.Scene(
+        name="hinged",
+        bodies=(
+            mca.Body(name="low", geometry=bar, **flight),
+            mca.Body(name="high", geometry=bar, position=(0.0, 0.06, 0.0), **flight),
+            mca.Body(name="plate", geometry=plate, material=metal, element=element),
+        ),
+        joints=(mca.Revolute(name="A", body="low", at=(-0.011, 0.06, 0.0), other="high", other_at=(-0.011, 0.0, 0.0)),),
+        contacts=(
+            mca.Contact(slave=mca.Surface(body="low", nodes="ymin"), master=top, mu=mu, penalty=penalty, two_way=True),
+        ),
+        fixed=(mca.Fixed(body="plate", nodes="ymin"),),
+        paths=(mca.Path(name="middle", lines=(middle,), spacing=0.01),),
+        gravity=(0.0, -gravity, 0.0),
+        impact=mca.ImpactPhase(**{"duration": 4e-5, "output_interval": 1e-6} | impact),
+        tip=mca.Point(body="low", at=(0.0, 0.0, 0.0)),
+        target=mca.Point(body="plate", at=(0.0, 0.0, 0.0)),
+    )
+
+
+def driven(v: float, mu: float, normal: mca.scene.Vec3, soft: bool = False) -> mca.Scene:
+    """The same bars on a moving plane, pushed from above by a table."""
+    scene = hinged(E=50e9 if soft else 70e9)
+    plane = mca.RigidPlane(normal=normal, velocity=(v, 0.0, 0.0))
+    return replace(
+        scene,
+        bodies=scene.bodies[:2],
+        fixed=(),
+        target=None,
+        contacts=(mca.Contact(slave=mca.Surface(body="low", nodes="ymin"), master=plane, mu=mu),),
+        prescribed=(
+            mca.Prescribed(body="high", nodes="ymax", axis="y", times=(0.0, 1e-5), velocities=(-3.0, -3.0 - v)),
+        ),
+    )
+
+
+def alone(scene: mca.Scene, result: mca.Result, precision: str) -> mca.Result:
+    """The run of a scene by itself, with the time step that it had in the batch."""
+    scale = result.summary["dt"] / result.summary["stable_dt"] * (1.0 + 1e-9)
+    one = mca.run(replace(scene, impact=replace(scene.impact, time_step_scale=scale)), precision=precision)
+    assert one.summary["dt"] == result.summary["dt"]
+    return one
+
+
+def test_histories_are_those_of_each_scene_alone_bit_for_bit():
+    """Numbers of elements are multiples of the CPU's lanes, so that none is computed apart."""
+    scenes = [hinged(), hinged(E=50e9, speed=5.0), hinged(mu=0.0), hinged(mu=0.1, gravity=1e5)]
+    results = mca.run_batch(scenes)
+    for k, (scene, result) in enumerate(zip(scenes, results, strict=True)):
+        one = alone(scene, result, "mixed")
+        assert one.summary["n_elements"] % LANES == 0
+        assert one.F_n.max() > 1e3
+        for name in one.history:
+            assert np.array_equal(one[name], result[name], equal_nan=True), name
+        assert np.array_equal(one.paths[0].stress, result.paths[0].stress)
+        for name in ("max_plastic_strain", "energy", "joint_impulse", "max_penetration", "contacts", "n_steps"):
+            assert one.summary[name] == result.summary[name], name
+        assert result.summary["batch"] == {"scene": k, "scenes": 4}
+    assert results[2].F_t.max() < results[0].F_t.max()
+    assert len({result.F_n.max() for result in results}) == 4
+
+
+@pytest.mark.parametrize(
+    "scenes",
+    [
+        [hinged(), hinged(element="hex8r", cells=3), hinged(element="tet4"), hinged(cells=5)],
+        [driven(2.0, 0.0, (0, 1, 0)), driven(1.0, 0.3, (0, 2, 0)), driven(0.5, 0.3, (0, 1, 0), soft=True)],
+    ],
+    ids=["elements and meshes", "planes and tables"],
+)
+def test_scenes_may_differ_in_all_that_is_data(scenes):
+    for scene, result in zip(scenes, mca.run_batch(scenes, precision="float64"), strict=True):
+        one = alone(scene, result, "float64")
+        for name in one.history:
+            np.testing.assert_allclose(result[name], one[name], atol=1e-9 * np.nanmax(np.abs(one[name])), err_msg=name)
+        stress = one.paths[0].stress
+        np.testing.assert_allclose(result.paths[0].stress, stress, atol=1e-5 * np.abs(stress).max())
+
+
+def test_patches_of_a_gpu_are_those_of_each_scene_alone():
+    """So that sums over a patch have the order that they have without the other scenes."""
+    meshes = [mca.Box(size=(1.0, 1.0, 1.0), divisions=n).build() for n in ((7, 6, 7), (5, 5, 5), (8, 8, 4))]
+    conns = [mesh.hexahedra.T.astype(np.int32) for mesh in meshes]
+    nodes, ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes)]), np.cumsum([conn.shape[1] for conn in conns])
+    assert ends[0] % PATCH and ends[1] % PATCH
+    shifted = [conn + np.int32(first) for conn, first in zip(conns, nodes, strict=False)]
+    joined = make_patches(np.concatenate(shifted, axis=1), ends.tolist())
+    single = [make_patches(conn) for conn in conns]
+    for name in ("places", "corner"):
+        assert np.array_equal(getattr(joined, name), np.concatenate([getattr(p, name) for p in single], axis=1))
+    own = [patches.node + first for patches, first in zip(single, nodes, strict=False)]
+    assert np.array_equal(joined.node, np.concatenate(own))
+    for name in ("start", "slot_start"):
+        sizes = np.concatenate([np.diff(getattr(patches, name)) for patches in single])
+        assert np.array_equal(np.diff(getattr(joined, name)), sizes)
+    assert len(sizes) > len(meshes)
+
+
+def test_bars_of_a_batch_follow_wave_theory_each_with_its_own_speed():
+    """F = rho c A v; the stiffest sets the step of all."""
+
+    def bar(E: float, v: float) -> mca.Scene:
+        rod = mca.Box(size=(0.2, 0.01, 0.01), divisions=(100, 1, 1))
+        body = mca.Body(name="bar", geometry=rod, material=mca.Elastic(E=E, nu=0.0, rho=2700.0), velocity=(v, 0.0, 0.0))
+        wall = mca.RigidPlane(point=(0.2, 0.0, 0.0), normal=(-1, 0, 0))
+        return mca.Scene(
+            name="bar",
+            bodies=(body,),
+            contacts=(mca.Contact(slave=mca.Surface(body="bar", nodes="xmax"), master=wall),),
+            impact=mca.ImpactPhase(duration=7e-5),
+        )
+
+    cases = [(70e9, 1.0), (20e9, 1.0), (140e9, 0.5), (70e9, 3.0)]
+    results = mca.run_batch([bar(*case) for case in cases])
+    for (E, v), result in zip(cases, results, strict=True):
+        plateau = result.F_n[(result.time > 2e-5) & (result.time < 5e-5)].mean()
+        assert plateau == pytest.approx(2700.0 * np.sqrt(E / 2700.0) * 1e-4 * v, rel=5e-3)
+        assert result.summary["energy_error"] < 1e-3
+    steps = {result.summary["dt"] for result in results}
+    assert len(steps) == 1
+    assert steps.pop() <= 0.9 * min(result.summary["stable_dt"] for result in results)
+
+
+def test_one_scene_is_run_as_alone():
+    (result,), one = mca.run_batch([hinged()]), mca.run(hinged())
+    assert all(np.array_equal(one[name], result[name], equal_nan=True) for name in one.history)
+    assert "batch" not in result.summary
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_a_scene_that_breaks_leaves_the_others_alone(tmp_path):
+    sunk, overflowed = hinged(penalty=1e-7, speed=30.0, duration=5e-4), hinged(duration=5e-4)
+    metal = mca.Elastic(E=1e39, nu=0.0, rho=2700e28)  # its stress is beyond float32
+    overflowed = replace(overflowed, bodies=tuple(replace(body, material=metal) for body in overflowed.bodies))
+    tight = hinged(energy_tolerance=1e-9, duration=5e-4)
+    sound = hinged(mu=0.2, duration=5e-4)
+    scenes = [sunk, tight, sound, overflowed]
+    results = mca.run_batch(scenes, out=tmp_path / "sweep")
+    for scene, result in zip(scenes, results, strict=True):
+        if scene is sound:
+            assert result.stopped is None
+            one = alone(scene, result, "mixed")
+            assert all(np.array_equal(one[name], result[name], equal_nan=True) for name in one.history)
+        else:
+            with pytest.raises(mca.GuardError) as stop:
+                alone(scene, result, "mixed")
+            assert result.stopped == str(stop.value)
+            assert len(result.time) < 501
+            assert result.summary["simulated_time"] == (result.time[-1] if len(result.time) else 0.0)
+    assert results[1].stopped.startswith("energy imbalance")
+    assert len(results[1].time) >= 1
+    assert results[0].stopped.endswith("raise penalty, or refine the mesh")
+    assert [folder.name for folder in (tmp_path / "sweep").iterdir()] == ["2"]
+
+
+def test_the_batch_ends_when_no_scene_is_left(monkeypatch):
+    done, step = [], Solver.record_and_step
+    monkeypatch.setattr(Solver, "record_and_step", lambda self, *args: done.append(1) or step(self, *args))
+    scenes = [hinged(energy_tolerance=tolerance, duration=1e-2) for tolerance in (1e-9, 1e-10)]
+    assert all(result.stopped for result in mca.run_batch(scenes))
+    assert len(done) < 100  # of 10,000 intervals
+
+
+def test_every_scene_has_its_folder(tmp_path):
+    scenes = [hinged(mu=mu, duration=1e-5) for mu in (0.1, 0.3)]
+    results = mca.run_batch(scenes, out=tmp_path / "sweep")
+    for name, result in zip(("0", "1"), results, strict=True):
+        assert result.path == tmp_path / "sweep" / name
+        assert {file.name for file in result.path.iterdir()} == {*FILES, *PATH_FILES}
+        read = mca.load(result.path)
+        assert np.array_equal(read.F_t, result.F_t)
+        assert np.array_equal(read.paths[0].stress, result.paths[0].stress)
+    with pytest.raises(mca.RequestError, match="holds results already"):
+        mca.run_batch(scenes, out=tmp_path / "sweep")
+    mca.run_batch(scenes, out=tmp_path / "sweep", force=True)
+
+
+def test_scenes_share_the_meshes_of_equal_recipes(monkeypatch):
+    built, build = [], mca.Box.build
+    monkeypatch.setattr(mca.Box, "build", lambda self: built.append(self) or build(self))
+    mca.run_batch([hinged(mu=mu, duration=1e-6) for mu in (0.1, 0.2, 0.3)])
+    assert len(built) == 2
+
+
+def test_finished_meshes_are_taken():
+    scene = hinged(duration=2e-6)
+    meshes = mca.mesh(hinged(cells=2))
+    results = mca.run_batch([scene, scene], meshes=[meshes, mca.mesh(scene)])
+    assert results[0].summary["n_elements"] < results[1].summary["n_elements"]
+    with pytest.raises(mca.RequestError, match="number of meshes = 1"):
+        mca.run_batch([scene, scene], meshes=[meshes])
+
+
+@pytest.mark.parametrize(
+    ("scenes", "message"),
+    [
+        ([], r"scenes = \[\]: give at least one"),
+        ([hinged(), hinged(duration=3e-5)], r"scenes\[1\].impact.duration = 3e-05: .*scenes\[0\] has 4e-05"),
+        ([hinged(), hinged(), hinged(output_interval=2e-6)], r"scenes\[2\].impact.output_interval = 2e-06"),
+        ([hinged(), replace(hinged(), contacts=())], r"scenes\[1\].contacts = 0: scenes\[0\] has 1"),
+        ([hinged(), driven(1.0, 0.3, (0, 1, 0))], r"contacts\[0\].master = 'RigidPlane': .*Surface"),
+        (
+            [hinged(), replace(hinged(), contacts=(replace(hinged().contacts[0], two_way=False),))],
+            r"scenes\[1\].contacts\[0\].two_way = False",
+        ),
+        ([hinged(), replace(hinged(), fixed=(mca.Fixed(body="low", nodes="top"),))], r"scenes\[1\]: .*top"),
+    ],
+)
+def test_what_scenes_must_share_is_named(scenes, message, tmp_path):
+    with pytest.raises(mca.RequestError, match=message) as refused:
+        mca.run_batch(scenes, out=tmp_path / "out")
+    assert refused.value.exit_status == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_duration_for_all():
+    results = mca.run_batch([hinged(), hinged(duration=3e-5)], duration=2e-6)
+    assert [len(result.time) for result in results] == [3, 3]

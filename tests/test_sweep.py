@@ -1,0 +1,102 @@
+"""Sweeps from the command line: combinations, folders, exit status, and requests that are refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.cli import main
+from warp_mca.sweep import parse_sweep
+
+SCENE = '''
+"""A block falls on a rough plane."""
+from typing import Annotated
+
+import warp_mca as mca
+from warp_mca import Param
+
+
+def build(
+    *,
+    v: Annotated[float, Param("speed", unit="m/s")] = 1.0,
+    mu: Annotated[float, Param("friction")] = 0.2,
+    tolerance: Annotated[float, Param("of the energy")] = 0.01,
+    duration: Annotated[float, Param("of the run", unit="s")] = 4e-6,
+) -> mca.Scene:
+    """A block with two elements."""
+    block = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 1, 1))
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    return mca.Scene(
+        name="block",
+        bodies=(mca.Body(name="block", geometry=block, material=steel, velocity=(v, -v, 0.0)),),
+        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), mu=mu),),
+        impact=mca.ImpactPhase(duration=duration, energy_tolerance=tolerance),
+    )
+'''
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "block.py").write_text(SCENE, encoding="utf-8")
+    return tmp_path
+
+
+def test_every_combination_the_last_key_fastest():
+    found = parse_sweep(["mu=0.1,0.2", "v=1,2,3"])
+    assert [(item["mu"], item["v"]) for item in found] == [
+        ("0.1", "1"), ("0.1", "2"), ("0.1", "3"), ("0.2", "1"), ("0.2", "2"), ("0.2", "3")
+    ]  # fmt: skip
+
+
+def test_each_scene_of_a_sweep_has_its_folder(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["run", "block.py", "--sweep", "v=1,2", "--sweep", "mu=0,0.3", "--out", "all"]) == 0
+    printed = capsys.readouterr().out
+    for k, (v, mu) in enumerate([(1.0, 0.0), (1.0, 0.3), (2.0, 0.0), (2.0, 0.3)]):
+        folder = here / "all" / str(k)
+        parameters = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["parameters"]
+        assert (parameters["v"], parameters["mu"]) == (v, mu)
+        assert f"all/{k}" in printed
+        assert main(["run", "block.py", "--set", f"v={v}", "--set", f"mu={mu}", "--out", f"one-{k}"]) == 0
+        one, swept = mca.load(here / f"one-{k}"), mca.load(folder)
+        assert one.F_n.max() > 0.0
+        for name in one.history:
+            assert np.array_equal(one[name], swept[name], equal_nan=True), name
+
+
+def test_a_scene_that_is_stopped_gives_exit_status_1(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["run", "block.py", "--sweep", "tolerance=1,1e-12"]) == 1
+    captured = capsys.readouterr()
+    assert captured.err == "warp-mca: error: guards stopped 1 of 2 scenes\n"
+    assert "energy" in captured.out and "imbalance" in captured.out
+    assert [folder.name for folder in (here / "block-sweep").iterdir()] == ["0"]
+
+
+def test_a_built_model_is_swept(here: Path):
+    small = [f"--set={key}" for key in ("axial=4", "output_interval=1e-6", "duration=2e-6")]
+    assert main(["build", "single_rod", *small, "-o", "rod.mca"]) == 0
+    assert main(["run", "rod.mca", "--sweep", "v=0.5,1"]) == 0
+    slow, fast = (mca.load(here / "rod-sweep" / name) for name in "01")
+    assert fast.F_n.max() == pytest.approx(2.0 * slow.F_n.max(), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--sweep", "v"], "--sweep = 'v': write it as KEY=VALUE,VALUE"),
+        (["--sweep", "v=1,,2"], "--sweep = 'v=1,,2'"),
+        (["--sweep", "v=1", "--sweep", "v=2"], "list all values of v at once"),
+        (["--sweep", "w=1,2"], "'w'"),
+        (["--sweep", "v=1,fast"], "'fast'"),
+        (["--sweep", "duration=1e-6,2e-6"], "scenes[1].impact.duration = 2e-06"),
+        (["--sweep", "v=1,2", "--rrd", "a.rrd"], "recorders show single runs"),
+        (["--sweep", "v=1,2", "--device", "cuda:99"], "device = 'cuda:99'"),
+    ],
+)
+def test_bad_sweeps_are_refused(words: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["run", "block.py", *words]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err and captured.err.count("\n") == 1
+    assert [path.name for path in here.iterdir() if path.is_dir() and path.name != "__pycache__"] == []

@@ -1,0 +1,173 @@
+"""Owns batches: independent scenes side by side in one model, so that small ones fill a device."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from numpy.typing import NDArray
+
+from warp_mca.account import Account, Prepared
+from warp_mca.errors import GuardError, RequestError, bad_value
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.join import join_models, join_probes
+from warp_mca.layout import offsets
+from warp_mca.paths import Found
+from warp_mca.results import Result, check_output, save
+from warp_mca.scene import RigidPlane, Scene
+from warp_mca.simulation import Clock, Progress, advance, divide_alike, mesh, prepare
+
+Meshes = Mapping[str, Mesh]
+
+
+def run_batch(
+    scenes: Sequence[Scene],
+    *,
+    device: str = "cpu",
+    precision: str = "mixed",
+    threads: int | None = None,
+    duration: float | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    meshes: Sequence[Meshes] | None = None,
+    progress: Progress | None = None,
+) -> list[Result]:
+    """Run independent scenes at once, each with its own parameters: their elements share every launch.
+
+    The scenes take the same steps: the smallest that one of them needs, so that the result of each is that of the scene
+    alone with this step. They must have the same duration and output interval, and contacts of the same kinds, in the
+    same order; all else may differ. Parts that scenes have in common are meshed once.
+
+    Args:
+        scenes: what to run.
+        device, precision, threads, force: as in `warp_mca.run`.
+        duration: of the impact phase [s]; the scenes' own if None.
+        out: folder that gets a folder for each scene, named by its number from 0, with the files of `warp_mca.run`.
+        meshes: finished meshes by body, for each scene, to save making them again.
+        progress: called with a stage and the share of it that is done.
+
+    Returns:
+        The result of each scene. Where a guard stopped one, `Result.stopped` says so, its rows end there, and nothing
+        of it is written; the others go on. Wall times are those of the batch.
+
+    Raises:
+        RequestError: the request cannot be carried out; nothing was written.
+    """
+    from warp_mca.output import Output
+    from warp_mca.solver import Solver, check_device
+    from warp_mca.threads import thread_count
+
+    tell = progress or (lambda stage, done: None)
+    span = check_alike(scenes, duration)
+    check_device(device)
+    threads = thread_count(threads)
+    folders = _folders(out, len(scenes), force)
+    clock = Clock()
+    ready = _prepare(scenes, meshes, clock, tell)
+    steps = divide_alike([(item.scene, item.model) for item in ready], span)
+    model, probes = join_models([item.model for item in ready]), join_probes(ready)
+    clock.lap("mesh")
+    tell("compile", 0.0)
+    solver = Solver(model, device=device, precision=precision, dt=steps.dt, threads=threads)
+    if len(probes.corner):
+        solver.output = Output(solver, {}, probes, frozenset())
+    solver.compile()
+    clock.lap("compile")
+    first = offsets([len(item.probes.corner) for item in ready])
+    accounts = [Account(item, steps, solver.layout, k, int(first[k])) for k, item in enumerate(ready)]
+    stopped: list[str | None] = [None] * len(scenes)
+    solver.start()
+    with suppress(GuardError):  # that of the last scene
+        advance(solver, steps, _reader(accounts, stopped, steps.intervals + 1, tell))
+    clock.lap("fe")
+    tell("impact", 1.0)
+    results = [account.result(solver, clock.wall, stopped=stopped[k]) for k, account in enumerate(accounts)]
+    return [
+        result if folder is None or result.stopped else save(result, folder, force=force)
+        for result, folder in zip(results, folders, strict=True)
+    ]
+
+
+def _reader(
+    accounts: Sequence[Account], stopped: list[str | None], rows: int, tell: Progress
+) -> Callable[[int, Mapping[str, NDArray]], None]:
+    """What hands records to each account that no guard has stopped, and notes in `stopped` why one does."""
+
+    def read(written: int, records: Mapping[str, NDArray]) -> None:
+        for k, account in enumerate(accounts):
+            if stopped[k] is None:
+                try:
+                    account.read(written, records)
+                except GuardError as error:
+                    stopped[k] = str(error)
+                    if None not in stopped:
+                        raise
+        tell("impact", max(account.ledger.count for account in accounts) / rows)
+
+    return read
+
+
+def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float:
+    """The duration [s] of scenes that one batch can run.
+
+    Raises:
+        RequestError: there is none, or what the scenes must share differs.
+    """
+    if not scenes:
+        raise bad_value("scenes", [], "give at least one scene")
+    first = scenes[0]
+    span = first.impact.duration if duration is None else duration
+    if not (math.isfinite(span) and span > 0.0):
+        raise bad_value("duration", span, "give a finite time above 0 s")
+    for k, scene in enumerate(scenes[1:], 1):
+        for name in ("duration", "output_interval"):
+            value, wanted = getattr(scene.impact, name), getattr(first.impact, name)
+            if value != wanted and not (name == "duration" and duration is not None):
+                remedy = f"the batch takes its steps together and scenes[0] has {wanted:g}; give all scenes the same"
+                raise bad_value(f"scenes[{k}].impact.{name}", value, remedy)
+        if len(scene.contacts) != len(first.contacts):
+            remedy = f"scenes[0] has {len(first.contacts)}; batch scenes with as many contacts"
+            raise bad_value(f"number of scenes[{k}].contacts", len(scene.contacts), remedy)
+        for i, (contact, wanted) in enumerate(zip(scene.contacts, first.contacts, strict=True)):
+            for name, kind in (("master", _kind), ("two_way", bool)):
+                value, other = (kind(getattr(item, name)) for item in (contact, wanted))
+                if value != other:
+                    remedy = f"that of scenes[0] is {other}; batch scenes with contacts of the same kinds"
+                    raise bad_value(f"scenes[{k}].contacts[{i}].{name}", value, remedy)
+    return span
+
+
+def _kind(master: object) -> str:
+    return "RigidPlane" if isinstance(master, RigidPlane) else "Surface"
+
+
+def _folders(out: str | os.PathLike[str] | None, count: int, force: bool) -> list[Path | None]:
+    """A folder for each scene, numbered so that names sort."""
+    if out is None:
+        return [None] * count
+    digits = len(str(count - 1))
+    return [check_output(Path(out) / f"{k:0{digits}d}", force=force) for k in range(count)]
+
+
+def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Clock, tell: Progress) -> list[Prepared]:
+    """Every scene at the start of its impact phase."""
+    if meshes is not None and len(meshes) != len(scenes):
+        raise bad_value("number of meshes", len(meshes), f"give the meshes of each of the {len(scenes)} scenes")
+    made: dict[object, Mesh] = {}
+    places: Found = {}
+    ready = []
+    for k, scene in enumerate(scenes):
+        try:
+            own = mesh(scene, made) if meshes is None else meshes[k]
+            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places))
+        except RequestError as error:
+            raise RequestError(f"scenes[{k}]: {error}") from error
+    return ready
+
+
+def _share(tell: Progress, done: float) -> Progress:
+    """Tells of every stage that this share of the scenes is done with it."""
+    return lambda stage, _: tell(stage, done)

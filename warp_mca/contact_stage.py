@@ -1,0 +1,155 @@
+"""Owns the device side of contact: one pass of the scene, or of each scene of a batch, in the same launches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.kernels import contact, search
+from warp_mca.layout import offsets
+from warp_mca.surfaces import LIST_LENGTH, ContactPass
+
+if TYPE_CHECKING:
+    from warp_mca.model import Model
+
+
+def per_scene(first: NDArray[np.int32]) -> Any:
+    """The scene of each entry, as kernels take it: 0 where there is one scene, else an array; see `kernels.each`."""
+    if len(first) == 2:
+        return 0
+    return wp.array(np.repeat(np.arange(len(first) - 1), np.diff(first)), dtype=wp.int32)
+
+
+def _numbers(values: Sequence[float]) -> Any:
+    """A number of each scene, as kernels take it."""
+    return values[0] if len(values) == 1 else wp.array(list(values), dtype=wp.float64)
+
+
+def _vectors(values: Sequence[Any]) -> Any:
+    """A vector of each scene, as kernels take it."""
+    return wp.vec3d(*values[0]) if len(values) == 1 else wp.array(np.asarray(values), dtype=wp.vec3d)
+
+
+class ContactStage:
+    """Device side of one contact pass.
+
+    Attributes:
+        items: the pass of each scene; no slave meets the faces of another scene.
+        column: of its sums in a record.
+        slaves, first: first slave of each scene, and the number of all, shape (scene_count + 1,), int32, on the host
+            and on the device.
+        spring: state of the slaves' springs.
+    """
+
+    def __init__(self, items: Sequence[ContactPass], model: Model, column: int) -> None:
+        self.items, self.column = items, column
+        self.each = len(items) > 1
+        self.slaves = offsets([len(item.slave) for item in items])
+        self.first = wp.array(self.slaves, dtype=wp.int32)
+        self.slave_scene = per_scene(self.slaves)
+        self.slave = wp.array(self._join("slave"), dtype=wp.int32)
+        self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
+        self.mu = _numbers([item.mu for item in items])
+        self._make_springs()
+        friction = any(item.mu > 0.0 for item in items)
+        if items[0].plane is not None:
+            self.kernel = contact.plane_kernel(friction, self.each)
+            self._make_planes()
+            return
+        self.kernel = contact.surface_kernel(friction, self.each)
+        self.react, self.bounds = contact.react_kernel(self.each), search.bounds_kernel(self.each)
+        self.find = search.candidates_kernel(self.each)
+        self._make_faces(model)
+
+    def _join(self, name: str) -> NDArray:
+        return np.concatenate([getattr(item, name) for item in self.items])
+
+    def _make_springs(self) -> None:
+        count = len(self.slave)
+        self.spring = contact.Spring()
+        for name in ("tangential", "force", "impulse"):
+            setattr(self.spring, name, wp.zeros(count, dtype=wp.vec3d))
+        for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth"):
+            setattr(self.spring, name, wp.zeros(count, dtype=wp.float64))
+        self.spring.face = wp.full(count, -1, dtype=wp.int32)
+        self.spring.weight = wp.zeros(count, dtype=wp.vec4d)
+
+    def _make_planes(self) -> None:
+        planes = [item.plane for item in self.items if item.plane is not None]
+        normals = [np.asarray(plane.normal, dtype=float) for plane in planes]
+        unit = [normal / np.linalg.norm(normal) for normal in normals]
+        self.planes = [_vectors([p.point for p in planes]), _vectors(unit), _vectors([p.velocity for p in planes])]
+        self.deepest = _numbers([item.deepest for item in self.items])
+
+    def _make_faces(self, model: Model) -> None:
+        slaves, faces = len(self.slave), offsets([len(item.face) for item in self.items])
+        masters, around = (
+            offsets([len(getattr(item, name)) for item in self.items]) for name in ("master", "face_of_node")
+        )
+        rows = [item.face_offset[:-1] + start for item, start in zip(self.items, around, strict=False)]
+        numbers = [item.face_of_node + start for item, start in zip(self.items, faces, strict=False)]
+        self.margin = _numbers([item.margin for item in self.items])
+        self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
+        self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
+        self.face = wp.array(self._join("face"), dtype=wp.int32)
+        self.master = wp.array(self._join("master"), dtype=wp.int32)
+        self.face_offset = wp.array(np.append(np.concatenate(rows), around[-1]), dtype=wp.int32)
+        self.face_of_node = wp.array(np.concatenate(numbers), dtype=wp.int32)
+        self.count = wp.zeros(slaves, dtype=wp.int32)
+        self.candidate = wp.zeros((slaves, LIST_LENGTH), dtype=wp.int32)
+        self.face_count = wp.zeros(len(self.face), dtype=wp.int32)
+        self.face_slave = wp.zeros((len(self.face), LIST_LENGTH), dtype=wp.int32)
+        self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
+        self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
+        self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
+        self.bvh: Any = None
+
+    @property
+    def on_plane(self) -> bool:
+        """Whether the master is a rigid plane, in each scene."""
+        return self.items[0].plane is not None
+
+    def kernels(self) -> list[Any]:
+        """Those of a step and of a search."""
+        return [self.kernel] if self.on_plane else [self.kernel, self.react, self.bounds, self.find]
+
+    def search(self, X: wp.array, u: wp.array, flag: wp.array) -> None:
+        """Broad phase: list what each slave may touch until the next search."""
+        if self.on_plane:
+            return
+        inputs = [X, u, self.face, self.face_scene, self.origin, self.margin]
+        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper, self.face_count])
+        if self.bvh is None:
+            self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
+        else:
+            self.bvh.refit()
+        wp.launch(
+            self.find,
+            len(self.slave),
+            inputs=[self.bvh.id, X, u, self.slave, self.slave_scene, self.origin],
+            outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
+        )
+        wp.launch(search.sort_lists, len(self.face), inputs=[self.face_count], outputs=[self.face_slave])
+        wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[self.u_search])
+
+    def touch(self, X: wp.array, u: wp.array, v: wp.array, dt: float, force: wp.array, flag: wp.array) -> None:
+        """Contact forces of this pass, added to `force`."""
+        if self.on_plane:
+            inputs = [X, u, v, self.slave, self.stiffness, self.slave_scene, *self.planes]
+            inputs += [self.mu, self.deepest, dt, self.spring]
+            wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag])
+            return
+        inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
+        inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
+        wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag])
+        inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
+        inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
+        wp.launch(self.react, len(self.master), inputs=inputs, outputs=[force, flag])
+
+    def max_depth(self, scene: int) -> float:
+        """Largest penetration so far of a slave of a scene [m]."""
+        return float(self.spring.depth.numpy()[self.slaves[scene] : self.slaves[scene + 1]].max())
