@@ -10,8 +10,8 @@ from warp_mca import Param
 # The foot flattens to a twentieth of its height, and more the finer its cells are.
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
-    "standard": {"section": 6, "ring": 3, "axial": 54, "time_step_scale": 0.1},
-    "fine": {"section": 8, "ring": 6, "axial": 81, "time_step_scale": 0.07},
+    "standard": {"section": 6, "ring": 3, "axial": 54, "time_step_scale": 0.065},
+    "fine": {"section": 8, "ring": 6, "axial": 81, "time_step_scale": 0.045},
 }
 
 
@@ -30,7 +30,7 @@ def build(
     penalty: Annotated[float, Param("factor of the wall's stiffness", low=0.0, exclusive=True)] = 10.0,
     kinematics: Annotated[str, Param("strain measure", choices=("finite", "corotational"))] = "finite",
     duration: Annotated[float, Param("simulated time", unit="s", low=0.0, exclusive=True)] = 80e-6,
-    time_step_scale: Annotated[float, Param("share of the stable time step at the start", low=0.0, high=1.0)] = 0.3,
+    time_step_scale: Annotated[float, Param("share of the stable time step at the start", low=0.0, high=1.0)] = 0.1,
     section: Annotated[int, Param("cells along each side of the core, even", low=2)] = 4,
     ring: Annotated[int, Param("cells from the core to the surface", low=1)] = 2,
     axial: Annotated[int, Param("cells along the bar", low=1)] = 36,

@@ -14,9 +14,7 @@ from warp_mca.solver import Solver  # noqa: E402
 element = "hex8r" if "hex8r" in sys.argv else "hex8"
 points, bricks, foot = taylor.mesh()
 rod = mca.Rod(radius=taylor.RADIUS, length=taylor.LENGTH, tip="flat", **taylor.CELLS)
-copper = mca.J2Bilinear(
-    E=taylor.E, nu=taylor.NU, rho=taylor.RHO, sigma_y=taylor.YIELD, E_t=taylor.E_T, beta=1.0
-)
+copper = mca.J2Bilinear(E=taylor.E, nu=taylor.NU, rho=taylor.RHO, sigma_y=taylor.YIELD, E_t=taylor.E_T, beta=1.0)
 scene = mca.Scene(
     name="taylor",
     bodies=(mca.Body(name="bar", geometry=rod, material=copper, element=element, kinematics="finite"),),
@@ -27,7 +25,9 @@ meshes = mesh(scene)
 v = 0.0 * points
 v[:, 0] = taylor.SPEED
 v[foot, 0] = 0.0
-solver = Solver(build_model(scene, meshes, {"bar": points}, {"bar": v}), device="cpu", precision="float64", dt=taylor.DT)
+solver = Solver(
+    build_model(scene, meshes, {"bar": points}, {"bar": v}), device="cpu", precision="float64", dt=taylor.DT
+)
 solver.compile()
 solver.start()
 begun = taylor.clock()

@@ -314,7 +314,7 @@ _FEET = (("held", 21.42, 7.22), ("free", 21.47, 7.38))  # with final length and 
 
 
 def _mushroom(setup: Setup, count: int, foot: str) -> tuple[float, float]:
-    """Final length, and radius of the foot [mm], with `count` cells along the bar and a sixth of them over its radius."""
+    """Final length and radius of the foot [mm], with `count` cells along the bar, a sixth as many over its radius."""
     shape = _Foot(0.0324, 0.0032)
     scale = setup.by_element(0.15, hex8r=0.12) * 24.0 / count
     mesh = {"axial": count, "section": count // 6, "ring": count // 12}
