@@ -199,7 +199,7 @@ def bar(across: int, along: int, law: str, held: bool, share: float = 0.6) -> tu
 
 def main() -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.taylor_axisymmetric", description="Taylor's test without warp_mca")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.taylor_axisymmetric")
     parser.add_argument("--cells", type=int, nargs="+", default=[4, 8, 16], help="over the radius")
     parser.add_argument("--law", choices=tuple(LAWS), default="multiplicative")
     parser.add_argument("--held", action="store_true", help="the foot stays on the wall")
