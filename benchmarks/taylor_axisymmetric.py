@@ -1,4 +1,4 @@
-"""Taylor's test without warp_mca: `python -m benchmarks.taylor_axisymmetric [--cells N] [--law LAW] [--held]`.
+"""Taylor's test, warp_mca left out: `python -m benchmarks.taylor_axisymmetric [--cells N] [--ratio N] [--law LAW] [--held]`.
 
 Axisymmetric 4-node elements, 2 x 2 points and mean dilatation as Simo, Taylor and Pister (1985), central differences,
 a step that follows the deformed mesh, float64. Three laws of J2 plasticity: `multiplicative`, F = F_e F_p with
@@ -201,11 +201,12 @@ def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.taylor_axisymmetric")
     parser.add_argument("--cells", type=int, nargs="+", default=[4, 8, 16], help="over the radius")
+    parser.add_argument("--ratio", type=int, default=9, help="cells along the bar for each over the radius")
     parser.add_argument("--law", choices=tuple(LAWS), default="multiplicative")
     parser.add_argument("--held", action="store_true", help="the foot stays on the wall")
     args = parser.parse_args()
     for cells in args.cells:
-        length, radius = bar(cells, 9 * cells, args.law, args.held)
+        length, radius = bar(cells, args.ratio * cells, args.law, args.held)
         print(f"{cells:3d} cells over the radius: length {1e3 * length:.3f} mm, foot {1e3 * radius:.3f} mm", flush=True)
 
 
