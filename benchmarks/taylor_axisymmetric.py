@@ -1,6 +1,6 @@
-"""Taylor's test, warp_mca left out: `python -m benchmarks.taylor_axisymmetric [--cells N] [--ratio N] [--law LAW] [--held]`.
+"""Taylor's test by axisymmetric elements without warp_mca: `python -m benchmarks.taylor_axisymmetric --help`.
 
-Axisymmetric 4-node elements, 2 x 2 points and mean dilatation as Simo, Taylor and Pister (1985), central differences,
+4-node elements, 2 x 2 points and mean dilatation as Simo, Taylor and Pister (1985), central differences,
 a step that follows the deformed mesh, float64. Three laws of J2 plasticity: `multiplicative`, F = F_e F_p with
 logarithmic elastic strain (Simo, Comput. Meth. Appl. Mech. Engng 99 (1992) 61); `hypoelastic`, Jaumann's rate of the
 stress by Hughes and Winget (Int. J. Numer. Meth. Engng 15 (1980) 1862); `additive` in logarithmic strain, which is

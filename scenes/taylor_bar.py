@@ -10,7 +10,7 @@ from warp_mca import Param
 # The foot flattens to a twentieth of its height, and more the finer its cells are.
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
-    "standard": {"section": 6, "ring": 3, "axial": 54, "time_step_scale": 0.065},
+    "standard": {"section": 6, "ring": 3, "axial": 54, "time_step_scale": 0.1},
     "fine": {"section": 8, "ring": 6, "axial": 81, "time_step_scale": 0.045},
 }
 

@@ -290,7 +290,7 @@ def taylor_bar(setup: Setup) -> list[Row]:
     counts = setup.choose((24,), (24, 36))
     rows = []
     for foot, final_length, final_radius in setup.choose(_FEET[:1], _FEET):
-        length, radius = zip(*(_mushroom(setup, count, foot) for count in counts), strict=True)
+        length, radius = zip(*(mushroom(setup, count, foot) for count in counts), strict=True)
         coarse = 24.0 / counts[-1]
         left = coarse * setup.by_element(0.10, hex8r=0.32), coarse * setup.by_element(0.22, hex8r=0.34, tet4=0.30)
         found = (("length", final_length, length), ("radius", final_radius, radius))
@@ -313,7 +313,7 @@ def taylor_bar(setup: Setup) -> list[Row]:
 _FEET = (("held", 21.42, 7.22), ("free", 21.47, 7.38))  # with final length and radius of the foot [mm]
 
 
-def _mushroom(setup: Setup, count: int, foot: str) -> tuple[float, float]:
+def mushroom(setup: Setup, count: int, foot: str) -> tuple[float, float]:
     """Final length and radius of the foot [mm], with `count` cells along the bar, a sixth as many over its radius."""
     shape = _Foot(0.0324, 0.0032)
     scale = setup.by_element(0.15, hex8r=0.12) * 24.0 / count
