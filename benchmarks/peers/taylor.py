@@ -21,7 +21,7 @@ DURATION = 80e-6
 STEPS = 4800  # a tenth of the first stable step: cells of the foot flatten
 DT = DURATION / STEPS
 CELLS = {"section": 4, "ring": 2, "axial": 24}
-FOOT = 7.22e-3  # radius on converged meshes [m]: Foulk et al., Int. J. Numer. Meth. Engng 122 (2021) 3845
+FOOT = 7.22e-3  # radius on converged meshes [m]: Foulk et al., Int. J. Numer. Meth. Engng (2021)
 
 
 def write_mesh(path: Path) -> None:
