@@ -202,6 +202,26 @@ def peers(rows: list[dict]) -> str:
     return table([*head, "error"], lines)
 
 
+def peers_taylor(rows: list[dict]) -> str:
+    """Rates and final shapes of Taylor's bar with other codes; ours comes first."""
+    if not rows:
+        return "Not measured yet."
+    lines = [
+        [
+            f"{r['code']} {r['version']}",
+            r["element"],
+            f"{r['wall']:.0f}",
+            figure(r["rate"] / 1e6),
+            f"{r['slower']:.1f}",
+            f"{1e3 * r['length']:.2f}",
+            f"{1e3 * r['radius']:.2f}",
+        ]
+        for r in rows
+    ]
+    head = ["code", "element", "time [s]", "M element-steps/s", "times slower than the first"]
+    return table([*head, "length [mm]", "foot's radius [mm]"], lines)
+
+
 def render(paths: list[Path]) -> str:
     """docs/performance.md: its text with tables in place of marks."""
     devices, rows = load(paths)
@@ -222,7 +242,8 @@ def render(paths: list[Path]) -> str:
         "memory": sections(devices, memory),
         "startup": startup(devices),
         "host": host(devices),
-        "peers": peers(rows),
+        "peers": peers([r for r in rows if r["problem"] != "taylor"]),
+        "peers_taylor": peers_taylor([r for r in rows if r["problem"] == "taylor"]),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
     for name, value in marks.items():
