@@ -104,11 +104,14 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def element_function(precision: str, plastic: bool, finite: bool) -> Any:
-    """The function (corners, displacements, e, m, law, yielded, history) -> corner forces; flows where `plastic`."""
+def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any, Any, Any]:
+    """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
+
+    A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
+    """
     t = scalars(precision)
-    R, mat33, mat43, mat73, mat83 = t.real, t.mat33, t.mat43, t.mat73, t.mat83
-    to_patterns, to_corners = pattern_functions(precision)
+    R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
+    _, to_corners = pattern_functions(precision)
     rotated = mean_frame(precision, finite)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     amplitudes, hourglass = hourglass_functions(precision)
@@ -119,24 +122,26 @@ def element_function(precision: str, plastic: bool, finite: bool) -> Any:
     dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
 
     @wp.func
-    def element_forces(
-        X: mat83,
-        u: mat83,
+    def shape_and_strain(x: mat73, du: mat73):
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
+        return b, R(VOLUME_SCALE) * scaled_volume, W, H, amplitudes(x, du, H_world, W)
+
+    @wp.func
+    def stress_and_flow(
+        x: mat73,
+        volume: R,
+        H: mat33,
+        q: mat43,
         e: int,
         m: int,
         law: wp.array2d(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
     ):
-        x = to_patterns(X)
-        du = to_patterns(u)
-        b, scaled_volume = mean_gradients(x)
-        H_world = mean_gradient_of(du, b, scaled_volume)
-        W, H = rotated(H_world)
-        volume = R(VOLUME_SCALE) * scaled_volume
         K = law[m, 0]
         G = law[m, 1]
-        q = amplitudes(x, du, H_world, W)
         kept = R(1.0)
         strain, N, d = deviator(H)
         S = R(2.0) * G * strain
@@ -163,8 +168,13 @@ def element_function(precision: str, plastic: bool, finite: bool) -> Any:
         if wp.static(plastic):
             if kept < R(1.0):
                 row = wp.static(_DISSIPATED)
-                history_out[row, e] = history_out[row, e] + (R(1.0) - kept * kept) * stored
-                Q = kept * Q
+                # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
+                history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
+            Q = kept * Q
+        return P, Q
+
+    @wp.func
+    def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
         for n in range(4):  # amplitudes feel the mean gradient too
             P = P - (R(0.125) / volume) * wp.outer(Q[n], x[3 + n])
         P = -R(VOLUME_SCALE) * (P + W * P)
@@ -175,7 +185,7 @@ def element_function(precision: str, plastic: bool, finite: bool) -> Any:
             f[3 + n] = f[3 + n] - R(0.125) * (Q[n] + W * Q[n])
         return to_corners(f)
 
-    return element_forces
+    return shape_and_strain, stress_and_flow, corner_forces
 
 
 @cache
@@ -184,7 +194,8 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     load_element = load_function(precision)
-    element_forces = element_function(precision, plastic, finite)
+    to_patterns, _ = pattern_functions(precision)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, finite)
     store_force = store_function(precision)
 
     # ln(1 + x) of small x needs the rounding that fast math gives away
@@ -202,9 +213,11 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        f = element_forces(Xl, ul, e, material[e], law, yielded_out, history_out)
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, volume, W, H, q = shape_and_strain(x, du)
+        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+        f = corner_forces(x, b, volume, W, P, Q)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hex8r import element_function
+from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.patch import (
     Patches,
     barrier,
@@ -16,6 +16,7 @@ from warp_mca.kernels.patch import (
     shared_functions,
     sum_functions,
 )
+from warp_mca.kernels.patterns import pattern_functions
 from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import PATCH, SLOTS
 
@@ -30,7 +31,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     force_pool, _ = shared_functions(precision)
     load_element, _ = load_functions(precision)
     keep_forces, sum_patch = sum_functions(precision)
-    element_forces = element_function(precision, plastic, False)
+    to_patterns, _ = pattern_functions(precision)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, False)
 
     bounds = (PATCH, 4 if plastic else 5) if precision == "mixed" else None
 
@@ -62,9 +64,11 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         load_patch(X, u, patches, patch, lane, pool)
         barrier()
         if e < end:
-            Xl = load_element(pool, 0, corners)
-            ul = load_element(pool, wp.static(SLOTS), corners)
-            keep_forces(forces, lane, element_forces(Xl, ul, e, material[e], law, yielded_out, history_out))
+            x = to_patterns(load_element(pool, 0, corners))
+            du = to_patterns(load_element(pool, wp.static(SLOTS), corners))
+            b, volume, W, H, q = shape_and_strain(x, du)
+            P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+            keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
         sum_patch(forces, patches, patch, lane, slot, force_out)
 
     return hex8r_patch_force
