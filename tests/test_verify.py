@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from warp_mca.elements import ELEMENTS
+from warp_mca.errors import GuardError
 from warp_mca.verify import Setup, cases
 from warp_mca.verify.case import Row
 from warp_mca.verify.mutations import MUTATIONS
@@ -72,3 +73,14 @@ def test_an_open_row_is_shown_and_does_not_fail_its_case():
 def test_a_case_without_elements_runs_once(capsys):
     assert [found.element for found in verify(["yield_surface"])] == ["none"]
     assert "(none, mixed)" in capsys.readouterr().out
+
+
+def test_a_case_whose_histories_cannot_be_read_is_not_met(capsys, monkeypatch):
+    def unreadable(setup):
+        return [][0]
+
+    case = dataclasses.replace(cases(["chain_energy"])[0], measure=unreadable)
+    monkeypatch.setattr("warp_mca.verify.runner.cases", lambda names: [case])
+    with pytest.raises(GuardError, match=r"not met: chain_energy \(hex8\)"):
+        verify(element="hex8")
+    assert "gave nothing to read: IndexError" in capsys.readouterr().out

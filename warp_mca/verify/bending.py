@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-import warp_mca as mca
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.vibration import fitted_frequencies
 from warp_mca.verify.waves import frequency
