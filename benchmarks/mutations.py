@@ -74,7 +74,7 @@ def caught(name: str, case: str) -> str:
         command = [sys.executable, "-m", "warp_mca", "verify", case, "--element", MUTATIONS[name].element]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     found = [line.strip() for line in done.stdout.splitlines() if line.startswith("  ")]
-    found = [line for line in found if line.endswith(": NOT MET") or line.startswith("stopped: ")]
+    found = [line for line in found if line.endswith(": NOT MET") or line.startswith(("stopped: ", "gave nothing"))]
     if done.returncode not in (0, 1) or bool(found) != (done.returncode == 1):
         raise RuntimeError(f"{case} with {name} broke down: {done.stdout}{done.stderr}")
     return found[0] if found else ""

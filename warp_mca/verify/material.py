@@ -71,7 +71,7 @@ def _reversed_yield(stress: Array, strain: Array) -> float:
     group="material",
     title="A block pulled and pushed follows the exact bilinear loop, whatever the hardening",
     reference="The one-dimensional response with kinematic, mixed and isotropic hardening: Simo and Hughes, "
-    "Computational Inelasticity (1998), section 1.3.",
+    "Computational Inelasticity (1998), chapter 1.",
     catches=("back_stress_high", "hardening_is_tangent", "beta_swapped"),
 )
 def cyclic(setup: Setup) -> list[Row]:
@@ -188,7 +188,7 @@ def _exact_course(F: Array, time: Array, beta: float) -> Array:
     group="material",
     title="Tension and shear, together or not, give the stress of the integrated rate equations",
     reference="The rates of J2 plasticity with mixed hardening, integrated by an explicit Runge-Kutta method in "
-    "float64: Simo and Hughes, Computational Inelasticity (1998), section 2.3.",
+    "float64: Simo and Hughes, Computational Inelasticity (1998), chapter 2.",
     catches=("back_stress_high", "stress_not_turned", "shear_modulus_doubled"),
 )
 def tension_torsion(setup: Setup) -> list[Row]:
