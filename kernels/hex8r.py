@@ -237,7 +237,8 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         if wp.static(plastic):
             if kept < R(1.0):
                 row = wp.static(_DISSIPATED)
-                history_out[row, e] = history_out[row, e] + (R(1.0) - kept * kept) * stored
+                # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
+                history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
                 Q = kept * Q
         P = P - (eighth / volume) * (wp.transpose(Q) * hx)
         Q = eighth * Q
