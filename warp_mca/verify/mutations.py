@@ -279,6 +279,12 @@ MUTATIONS: dict[str, Mutation] = {
         "return K * theta * log_over(theta) / (R(1.0) + theta)",
         "return K * theta * log_over(theta)",
     ),
+    "finite_shear_unscaled": Mutation(
+        "shear off the axes of a large strain is not scaled by the divided difference of the logarithm",
+        "kernels/kinematics.py",
+        "xy = T[0, 1] * log_over((d[0] - d[1]) / (one + d[1])) / (one + d[1])",
+        "xy = T[0, 1] / (one + d[0])",
+    ),
     "hourglass_feels_strain": Mutation(
         "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
         "kernels/hex8r.py",
