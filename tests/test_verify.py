@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import pytest
 
 from warp_mca.elements import ELEMENTS
-from warp_mca.verify import Setup, cases
+from warp_mca.errors import GuardError
+from warp_mca.verify import Setup, bending, cases
 from warp_mca.verify.case import Row
 from warp_mca.verify.mutations import MUTATIONS
 from warp_mca.verify.report import lines
@@ -72,3 +74,25 @@ def test_an_open_row_is_shown_and_does_not_fail_its_case():
 def test_a_case_without_elements_runs_once(capsys):
     assert [found.element for found in verify(["yield_surface"])] == ["none"]
     assert "(none, mixed)" in capsys.readouterr().out
+
+
+def test_a_case_whose_histories_cannot_be_read_is_not_met(capsys, monkeypatch):
+    def unreadable(setup):
+        return [][0]
+
+    case = dataclasses.replace(cases(["chain_energy"])[0], measure=unreadable)
+    monkeypatch.setattr("warp_mca.verify.runner.cases", lambda names: [case])
+    with pytest.raises(GuardError, match=r"not met: chain_energy \(none\)"):
+        verify(element="hex8")
+    assert "gave nothing to read: IndexError" in capsys.readouterr().out
+
+
+def test_ritz_speed_is_near_beam_theory_and_comes_down_to_its_limit():
+    h, bar = bending.SIDE, math.sqrt(bending.E / bending.RHO)
+    # Bernoulli's beam, c / c0 = k h / sqrt(12), but for the share (k h)^2 (1 + E / (kappa G)) / 24
+    assert bending.ritz(0.1 / h, h) / bar == pytest.approx(0.1 / math.sqrt(12.0), rel=0.01 * 4.1 / 24.0 * 1.1)
+    for kh, apart in ((0.1, 1e-5), (0.2, 1e-4), (0.63, 5e-4), (1.88, 2e-3)):
+        assert bending.ritz(kh / h, h) == pytest.approx(bending.timoshenko(kh / h, h), rel=apart)
+    speeds = [bending.ritz(1.88 / h, h, degree) for degree in (4, 6, 8, 10, 12)]
+    assert speeds == sorted(speeds, reverse=True)
+    assert speeds[-2] == pytest.approx(speeds[-1], rel=1e-6)

@@ -237,7 +237,8 @@ class Contact:
         slave: surface whose nodes are kept out of the master.
         master: surface of another body, or a rigid plane.
         mu: coefficient of friction [-]; 0 runs no friction at all.
-        penalty: factor f of the penalty stiffness k = f K A^2 / V [-].
+        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]; K grows without bound as nu nears 0.5, and 0.1
+            suits nu = 0.49 or 0.499.
         two_way: the master's nodes are also kept out of the slave's faces.
     """
 

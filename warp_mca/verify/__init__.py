@@ -13,7 +13,18 @@ from warp_mca.errors import bad_value
 from warp_mca.verify.case import CASES, Case, Level, Row, Setup, case
 
 GROUPS = ("elements", "material", "waves", "impact", "friction", "rigid")
-FILES = ("elements", "vibration", "material", "waves", "impact", "friction", "rigid", "hinges")
+FILES = (
+    "elements",
+    "vibration",
+    "material",
+    "large_strain",
+    "waves",
+    "bending",
+    "impact",
+    "friction",
+    "rigid",
+    "hinges",
+)
 
 __all__ = ["FILES", "GROUPS", "Case", "Level", "Row", "Setup", "case", "cases"]
 

@@ -45,6 +45,8 @@ def slid(time: NDArray[np.float64], slip: NDArray[np.float64]) -> float:
     The end itself is blurred by swings on the contact springs, in which the slip passes zero at any of several rows.
     """
     middle = (slip < 0.9 * slip[0]) & (slip > 0.1 * slip[0])
+    if np.count_nonzero(middle) < 2:
+        return math.nan
     slope, start = np.polyfit(time[middle], slip[middle], 1)
     return float(-start / slope)
 
@@ -53,7 +55,7 @@ def slid(time: NDArray[np.float64], slip: NDArray[np.float64]) -> float:
     group="friction",
     title="A block slides to rest: over v^2 / (2 mu g), in v / (mu g), and all its energy becomes heat",
     reference=COULOMB,
-    catches=("friction_limit_doubled", "slip_work_halved"),
+    catches=("friction_limit_doubled", "friction_limit_ignored", "slip_work_halved"),
 )
 def sliding_block(setup: Setup) -> list[Row]:
     """v = 1 m/s, mu = 0.3, g = 300 m/s^2, 0.2 kg; the speed is that of the centre of mass, out of the impulse."""
@@ -110,9 +112,10 @@ def block_on_belt(setup: Setup) -> list[Row]:
         of_block = impulse(result) / MASS
         caught = crossings(result.time, of_block, SPEED)
         time.append(slid(result.time, SPEED - of_block))
-        carried = (result.time > caught[0]) & (result.time < caught[2 * ((len(caught) - 1) // 2)])  # whole swings
-        speed.append(float(of_block[carried].mean()))
-        rest.append(float(result.F_t[carried].mean()))
+        first, last = caught[[0, 2 * ((len(caught) - 1) // 2)]] if len(caught) > 2 else (math.nan, math.nan)
+        carried = (result.time > first) & (result.time < last)  # whole swings
+        speed.append(float(of_block[carried].mean()) if carried.any() else math.nan)
+        rest.append(float(result.F_t[carried].mean()) if carried.any() else math.nan)
         heat.append(float(result["E_friction"][-1]))
         work.append(float(result.summary["energy"]["external_work"]))
     swing = "the block swings on its contact springs"
@@ -194,7 +197,7 @@ def friction_work(setup: Setup) -> list[Row]:
     group="friction",
     title="Sticking contact gives all of its elastic energy back, at the frequency of its springs",
     reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V a node, of equal faces.",
-    catches=("tangential_spring_halved", "friction_limit_halved"),
+    catches=("tangential_spring_halved", "tangential_spring_reversed", "friction_limit_halved"),
 )
 def sticking_energy(setup: Setup) -> list[Row]:
     """10 periods at 80 % of the limit of friction; height and so normal force are held."""
@@ -292,7 +295,7 @@ def stick_slip(setup: Setup) -> list[Row]:
     group="friction",
     title="A sphere that slides at first ends up rolling, at 5 v / 7 from 2 v / (7 mu g) on",
     reference=COULOMB + " Its moment of inertia is 2 m R^2 / 5.",
-    catches=("friction_limit_doubled",),
+    catches=("friction_limit_doubled", "friction_limit_ignored"),
 )
 def rolling_sphere(setup: Setup) -> list[Row]:
     """v = 10 m/s, mu = 0.3, g = 12000 m/s^2, R = 10 mm; half of the sphere is run, on a contact radius of 0.055 R.

@@ -16,7 +16,10 @@ from warp_mca.verify.report import Outcome, lines, write
 
 
 def outcome(case: Case, setup: Setup) -> Outcome:
-    """Run one case; what it raises is its failure. One that needs a module which is not installed is skipped."""
+    """Run one case; what it raises is its failure. One that needs a module which is not installed is skipped.
+
+    An engine in error can give histories that nothing can be read off: that, too, is the case's failure.
+    """
     if case.needs and find_spec(case.needs) is None:
         skipped = f"skipped, it needs {case.needs} (pip install {case.needs})"
         return Outcome(case=case, setup=setup, rows=(), failure=None, wall=0.0, skipped=skipped)
@@ -26,6 +29,8 @@ def outcome(case: Case, setup: Setup) -> Outcome:
         rows = tuple(case.measure(setup))
     except McaError as error:
         failure = f"stopped: {error}"
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        failure = f"gave nothing to read: {type(error).__name__}: {error}"
     return Outcome(case=case, setup=setup, rows=rows, failure=failure, wall=time.perf_counter() - begun)
 
 

@@ -1,0 +1,44 @@
+"""docs/verification.md and docs/mutations.json say what the code says, of every case, element and precision."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from warp_mca.elements import ELEMENTS
+from warp_mca.verify import cases
+from warp_mca.verify.mutations import MUTATIONS
+
+DOCS = Path(__file__).parent.parent / "docs"
+PAGE = (DOCS / "verification.md").read_text(encoding="utf-8")
+CASES = cases()
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_page_has_each_case(case):
+    section = PAGE.split(f"### {case.name}\n", 1)[1].split("\n## ", 1)[0].split("\n### ", 1)[0]
+    assert f"{case.title}. {case.reference}" in section
+    assert "Fails, as it must, when " + "; or ".join(MUTATIONS[name].what for name in case.catches) + "." in section
+    assert case.uses_elements or "| none | mixed | " in section
+    for element in ELEMENTS if case.uses_elements else []:
+        for precision in ("mixed", "float64"):
+            assert f"| {element} | {precision} | " in section, (element, precision)
+    assert "Tolerances: " in section
+
+
+def test_every_case_was_seen_to_fail():
+    rows = json.loads((DOCS / "mutations.json").read_text(encoding="utf-8"))
+    ran = {(row["error"], row["case"]): row for row in rows}
+    assert set(ran) == {(name, case.name) for case in CASES for name in case.catches}
+    assert {case for _, case in ran} == {case.name for case in CASES}
+    for (name, _), row in ran.items():
+        assert row["failed"], row
+        assert (row["what"], row["element"]) == (MUTATIONS[name].what, MUTATIONS[name].element), name
+        assert f"Warp {row['warp']}" in PAGE
+
+
+def test_page_says_at_its_head_whether_every_row_is_met():
+    missed = any(line.endswith("| NOT MET |") for line in PAGE.splitlines())
+    assert ("Every row is met but the OPEN ones" in PAGE) != missed

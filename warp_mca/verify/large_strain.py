@@ -1,0 +1,113 @@
+"""Owns the case of plastic flow at large strain, off the axes of the strain: logarithmic strain, integrated apart."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warp_mca as mca
+from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.material import NU, SIGMA_Y, SIZE, E, imposed_course, integrated_stress
+
+Array = NDArray[np.float64]
+
+STRAIN = 0.08  # greatest axial strain [-]
+
+
+def _slope_of_log(C: Array, T: Array) -> Array:
+    """Derivative of the logarithm at C in the direction T, shape (3, 3): the corner of a matrix of twice the size."""
+    from scipy.linalg import logm
+
+    both = np.block([[C, T], [np.zeros((3, 3)), C]])
+    return np.real(logm(both))[:3, 3:]
+
+
+def _exact_course(F: Array, time: Array, beta: float, every: int) -> tuple[Array, float]:
+    """Stress xx, yy, zz, xy, yz, xz [Pa] in every so many rows, and work per volume done in all of them [J/m^3].
+
+    T of the strain ln(F^T F) / 2, whose plastic part is taken off it, gives F (d ln C / d C : T) F^T / J.
+
+    Args:
+        F: deformation gradients, shape (row_count, 3, 3), in rows close enough for a cubic spline.
+        time: of the rows [s].
+        beta: share of isotropic hardening.
+        every: step between the rows of the stress.
+    """
+    K, identity = E / (3.0 * (1.0 - 2.0 * NU)), np.eye(3)
+    C = np.swapaxes(F, 1, 2) @ F
+    squared, axes = np.linalg.eigh(C)
+    strain = axes @ (0.5 * np.log(squared)[:, :, None] * np.swapaxes(axes, 1, 2))
+    growth = np.trace(strain, axis1=1, axis2=2)  # ln J
+    deviator = strain - growth[:, None, None] / 3.0 * identity
+    T = integrated_stress(deviator, time, beta)
+    work = float((0.5 * (T[1:] + T[:-1]) * np.diff(deviator, axis=0)).sum() + 0.5 * K * growth[-1] ** 2)
+    chosen = range(0, len(time), every)
+    kirchhoff = [
+        F[i] @ _slope_of_log(C[i], T[i] / SIGMA_Y) @ F[i].T * SIGMA_Y + K * growth[i] * identity for i in chosen
+    ]
+    stress = np.array(kirchhoff) / np.exp(growth[::every])[:, None, None]
+    return stress[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], work
+
+
+@cache
+def _known(course: str, rows: int) -> tuple[Array, float]:
+    """Stress [Pa] in the rows of a run, and work [J]: rates do not matter, so that all runs share them."""
+    scene = mca.make_scene("strained_element", course=course, strain=STRAIN, size=SIZE, duration=1.0)
+    time = np.linspace(0.0, 1.0, 10 * (rows - 1) + 1)
+    stress, work = _exact_course(imposed_course(scene, time), time, 0.5, every=10)
+    return stress, work * SIZE**3
+
+
+@case(
+    group="material",
+    title="Large tension and shear, in turn and around, give stress and work of the integrated rate equations",
+    reference="Logarithmic strain with additive plastic strain: Miehe, Apel and Lambrecht, Comput. Meth. Appl. Mech. "
+    "Engng 191 (2002) 5383; its rates integrated by an explicit Runge-Kutta method, the slope of the logarithm by "
+    "that of a block matrix.",
+    catches=("finite_shear_unscaled", "finite_pressure_unscaled", "logarithmic_strain_doubled"),
+)
+def large_tension_torsion(setup: Setup) -> list[Row]:
+    """One element, strain and shear / sqrt(3) up to 8 %, forty times the yield strain; beta = 0.5."""
+    durations = setup.choose((4e-3, 16e-3), (1e-3, 4e-3, 16e-3))
+    rows = []
+    for course in ("in turn", "around"):
+        worst, work, steps, known = [], [], [], 0.0
+        for duration in durations:
+            scene = setup.scene("strained_element", course=course, strain=STRAIN, size=SIZE, duration=duration)
+            bodies = tuple(dataclasses.replace(body, kinematics="finite") for body in scene.bodies)
+            scene = dataclasses.replace(scene, bodies=bodies)
+            result = setup.run(scene)
+            exact, known = _known(course, len(result.time))
+            worst.append(float(np.abs(result.paths[0].stress[:, 1] - exact).max()))
+            work.append(float(result.summary["energy"]["external_work"]))
+            steps.append(result.summary["dt"] / duration)
+        order = 0.9
+        left = (steps[-2] / steps[-1]) ** order - 1.0
+        why = f"what order {order:g} in the step leaves of the change from the run before: the direction of flow turns"
+        rows += [
+            Row(
+                quantity=f"greatest error of any component of stress, {course}",
+                exact=0.0,
+                measured=tuple(worst),
+                unit="Pa",
+                tolerance=(worst[-2] - worst[-1]) / left / SIGMA_Y,
+                why=why + "; a share of the yield stress",
+                scale=SIGMA_Y,
+                sizes=tuple(steps),
+                least_order=order,
+            ),
+            Row(
+                quantity=f"work of the driven nodes, {course}",
+                exact=known,
+                measured=tuple(work),
+                unit="J",
+                tolerance=abs(work[-1] - work[-2]) / left / known,
+                why=why,
+                sizes=tuple(steps),
+                least_order=order,
+            ),
+        ]
+    return rows
