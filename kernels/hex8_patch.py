@@ -181,6 +181,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     ):
         lane = wp.tid() % wp.static(PATCH)
         patch = wp.tid() // wp.static(PATCH)
+        if wp.static(plastic):
+            patch = patches.order[patch]
         start = patches.start[patch]
         forces = wp.array(ptr=force_pool(), shape=(24 * PATCH,), dtype=R)
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
@@ -217,6 +219,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         barrier()
         if wp.static(plastic):
             count = todo[0]
+            if lane == 0:
+                patches.flowing[patch] = count
             for turn in range((8 * count + wp.static(PATCH - 1)) // wp.static(PATCH)):
                 item = (turn * wp.static(PATCH) + lane) // 8
                 mine = todo[1 + wp.min(item, count - 1)]

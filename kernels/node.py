@@ -21,7 +21,7 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, each: bool = Fa
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
 
-    @wp.kernel(enable_backward=False, module="unique")
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
         inverse_mass: wp.array(dtype=wp.float64),
         offset: wp.array(dtype=wp.int32),

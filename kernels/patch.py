@@ -53,6 +53,8 @@ class Patches:
             (4, element_count), uint32.
         places: where the first components of the forces of a slot lie in shared memory, two in a word and eight at
             most, NOWHERE where there are fewer, shape (4, slot_count), uint32.
+        order: patch of each block of threads where elements may yield, shape (patch_count,), int32, else empty.
+        flowing: elements of each patch that took the return map last, shape (patch_count,), int32, else empty.
     """
 
     start: wp.array(dtype=wp.int32)
@@ -60,6 +62,8 @@ class Patches:
     node: wp.array(dtype=wp.int32)
     corner: wp.array2d(dtype=wp.uint32)
     places: wp.array2d(dtype=wp.uint32)
+    order: wp.array(dtype=wp.int32)
+    flowing: wp.array(dtype=wp.int32)
 
 
 @cache
@@ -75,6 +79,22 @@ def shared_functions(precision: str) -> tuple[Any, Any]:
     def exchange(value: R, mask: int) -> R: ...
 
     return force_pool, exchange
+
+
+@wp.kernel(enable_backward=False)
+def schedule(
+    flowing: wp.array(dtype=wp.int32),
+    ends_out: wp.array(dtype=wp.int32),
+    order_out: wp.array(dtype=wp.int32),
+):
+    """Patches in which elements yield from the front, others from the back; in which order does not matter."""
+    patch = wp.tid()
+    place = int(0)
+    if flowing[patch] > 0:
+        place = wp.atomic_add(ends_out, 0, 1)
+    else:
+        place = flowing.shape[0] - 1 - wp.atomic_add(ends_out, 1, 1)
+    order_out[place] = patch
 
 
 @wp.func

@@ -6,7 +6,7 @@ Only what a scene's paths and a run's recorders need is allocated and launched.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
@@ -115,11 +115,6 @@ class Output:
             "von_mises": self.volume_stress.von_mises,
             "plastic_strain": self.volume_stress.plastic,
         }
-
-    def kernels(self) -> list[Any]:
-        """One kernel of every module that a step with output needs."""
-        used = [stage.stress_kernel for stage in self.solver.elements]
-        return [output.nodal_stress, *used] if self.arrays else []
 
     def before_step(self, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""

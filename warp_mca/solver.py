@@ -26,9 +26,9 @@ import warp as wp
 
 from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
-from warp_mca.elements.stage import gather_lists
+from warp_mca.elements.stage import BLOCK_DIM, gather_lists
 from warp_mca.errors import bad_value
-from warp_mca.kernels import constraint, contact, ledger, node
+from warp_mca.kernels import constraint, contact, ledger, node, output
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
 from warp_mca.ledger import DRIVE_WORK, HOURGLASS, PASS, PASS_COLUMNS
@@ -156,7 +156,9 @@ class Solver:
             inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot, fixed_axes]
             inputs += [self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part]]
-            wp.launch(self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=128)
+            wp.launch(
+                self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM
+            )
 
         split(self.model.node_count, launch, NODES)
 
@@ -206,6 +208,10 @@ class Solver:
             self.output.after_step(needs)
         wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
 
+    def _schedule(self) -> None:
+        for stage in self.elements:
+            stage.schedule()
+
     def _launch(self, name: str, body: Callable[[], None]) -> None:
         """Replay the graph `name`, captured from `body` at its first use."""
         with wp.ScopedDevice(self.device):
@@ -226,16 +232,26 @@ class Solver:
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            for kernel in self._kernels():
-                wp.load_module(kernel.module, device=self.device)
+            for kernels, size in ((self._kernels(), None), (self._block_kernels(), BLOCK_DIM)):
+                modules = list(dict.fromkeys(kernel.module for kernel in kernels))
+                wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
         self.search()
 
+    @property
+    def _shows_stress(self) -> bool:
+        return bool(self.output and self.output.arrays)
+
     def _kernels(self) -> list[Any]:
-        kernels = [constraint.rejoin, ledger.sum_nodes, contact.sum_springs]
-        kernels += [self.integrate_kernel, self.sum_elements_kernel]
-        kernels += [kernel for stage in self.elements for kernel in stage.kernels()]
-        kernels += self.output.kernels() if self.output else []
+        """One of each module that is launched in blocks of Warp's own size."""
+        kernels = [constraint.rejoin, ledger.sum_nodes, contact.sum_springs, self.sum_elements_kernel]
+        kernels += [output.nodal_stress] if self._shows_stress else []
         return kernels + [kernel for stage in self.contacts for kernel in stage.kernels()]
+
+    def _block_kernels(self) -> list[Any]:
+        """Those that are launched in blocks of BLOCK_DIM: a module is compiled for one size."""
+        kernels = [kernel for stage in self.elements for kernel in stage.kernels()]
+        kernels += [stage.stress_kernel for stage in self.elements if self._shows_stress]
+        return [self.integrate_kernel, *kernels]
 
     def search(self) -> None:
         """Broad phase of every contact."""
@@ -263,6 +279,7 @@ class Solver:
             return
 
         def interval() -> None:
+            self._schedule()
             self._record_step(needs)
             for _ in range(count - 1):
                 self._step()
@@ -280,6 +297,7 @@ class Solver:
             return
 
         def steps() -> None:
+            self._schedule()
             for _ in range(count):
                 self._step()
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import warp as wp
 
-from warp_mca.elements.stage import ElementStage
+from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import patch
 from warp_mca.patches import PATCH, Patches, make_patches
 from warp_mca.threads import Split, whole
@@ -35,13 +36,28 @@ class PatchStage(ElementStage):
             setattr(self.patches, field.name, wp.array(getattr(host, field.name)))
         if points > 1:  # eight lanes read the points of one element together
             self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
+        listed = self.patch_count if block.plastic and points > 1 else 0
+        self.patches.order = wp.array(np.arange(listed, dtype=np.int32))
+        self.patches.flowing = wp.zeros(listed, dtype=wp.int32)
+        self.ends = wp.zeros(2, dtype=wp.int32)
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [*super().kernels(), patch.schedule]
+
+    def schedule(self) -> None:
+        """Patches in which elements yield come first, because they take longer."""
+        if len(self.patches.order):
+            self.ends.zero_()
+            inputs, outputs = [self.patches.flowing], [self.ends, self.patches.order]
+            wp.launch(patch.schedule, self.patch_count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
         inputs = [X, self.patches, self.material, law, u, self.slot]
         outputs = [self.yielded, self.history, force]
         threads = self.patch_count * PATCH
-        wp.launch(self.force_kernel, threads, inputs=inputs, outputs=outputs, block_dim=PATCH)
+        wp.launch(self.force_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 
 def hexahedral_stage(

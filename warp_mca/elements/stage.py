@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.kernels import j2
 from warp_mca.kernels.lanes import side_by_side
 from warp_mca.kernels.scalars import scalars
+from warp_mca.patches import PATCH
 from warp_mca.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 Index = NDArray[np.int32]
 
-BLOCK_DIM = 64  # threads of a block: these kernels fill the register file
+BLOCK_DIM = PATCH  # threads of a block, for all kernels of elements
 
 
 class ElementStage:
@@ -71,6 +72,9 @@ class ElementStage:
     def _history(self, part: slice) -> list[Any]:
         """Yield flags and history of a range of elements."""
         return [self.yielded[part], self.history[:, part]] if self.block.plastic else [self.yielded, self.history]
+
+    def schedule(self) -> None:
+        """Launched now and then, between steps: choose in which order the next ones compute elements."""
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.elements.element import Array
-from warp_mca.elements.stage import ElementStage
+from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import tet4
 from warp_mca.kernels.lanes import side_by_side
 from warp_mca.kernels.scalars import scalars
@@ -51,13 +51,13 @@ class Tet4Stage(ElementStage):
         """Forces of each element on its nodes [N], after the dilatation at the pressure nodes."""
 
         def grow(part: slice) -> None:
-            inputs = [X, self.conn[:, part], u]
-            wp.launch(self.dilation_kernel, part.stop - part.start, inputs=inputs, outputs=[self.growth[part]])
+            count, inputs = part.stop - part.start, [X, self.conn[:, part], u]
+            wp.launch(self.dilation_kernel, count, inputs=inputs, outputs=[self.growth[part]], block_dim=BLOCK_DIM)
 
         def average(part: slice) -> None:
             ends = self.offset[part.start : part.stop + 1]
-            inputs = [ends, self.element, self.inverse_volume[part], self.growth]
-            wp.launch(self.average_kernel, part.stop - part.start, inputs=inputs, outputs=[self.dilation[part]])
+            count, inputs = part.stop - part.start, [ends, self.element, self.inverse_volume[part], self.growth]
+            wp.launch(self.average_kernel, count, inputs=inputs, outputs=[self.dilation[part]], block_dim=BLOCK_DIM)
 
         split(self.count, grow, ELEMENTS)
         split(len(self.dilation), average, NODES)
