@@ -14,6 +14,8 @@ import warp as wp
 from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import NOWHERE, PATCH, SLOTS
 
+SCHEDULERS = 256  # threads that put patches in order
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -82,19 +84,33 @@ def shared_functions(precision: str) -> tuple[Any, Any]:
 
 
 @wp.kernel(enable_backward=False)
-def schedule(
-    flowing: wp.array(dtype=wp.int32),
-    ends_out: wp.array(dtype=wp.int32),
-    order_out: wp.array(dtype=wp.int32),
-):
-    """Patches in which elements yield from the front, others from the back; in which order does not matter."""
-    patch = wp.tid()
-    place = int(0)
-    if flowing[patch] > 0:
-        place = wp.atomic_add(ends_out, 0, 1)
-    else:
-        place = flowing.shape[0] - 1 - wp.atomic_add(ends_out, 1, 1)
-    order_out[place] = patch
+def count_flowing(flowing: wp.array(dtype=wp.int32), count_out: wp.array(dtype=wp.int32)):
+    """Patches in which elements yield, of each of SCHEDULERS equal runs of patches."""
+    run = wp.tid()
+    size = (flowing.shape[0] + wp.static(SCHEDULERS - 1)) // wp.static(SCHEDULERS)
+    count = int(0)
+    for patch in range(run * size, wp.min((run + 1) * size, flowing.shape[0])):
+        count += wp.min(flowing[patch], 1)
+    count_out[run] = count
+
+
+@wp.kernel(enable_backward=False)
+def schedule(flowing: wp.array(dtype=wp.int32), count: wp.array(dtype=wp.int32), order_out: wp.array(dtype=wp.int32)):
+    """Patches in which elements yield first, then the others, both as they lie: neighbours share what they read."""
+    run = wp.tid()
+    size = (flowing.shape[0] + wp.static(SCHEDULERS - 1)) // wp.static(SCHEDULERS)
+    before = int(0)
+    total = int(0)
+    for k in range(wp.static(SCHEDULERS)):
+        if k < run:
+            before += count[k]
+        total += count[k]
+    for patch in range(run * size, wp.min((run + 1) * size, flowing.shape[0])):
+        if flowing[patch] > 0:
+            order_out[before] = patch
+            before += 1
+        else:
+            order_out[total + patch - before] = patch
 
 
 @wp.func

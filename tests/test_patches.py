@@ -83,3 +83,20 @@ def test_elements_of_a_model_come_patch_by_patch():
     model = build_model(scene, meshes, {"bar": X}, {"bar": np.zeros_like(X)})
     np.testing.assert_array_equal(model.blocks[0].conn.T, meshes["bar"].hexahedra[model.element_of])
     assert not np.array_equal(model.element_of, np.arange(512))
+
+
+def test_patches_that_yield_come_first_in_the_order_they_lie_in():
+    """The kernels run on any device; a thread that starts behind the end has nothing to do."""
+    import warp as wp
+
+    from warp_mca.kernels import patch
+
+    for count in (1, 5, 256, 1000):
+        flowing = np.random.default_rng(count).integers(0, 4, count) * np.random.default_rng(7).integers(0, 2, count)
+        with wp.ScopedDevice("cpu"):
+            given, order = wp.array(flowing, dtype=wp.int32), wp.zeros(count, dtype=wp.int32)
+            sums = wp.zeros(patch.SCHEDULERS, dtype=wp.int32)
+            wp.launch(patch.count_flowing, patch.SCHEDULERS, inputs=[given], outputs=[sums])
+            wp.launch(patch.schedule, patch.SCHEDULERS, inputs=[given, sums], outputs=[order])
+        expected = np.concatenate([np.flatnonzero(flowing > 0), np.flatnonzero(flowing == 0)])
+        np.testing.assert_array_equal(order.numpy(), expected)

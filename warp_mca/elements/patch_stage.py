@@ -39,7 +39,7 @@ class PatchStage(ElementStage):
         listed = self.patch_count if block.plastic and points > 1 else 0
         self.patches.order = wp.array(np.arange(listed, dtype=np.int32))
         self.patches.flowing = wp.zeros(listed, dtype=wp.int32)
-        self.ends = wp.zeros(2, dtype=wp.int32)
+        self.flowing_of_run = wp.zeros(patch.SCHEDULERS, dtype=wp.int32)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -48,9 +48,11 @@ class PatchStage(ElementStage):
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
         if len(self.patches.order):
-            self.ends.zero_()
-            inputs, outputs = [self.patches.flowing], [self.ends, self.patches.order]
-            wp.launch(patch.schedule, self.patch_count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+            for kernel, inputs, output in (
+                (patch.count_flowing, [self.patches.flowing], self.flowing_of_run),
+                (patch.schedule, [self.patches.flowing, self.flowing_of_run], self.patches.order),
+            ):
+                wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
