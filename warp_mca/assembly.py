@@ -201,7 +201,8 @@ class Assembly:
             for part in self.cells:
                 mine = np.flatnonzero(plastic[part.index] == flag)
                 if len(mine):
-                    mine = mine[compact_order(self.X[part.conn[mine]], PATCH)]
+                    if part.element.corners == 8:  # tetrahedra are not computed by patches
+                        mine = mine[compact_order(self.X[part.conn[mine]], PATCH)]
                     index = part.index[mine]
                     blocks.append(
                         Block(
