@@ -127,15 +127,11 @@ def memory(data: Data) -> str:
         if r["size"] != sizes_of([q for q in rows if q["element"] == r["element"]])[-1]:
             continue
         at = at_ceiling(data, r)
-        pool = f"{r['pool_bytes'] / 2**30:.2f}" if "pool_bytes" in r else ""
-        words = [r["element"], r["precision"], r["case"], r["size"], figure(r["bytes_per_element"]), pool]
+        words = [r["element"], r["precision"], r["case"], r["size"], figure(r["bytes_per_element"])]
         words += [figure(r["step_bytes_per_element"]), figure(at["flop"]), figure(at["bytes"] / 1e9)]
         lines.append([*words, figure(at["flops"] / 1e9), f"{100 * at['share']:.0f} %"])
-    head = ["element", "precision", "case", "elements", "held [B/element]", "off the pool [GiB]"]
+    head = ["element", "precision", "case", "elements", "held [B/element]"]
     head += ["moved [B/element-step]", "operations/element-step", "moved [GB/s]", "computed [Gflop/s]", "of ceiling"]
-    if not any("pool_bytes" in r for r in rows):
-        head.pop(5)
-        lines = [line[:5] + line[6:] for line in lines]
     return table(head, lines)
 
 

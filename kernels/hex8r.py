@@ -228,7 +228,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
     t = scalars(precision)
-    R, mat33 = t.real, t.mat33
+    R, mat33, mat43 = t.real, t.mat33, t.mat43
     to_patterns, _ = pattern_functions(precision)
     rotated = mean_frame(precision, finite)
     load_element = load_function(precision)
@@ -272,8 +272,10 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
                 dissipated += history[wp.static(_DISSIPATED), e]
         q = amplitudes(x, du, H_world, W)
         if wp.static(plastic):
+            q_p = mat43()
             if yielded[e] != 0:
-                q = q - read_amplitudes(history, e)
+                q_p = read_amplitudes(history, e)
+            q = q - q_p
         _Q, stored = hourglass(q, x, volume, K, G)
         identity = wp.identity(n=3, dtype=R)
         elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))

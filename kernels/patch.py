@@ -3,7 +3,7 @@
 A patch is up to PATCH elements, one for each thread. Its nodes are read once, into shared memory; its forces are summed
 there in a fixed order, so that what leaves the multiprocessor is one force for each node of a patch in place of eight
 for each element, and runs repeat bit for bit. Shared memory, barriers and the exchange between the lanes of a warp are
-CUDA's own; nothing of this module runs on a CPU.
+CUDA's own; of this module only the order of patches can be found on a CPU.
 """
 
 from functools import cache
