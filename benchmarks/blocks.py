@@ -8,7 +8,6 @@ velocity worth naming, and velocities let the strain grow by 1e-6 of itself each
 
 from __future__ import annotations
 
-import gc
 from dataclasses import dataclass, replace
 from unittest.mock import patch
 
@@ -135,16 +134,6 @@ def motion(model: Model, case: Case) -> tuple[NDArray[np.float64], NDArray[np.fl
     return u, GROWTH / (STEP * model.stable.dt) * grow @ turn.T
 
 
-def pool(device: str) -> int | None:
-    """Memory in use out of the device's pool [B], or None where it has no pool."""
-    found = wp.get_device(device)
-    if not (found.is_cuda and found.is_mempool_enabled):
-        return None
-    gc.collect()
-    wp.synchronize_device(device)
-    return wp.get_mempool_used_mem_current(device)
-
-
 class Held:
     """A solver of the model as the case has it, with a state to return to.
 
@@ -152,12 +141,10 @@ class Held:
         solver: of warp_mca.
         case: what it has.
         precision: as in `warp_mca.run`.
-        pool_before: device memory in use before this was made [B], or None.
     """
 
     def __init__(self, model: Model, case: Case, device: str, precision: str) -> None:
         part = without(model, case)
-        self.pool_before = pool(device)
         self.case, self.device, self.precision = case, device, precision
         self.solver = Solver(part, device=device, precision=precision, dt=STEP * model.stable.dt)
         u, v = motion(model, case)

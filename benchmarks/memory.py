@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from benchmarks.blocks import Held, pool
+from benchmarks.blocks import Held
 from warp_mca.elements.patch_stage import PatchStage
 
 
@@ -60,12 +60,10 @@ def step_bytes(held: Held) -> float:
 
 
 def memory(held: Held) -> dict[str, float]:
-    """Bytes of the solver's arrays and of a step, for each element; what it took off the device's pool [B]."""
+    """Bytes of the solver's arrays and of a step, for each element."""
     count = held.solver.model.element_count
     found = {
         "bytes_per_element": sum(size(a) for a in arrays(held.solver, {}).values()) / count,
         "step_bytes_per_element": step_bytes(held) / count,
     }
-    if held.pool_before is not None:
-        found["pool_bytes"] = float(pool(held.device) or 0) - held.pool_before
     return found

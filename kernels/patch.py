@@ -96,7 +96,7 @@ def count_flowing(flowing: wp.array(dtype=wp.int32), count_out: wp.array(dtype=w
 
 @wp.kernel(enable_backward=False)
 def schedule(flowing: wp.array(dtype=wp.int32), count: wp.array(dtype=wp.int32), order_out: wp.array(dtype=wp.int32)):
-    """Patches in which elements yield first, then the others, both as they lie: neighbours share what they read."""
+    """Patches in which elements yield first, then the others, both in the order they lie in."""
     run = wp.tid()
     size = (flowing.shape[0] + wp.static(SCHEDULERS - 1)) // wp.static(SCHEDULERS)
     before = int(0)

@@ -122,4 +122,5 @@ def largest_eigenvalues(x: Array, K: Array, G: Array, mass: Array) -> Array:
 
 
 def chunks(count: int, size: int) -> list[slice]:
+    """Slices of `size` that cut `count` entries, the last one shorter."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]

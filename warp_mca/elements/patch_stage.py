@@ -39,11 +39,11 @@ class PatchStage(ElementStage):
         listed = self.patch_count if block.plastic and points > 1 else 0
         self.patches.order = wp.array(np.arange(listed, dtype=np.int32))
         self.patches.flowing = wp.zeros(listed, dtype=wp.int32)
-        self.flowing_of_run = wp.zeros(patch.SCHEDULERS, dtype=wp.int32)
+        self.flowing_of_run = wp.zeros(patch.SCHEDULERS if listed else 0, dtype=wp.int32)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [*super().kernels(), patch.schedule]
+        return [*super().kernels(), *([patch.schedule] if len(self.patches.order) else [])]
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
