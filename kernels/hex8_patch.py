@@ -1,7 +1,7 @@
-"""Owns the force kernel of `hex8` on a GPU, at small strain: one thread for each element, eight where it yields.
+"""Owns the force kernel of `hex8` on a GPU, at small strain: one thread for each element, four where it yields.
 
 Elements that have not yielded need neither history nor registers for it: a thread computes one as if it were elastic.
-Those that have, or that turn out to yield now, are listed; then eight lanes take each of them, a Gauss point apiece,
+Those that have, or that turn out to yield now, are listed; then four lanes take each of them, two Gauss points apiece,
 and exchange what the points of an element share.
 """
 
@@ -12,17 +12,30 @@ import warp as wp
 
 from warp_mca.kernels import j2
 from warp_mca.kernels.hex8 import elastic_function, stress_functions
-from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions, history_functions
+from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
 from warp_mca.kernels.patch import (
+    FORCES,
+    HEADS,
     Patches,
     barrier,
+    begin_turns,
+    copy_head,
+    copy_list,
+    copy_nodes,
+    copy_places,
     corners_of,
+    element_count,
+    head_ring,
     list_pool,
     load_functions,
-    load_patch,
+    node_list,
     node_pool,
+    places_pool,
+    row_functions,
     shared_functions,
     sum_functions,
+    wait_for_copies,
+    wait_for_older_copies,
     warp_barrier,
 )
 from warp_mca.kernels.scalars import scalars
@@ -35,10 +48,11 @@ _THIRD = 1.0 / 3.0
 
 @cache
 def lane_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions over the eight lanes of an element, whose bits 0, 1, 2 are xi, eta, zeta of corner and Gauss point.
+    """Functions over the four lanes of an element, whose bits 0 and 1 are xi and eta of corners and Gauss points.
 
-    (corner value -> edge vectors on the three Gauss lines through the lane's point, as `line_functions` has them;
-    edge forces at the points -> corner force, the transpose; sum of a scalar.)
+    A lane has the lower and the upper of both. (Corner values -> edge vectors on the Gauss lines through the lane's
+    points, as `line_functions` has them, along zeta one for both; edge forces at the points -> corner forces, the
+    transpose; sum of a scalar.)
     """
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
@@ -49,42 +63,108 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any]:
         return vec3(exchange(x[0], mask), exchange(x[1], mask), exchange(x[2], mask))
 
     @wp.func
-    def side(q: int, bit: int):
-        return wp.where((q >> bit) & 1 != 0, R(1.0), R(-1.0))
+    def to_point_lines(lower: vec3, upper: vec3, xi: R, eta: R):
+        r = R(LINE_RATIO)
+        s0 = lower + r * upper
+        s1 = upper + r * lower
+        d = upper - lower  # edge along zeta
+        o0 = other(s0, 2)
+        o1 = other(s1, 2)
+        e0 = eta * (s0 - o0)  # edge along eta
+        e1 = eta * (s1 - o1)
+        s0 = s0 + r * o0
+        s1 = s1 + r * o1
+        d = d + r * other(d, 2)
+        gx0 = xi * (s0 - other(s0, 1))
+        gx1 = xi * (s1 - other(s1, 1))
+        return gx0, gx1, e0 + r * other(e0, 1), e1 + r * other(e1, 1), d + r * other(d, 1)
 
     @wp.func
-    def to_point_lines(x: vec3, q: int):
+    def to_corners(Fx0: vec3, Fx1: vec3, Fy0: vec3, Fy1: vec3, Fz: vec3, xi: R, eta: R):
         r = R(LINE_RATIO)
-        o = other(x, 1)
-        d = side(q, 0) * (x - o)  # edge along xi
-        s = x + r * o
-        do = other(d, 2)
-        so = other(s, 2)
-        ds = d + r * do
-        sd = side(q, 1) * (s - so)  # edge along eta
-        ss = s + r * so
-        return ds + r * other(ds, 4), sd + r * other(sd, 4), side(q, 2) * (ss - other(ss, 4))
-
-    @wp.func
-    def to_corner(Fx: vec3, Fy: vec3, Fz: vec3, q: int):
-        r = R(LINE_RATIO)
-        x = Fx + r * other(Fx, 4)
-        y = Fy + r * other(Fy, 4)
-        z = -side(q, 2) * (Fz + other(Fz, 4))  # forces pull the ends of an edge together
-        mine = -side(q, 1)
-        x = x + r * other(x, 2)
+        x0 = -xi * (Fx0 + other(Fx0, 1))  # forces pull the ends of an edge together
+        x1 = -xi * (Fx1 + other(Fx1, 1))
+        y0 = eta * (Fy0 + r * other(Fy0, 1))
+        y1 = eta * (Fy1 + r * other(Fy1, 1))
+        z = Fz + r * other(Fz, 1)
         # each lane sends what its partner, on the other side, adds
-        y = (mine * y + z) + other(-mine * y + r * z, 2)
-        mine = -side(q, 0)
-        return (mine * x + y) + other(-mine * x + r * y, 1)
+        s0 = (x0 - y0) + other(r * x0 + y0, 2)
+        s1 = (x1 - y1) + other(r * x1 + y1, 2)
+        z = z + r * other(z, 2)
+        return (s0 + r * s1) + z, (s1 + r * s0) - z
 
     @wp.func
     def lane_sum(value: R):
         value += exchange(value, 1)
-        value += exchange(value, 2)
-        return value + exchange(value, 4)
+        return value + exchange(value, 2)
 
-    return to_point_lines, to_corner, lane_sum
+    return to_point_lines, to_corners, lane_sum
+
+
+@cache
+def point_functions(precision: str) -> tuple[Any, Any, Any]:
+    """Functions of one Gauss point.
+
+    (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
+    stress of a point, and its history; forces of the edges.)
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    add_traction, symmetric_gradient = stress_functions(precision)
+    j2_return = j2.return_map(precision)
+    read_row, write_row = row_functions(precision, j2.HISTORY_SIZE)
+    row = wp.types.vector(j2.HISTORY_SIZE, R)
+    scale = LINE_SCALE**3
+
+    @wp.func
+    def shape_of_point(gx: vec3, gy: vec3, gz: vec3, lx: vec3, ly: vec3, lz: vec3):
+        b0 = wp.cross(gy, gz)
+        b1 = wp.cross(gz, gx)
+        b2 = wp.cross(gx, gy)
+        xx, yy, zz, xy, yz, xz = symmetric_gradient(lx, ly, lz, b0, b1, b2)
+        return b0, b1, b2, wp.dot(gx, b0), mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+
+    @wp.func
+    def stress_of_point(
+        sums: mat33,
+        det: R,
+        law: wp.array2d(dtype=R),
+        m: int,
+        q: int,
+        e: int,
+        valid: bool,
+        history_out: wp.array2d(dtype=R),
+    ):
+        """Direct `sums` are strains times det, the others twice that."""
+        shear = R(0.5) / det
+        direct = shear + shear
+        mean = R(_THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
+        xx = direct * (sums[0, 0] - mean)
+        yy = direct * (sums[1, 1] - mean)
+        zz = direct * (sums[2, 2] - mean)
+        xy = shear * sums[0, 1]
+        yz = shear * sums[1, 2]
+        xz = shear * sums[0, 2]
+        strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+        h = read_row(history_out, q * wp.static(j2.HISTORY_SIZE), e)
+        eps_p = mat33(h[0], h[2], h[4], h[2], h[1], h[3], h[4], h[3], -h[0] - h[1])
+        G = R(scale) * law[m, 1]
+        S, eps, p = j2_return(strain, eps_p, h[5], G, R(scale) * law[m, 2], R(scale) * law[m, 3], law[m, 4])
+        if valid and p > h[5]:
+            h = row(eps[0, 0], eps[1, 1], eps[0, 1], eps[1, 2], eps[0, 2], p)
+            write_row(h, q * wp.static(j2.HISTORY_SIZE), e, history_out)
+        return S
+
+    @wp.func
+    def force_of_edge(S: mat33, pressure: R, b: vec3):
+        return add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b, pressure * b)
+
+    return shape_of_point, stress_of_point, force_of_edge
+
+
+def resident(precision: str, plastic: bool) -> int:
+    """Blocks of threads that a multiprocessor holds, by their registers."""
+    return 4 if precision == "mixed" else 2
 
 
 @cache
@@ -93,22 +173,20 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     force_pool, _ = shared_functions(precision)
-    load_element, load_node = load_functions(precision)
-    keep_forces, sum_patch = sum_functions(precision)
+    load_element, load_corners = load_functions(precision)
+    clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
     elastic_forces = elastic_function(precision)
-    add_traction, symmetric_gradient = stress_functions(precision)
-    to_point_lines, to_corner, lane_sum = lane_functions(precision)
-    read_plastic_strain, write_plastic_strain = history_functions(precision)
-    j2_return = j2.return_map(precision)
+    to_point_lines, to_corners, lane_sum = lane_functions(precision)
+    shape_of_point, stress_of_point, force_of_edge = point_functions(precision)
     scale = LINE_SCALE**3
 
     @wp.func
     def flow(
         pool: wp.array(dtype=wp.vec3d),
         patches: Patches,
-        law: wp.array2d(dtype=R),
         e: int,
+        law: wp.array2d(dtype=R),
         m: int,
         thread: int,
         q: int,
@@ -116,56 +194,46 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Eight lanes, q = 0 to 7, compute element e, whose rotation W stands where its forces will."""
-        a = q ^ ((q >> 1) & 1)  # corners run around the faces
-        eps_p, p = read_plastic_strain(history_out, q, e)
-        x = load_node(pool, 0, patches, e, a)
-        d = load_node(pool, wp.static(SLOTS), patches, e, a)
+        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
+        a = q ^ (q >> 1)  # corners run around the faces
+        x0, d0, x1, d1 = load_corners(pool, patches, e, a)
         W = mat33()
         for k in range(9):
             W[k // 3, k % 3] = force_out[k * wp.static(PATCH) + thread]
         warp_barrier()
-        local = d + wp.transpose(W) * (x + d)
-        gx, gy, gz = to_point_lines(x, q)
-        lx, ly, lz = to_point_lines(local, q)
-        b0 = wp.cross(gy, gz)
-        b1 = wp.cross(gz, gx)
-        b2 = wp.cross(gx, gy)
-        det = wp.dot(gx, b0)
-        xx, yy, zz, xy, yz, xz = symmetric_gradient(lx, ly, lz, b0, b1, b2)
-        trace = xx + yy + zz
-        pressure = R(scale) * law[m, 0] * lane_sum(trace) / lane_sum(det)
-        shear = R(0.5) / det
-        direct = shear + shear
-        mean = R(_THIRD) * trace
-        xx = direct * (xx - mean)
-        yy = direct * (yy - mean)
-        zz = direct * (zz - mean)
-        xy = shear * xy
-        yz = shear * yz
-        xz = shear * xz
-        strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-        G = R(scale) * law[m, 1]
-        S, eps_new, p_new = j2_return(strain, eps_p, p, G, R(scale) * law[m, 2], R(scale) * law[m, 3], law[m, 4])
-        if valid and p_new > p:
-            write_plastic_strain(history_out, q, e, eps_new, p_new)
-        Fx = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b0, pressure * b0)
-        Fy = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b1, pressure * b1)
-        Fz = add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b2, pressure * b2)
-        f = to_corner(Fx, Fy, Fz, q)
-        f = f + W * f
+        xi = wp.where(q % 2 != 0, R(1.0), R(-1.0))
+        eta = wp.where(q > 1, R(1.0), R(-1.0))
+        gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
+        T = wp.transpose(W)
+        lx0, lx1, ly0, ly1, lz = to_point_lines(d0 + T * (x0 + d0), d1 + T * (x1 + d1), xi, eta)
+        b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
+        b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
+        pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
+        S0 = stress_of_point(sums0, det0, law, m, q, e, valid, history_out)
+        S1 = stress_of_point(sums1, det1, law, m, q + 4, e, valid, history_out)
+        Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
+        f0, f1 = to_corners(
+            force_of_edge(S0, pressure, b00),
+            force_of_edge(S1, pressure, b10),
+            force_of_edge(S0, pressure, b01),
+            force_of_edge(S1, pressure, b11),
+            Fz,
+            xi,
+            eta,
+        )
+        f0 = f0 + W * f0
+        f1 = f1 + W * f1
         if valid:
             for i in range(3):
-                force_out[(3 * a + i) * wp.static(PATCH) + thread] = f[i]
+                force_out[(3 * a + i) * wp.static(PATCH) + thread] = f0[i]
+                force_out[(3 * (a + 4) + i) * wp.static(PATCH) + thread] = f1[i]
 
     # in float32, a few registers spilled cost less than a quarter of the threads
-    bounds = (PATCH, 4) if precision == "mixed" else None
-
     @wp.kernel(
         enable_backward=False,
         module="unique",
         grid_stride=False,
-        launch_bounds=bounds,
+        launch_bounds=(PATCH, resident(precision, plastic)),
         module_options={"fast_math": True},
     )
     def hex8_patch_force(
@@ -175,67 +243,82 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        stride: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         lane = wp.tid() % wp.static(PATCH)
-        patch = wp.tid() // wp.static(PATCH)
-        if wp.static(plastic):
-            patch = patches.order[patch]
-        start = patches.start[patch]
-        forces = wp.array(ptr=force_pool(), shape=(24 * PATCH,), dtype=R)
+        block = wp.tid() // wp.static(PATCH)
+        forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
+        pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
+        node = wp.array(ptr=node_list(), shape=(SLOTS,), dtype=wp.int32)
+        places = wp.array(ptr=places_pool(), shape=(SLOTS,), dtype=wp.vec4ui)
+        ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
+        clear_nowhere(forces, lane)
         if wp.static(plastic):
             if lane == 0:
                 todo[0] = 0
-        pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
-        e = start + lane
-        end = patches.start[patch + 1]
-        corners = corners_of(patches, wp.min(e, end - 1))
-        load_patch(X, u, patches, patch, lane, pool)
-        barrier()
-        if e < end:
+        begin_turns(X, u, patches, block, stride, lane, ring, node, pool)
+        head = ring[0]
+        corners = corners_of(patches, head, lane)
+        k = int(0)
+        while element_count(head) > 0:
+            copy_places(patches, head, lane, places)
+            e = head[0] + lane
             Xl = load_element(pool, 0, corners)
             ul = load_element(pool, wp.static(SLOTS), corners)
-            W = element_rotation(Xl, ul)
-            m = material[e]
-            flows = bool(False)
-            if wp.static(plastic):
-                flows = yielded_out[e] != 0
-            if not flows:
-                ul = local_displacement(Xl, ul, W)
-                f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], R(scale) * law[m, 1])
-                keep_forces(forces, lane, f)
+            coming = ring[(k + 1) % wp.static(HEADS)]
+            if wp.static(not plastic):
+                wait_for_older_copies()
+                barrier()
+                copy_nodes(X, u, coming, lane, node, pool)
+            if lane < element_count(head):
+                m = material[e]
+                W = element_rotation(Xl, ul)
+                flows = bool(False)
                 if wp.static(plastic):
-                    if R(1.5) * largest > R(scale * scale) * law[m, 2] * law[m, 2]:
-                        flows = bool(True)
-                        yielded_out[e] = 1
+                    flows = yielded_out[e] != 0
+                if not flows:
+                    ul = local_displacement(Xl, ul, W)
+                    f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], R(scale) * law[m, 1])
+                    keep_forces(forces, lane, f)
+                    if wp.static(plastic):
+                        if R(1.5) * largest > R(scale * scale) * law[m, 2] * law[m, 2]:
+                            flows = bool(True)
+                            yielded_out[e] = 1
+                if wp.static(plastic):
+                    if flows:
+                        todo[1 + wp.atomic_add(todo, 0, 1)] = lane
+                        for i in range(9):
+                            forces[i * wp.static(PATCH) + lane] = W[i // 3, i % 3]
             if wp.static(plastic):
-                if flows:
-                    todo[1 + wp.atomic_add(todo, 0, 1)] = lane
-                    for k in range(9):
-                        forces[k * wp.static(PATCH) + lane] = W[k // 3, k % 3]
-        barrier()
-        if wp.static(plastic):
-            count = todo[0]
-            if lane == 0:
-                patches.flowing[patch] = count
-            for turn in range((8 * count + wp.static(PATCH - 1)) // wp.static(PATCH)):
-                item = (turn * wp.static(PATCH) + lane) // 8
-                mine = todo[1 + wp.min(item, count - 1)]
-                flow(
-                    pool,
-                    patches,
-                    law,
-                    start + mine,
-                    material[start + mine],
-                    mine,
-                    lane % 8,
-                    item < count,
-                    history_out,
-                    forces,
-                )
-        sum_patch(forces, patches, patch, lane, slot, force_out)
+                barrier()
+                listed = todo[0]
+                if lane == 0:
+                    patches.flowing[head[3]] = listed
+                for turn in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
+                    item = (turn * wp.static(PATCH) + lane) // 4
+                    thread = todo[1 + wp.min(item, listed - 1)]
+                    mine = head[0] + thread
+                    valid = item < listed
+                    flow(pool, patches, mine, law, material[mine], thread, lane % 4, valid, history_out, forces)
+            corners = corners_of(patches, coming, lane)
+            wait_for_copies()
+            barrier()
+            if wp.static(plastic):  # the nodes of elements that yield were needed until now
+                copy_nodes(X, u, coming, lane, node, pool)
+            if lane == wp.static(PATCH - 1):
+                copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring)
+            copy_list(patches, ring[(k + 2) % wp.static(HEADS)], lane, node)
+            sum_patch(forces, places, head, lane, slot, force_out)
+            if wp.static(plastic):
+                if lane == 0:
+                    todo[0] = 0
+                wait_for_copies()
+                barrier()
+            head = coming
+            k += 1
 
     return hex8_patch_force

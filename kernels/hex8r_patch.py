@@ -7,20 +7,37 @@ import warp as wp
 
 from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.patch import (
+    FORCES,
+    HEADS,
     Patches,
     barrier,
+    begin_turns,
+    copy_head,
+    copy_list,
+    copy_nodes,
+    copy_places,
     corners_of,
+    element_count,
+    head_ring,
     load_functions,
-    load_patch,
+    node_list,
     node_pool,
+    places_pool,
     shared_functions,
     sum_functions,
+    wait_for_copies,
+    wait_for_older_copies,
 )
 from warp_mca.kernels.patterns import pattern_functions
 from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
+
+
+def resident(precision: str, plastic: bool) -> int:
+    """Blocks of threads that a multiprocessor holds, by their registers."""
+    return 4 if precision == "mixed" else 2
 
 
 @cache
@@ -30,17 +47,15 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
     load_element, _ = load_functions(precision)
-    keep_forces, sum_patch = sum_functions(precision)
+    clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, False)
-
-    bounds = (PATCH, 4 if plastic else 5) if precision == "mixed" else None
 
     @wp.kernel(
         enable_backward=False,
         module="unique",
         grid_stride=False,
-        launch_bounds=bounds,
+        launch_bounds=(PATCH, resident(precision, plastic)),
         module_options={"fast_math": True},
     )
     def hex8r_patch_force(
@@ -50,25 +65,44 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
+        stride: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         lane = wp.tid() % wp.static(PATCH)
-        patch = wp.tid() // wp.static(PATCH)
-        forces = wp.array(ptr=force_pool(), shape=(24 * PATCH,), dtype=R)
+        block = wp.tid() // wp.static(PATCH)
+        forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
-        e = patches.start[patch] + lane
-        end = patches.start[patch + 1]
-        corners = corners_of(patches, wp.min(e, end - 1))
-        load_patch(X, u, patches, patch, lane, pool)
-        barrier()
-        if e < end:
+        node = wp.array(ptr=node_list(), shape=(SLOTS,), dtype=wp.int32)
+        places = wp.array(ptr=places_pool(), shape=(SLOTS,), dtype=wp.vec4ui)
+        ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
+        clear_nowhere(forces, lane)
+        begin_turns(X, u, patches, block, stride, lane, ring, node, pool)
+        head = ring[0]
+        corners = corners_of(patches, head, lane)
+        k = int(0)
+        while element_count(head) > 0:
+            copy_places(patches, head, lane, places)
+            e = head[0] + lane
             x = to_patterns(load_element(pool, 0, corners))
             du = to_patterns(load_element(pool, wp.static(SLOTS), corners))
-            b, volume, W, H, q = shape_and_strain(x, du)
-            P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
-            keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
-        sum_patch(forces, patches, patch, lane, slot, force_out)
+            coming = ring[(k + 1) % wp.static(HEADS)]
+            wait_for_older_copies()
+            barrier()
+            copy_nodes(X, u, coming, lane, node, pool)
+            if lane < element_count(head):
+                b, volume, W, H, q = shape_and_strain(x, du)
+                P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+                keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
+            corners = corners_of(patches, coming, lane)
+            wait_for_copies()
+            barrier()
+            if lane == wp.static(PATCH - 1):
+                copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring)
+            copy_list(patches, ring[(k + 2) % wp.static(HEADS)], lane, node)
+            sum_patch(forces, places, head, lane, slot, force_out)
+            head = coming
+            k += 1
 
     return hex8r_patch_force

@@ -15,6 +15,13 @@ from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import NOWHERE, PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
+FORCES = NOWHERE + 2 * PATCH + 1  # of a patch in shared memory, with zeros behind them
+SLOTS_OF_THREAD = (SLOTS + PATCH - 1) // PATCH
+
+HEADS = 4  # patches whose heads are in shared memory: this one, two to come, and one on its way
+
+_COPY = """asm volatile("cp.async.ca.shared.global [%0], [%1], {size};" ::
+    "r"((unsigned)__cvta_generic_to_shared({to})), "l"({of}) : "memory");"""
 
 wp.set_module_options({"enable_backward": False})
 
@@ -31,6 +38,12 @@ def warp_barrier():
     ...
 
 
+@wp.func_native(f"__shared__ int pool[{SLOTS}]; return (unsigned long long)pool;")
+def node_list() -> wp.uint64:
+    """Address of shared memory for the nodes of a patch."""
+    ...
+
+
 @wp.func_native(f"__shared__ double pool[{6 * SLOTS}]; return (unsigned long long)pool;")
 def node_pool() -> wp.uint64:
     """Address of shared memory for reference positions, then displacements, of the slots of a patch."""
@@ -43,28 +56,41 @@ def list_pool() -> wp.uint64:
     ...
 
 
+@wp.func_native(f"__shared__ uint4 pool[{SLOTS}]; return (unsigned long long)pool;")
+def places_pool() -> wp.uint64:
+    """Address of shared memory for where the forces of the slots of a patch lie."""
+    ...
+
+
+@wp.func_native(f"__shared__ int4 pool[{HEADS}]; return (unsigned long long)pool;")
+def head_ring() -> wp.uint64:
+    """Address of shared memory for the heads of the patches that a block of threads computes next."""
+    ...
+
+
 @wp.struct
 class Patches:
     """Patches of a block of elements.
 
+    A head of a patch is its first element, its first slot, how many it has of both, (slots << 16) + elements, and its
+    number.
+
     Attributes:
-        start: first element of each patch, and the end of the last, shape (patch_count + 1,), int32.
-        slot_start: the same of its slots, one for each of its nodes, shape (patch_count + 1,), int32.
-        node: of each slot, shape (slot_count,), int32.
+        head: of each patch, shape (patch_count,), vec4i.
+        turn: the same in the order in which they are computed, shape (patch_count,), vec4i.
+        node: of each slot, one for each node of a patch, shape (slot_count,), int32.
         corner: slots of the corners of each element, counted from the first of its patch, two in a word, shape
             (4, element_count), uint32.
         places: where the first components of the forces of a slot lie in shared memory, two in a word and eight at
-            most, NOWHERE where there are fewer, shape (4, slot_count), uint32.
-        order: patch of each block of threads where elements may yield, shape (patch_count,), int32, else empty.
-        flowing: elements of each patch that took the return map last, shape (patch_count,), int32, else empty.
+            most, NOWHERE where there are fewer, shape (slot_count,), vec4ui.
+        flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where elastic.
     """
 
-    start: wp.array(dtype=wp.int32)
-    slot_start: wp.array(dtype=wp.int32)
+    head: wp.array(dtype=wp.vec4i)
+    turn: wp.array(dtype=wp.vec4i)
     node: wp.array(dtype=wp.int32)
     corner: wp.array2d(dtype=wp.uint32)
-    places: wp.array2d(dtype=wp.uint32)
-    order: wp.array(dtype=wp.int32)
+    places: wp.array(dtype=wp.vec4ui)
     flowing: wp.array(dtype=wp.int32)
 
 
@@ -74,7 +100,7 @@ def shared_functions(precision: str) -> tuple[Any, Any]:
     R = scalars(precision).real
     name = "float" if precision == "mixed" else "double"
 
-    @wp.func_native(f"__shared__ {name} pool[{24 * PATCH}]; return (unsigned long long)pool;")
+    @wp.func_native(f"__shared__ {name} pool[{FORCES}]; return (unsigned long long)pool;")
     def force_pool() -> wp.uint64: ...
 
     @wp.func_native("return __shfl_xor_sync(0xffffffffu, value, mask);")
@@ -95,7 +121,12 @@ def count_flowing(flowing: wp.array(dtype=wp.int32), count_out: wp.array(dtype=w
 
 
 @wp.kernel(enable_backward=False)
-def schedule(flowing: wp.array(dtype=wp.int32), count: wp.array(dtype=wp.int32), order_out: wp.array(dtype=wp.int32)):
+def schedule(
+    flowing: wp.array(dtype=wp.int32),
+    count: wp.array(dtype=wp.int32),
+    head: wp.array(dtype=wp.vec4i),
+    turn_out: wp.array(dtype=wp.vec4i),
+):
     """Patches in which elements yield first, then the others, both in the order they lie in."""
     run = wp.tid()
     size = (flowing.shape[0] + wp.static(SCHEDULERS - 1)) // wp.static(SCHEDULERS)
@@ -107,53 +138,176 @@ def schedule(flowing: wp.array(dtype=wp.int32), count: wp.array(dtype=wp.int32),
         total += count[k]
     for patch in range(run * size, wp.min((run + 1) * size, flowing.shape[0])):
         if flowing[patch] > 0:
-            order_out[before] = patch
+            turn_out[before] = head[patch]
             before += 1
         else:
-            order_out[total + patch - before] = patch
+            turn_out[total + patch - before] = head[patch]
+
+
+def _begin_copy(size: int, to: str, of: str) -> str:
+    return _COPY.format(size=size, to=to, of=of)
+
+
+@wp.func_native("\n".join(_begin_copy(8, f"&to.data[slot].c[{i}]", f"&value.data[k].c[{i}]") for i in range(3)))
+def copy_vector(value: wp.array(dtype=wp.vec3d), k: int, slot: int, to: wp.array(dtype=wp.vec3d)):
+    """Begin to copy an entry into shared memory, past the registers."""
+    ...
+
+
+@wp.func_native(_begin_copy(4, "&to.data[slot]", "&value.data[k]"))
+def copy_index(value: wp.array(dtype=wp.int32), k: int, slot: int, to: wp.array(dtype=wp.int32)):
+    """Begin to copy an entry into shared memory, past the registers."""
+    ...
+
+
+@wp.func_native(_begin_copy(16, "&to.data[slot]", "&value.data[k]"))
+def copy_words(value: wp.array(dtype=wp.vec4ui), k: int, slot: int, to: wp.array(dtype=wp.vec4ui)):
+    """Begin to copy an entry into shared memory, past the registers."""
+    ...
+
+
+@wp.func_native(_begin_copy(16, "&to.data[slot]", "&value.data[k]"))
+def copy_entry(value: wp.array(dtype=wp.vec4i), k: int, slot: int, to: wp.array(dtype=wp.vec4i)):
+    """Begin to copy an entry into shared memory, past the registers."""
+    ...
+
+
+@wp.func_native('asm volatile("cp.async.commit_group;" ::: "memory");')
+def close_group():
+    """What this thread began to copy since the last group is one."""
+    ...
+
+
+@wp.func_native('asm volatile("cp.async.wait_group 1;" ::: "memory");')
+def wait_for_older_copies():
+    """Wait until what this thread began to copy has arrived, but for its last group."""
+    ...
+
+
+@wp.func_native('asm volatile("cp.async.wait_all;" ::: "memory");')
+def wait_for_copies():
+    """Wait until what this thread began to copy has arrived."""
+    ...
 
 
 @wp.func
-def load_patch(
+def element_count(head: wp.vec4i):
+    """Elements of a patch."""
+    return head[2] & 0xFFFF
+
+
+@wp.func
+def slot_count(head: wp.vec4i):
+    """Slots of a patch."""
+    return head[2] >> 16
+
+
+@wp.func
+def copy_head(patches: Patches, block: int, stride: int, k: int, ring_out: wp.array(dtype=wp.vec4i)):
+    """Begin to copy the head of the k-th patch of a block of threads; beyond the last, that of an empty one.
+
+    Blocks that had the first patches, which take longest, come last from then on: some have one fewer.
+    """
+    turn = block
+    if k > 0:
+        turn = (k + 1) * stride - 1 - block
+    if turn < patches.turn.shape[0]:
+        copy_entry(patches.turn, turn, k % wp.static(HEADS), ring_out)
+    else:
+        ring_out[k % wp.static(HEADS)] = wp.vec4i()
+
+
+@wp.func
+def copy_list(patches: Patches, head: wp.vec4i, lane: int, node_out: wp.array(dtype=wp.int32)):
+    """Begin to copy the nodes of a patch into shared memory, where each thread reads its own."""
+    for k in range(wp.static(SLOTS_OF_THREAD)):
+        n = lane + k * wp.static(PATCH)
+        if n < slot_count(head):
+            copy_index(patches.node, head[1] + n, n, node_out)
+    close_group()
+
+
+@wp.func
+def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.array(dtype=wp.vec4ui)):
+    """Begin to copy where the forces of slots lie into shared memory, where each thread reads its own."""
+    for k in range(wp.static(SLOTS_OF_THREAD)):
+        n = lane + k * wp.static(PATCH)
+        if n < slot_count(head):
+            copy_words(patches.places, head[1] + n, n, places_out)
+    close_group()
+
+
+@wp.func
+def copy_nodes(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    head: wp.vec4i,
+    lane: int,
+    node: wp.array(dtype=wp.int32),
+    pool_out: wp.array(dtype=wp.vec3d),
+):
+    """Begin to copy positions and displacements of a patch into shared memory; its own list of nodes has arrived."""
+    for k in range(wp.static(SLOTS_OF_THREAD)):
+        n = lane + k * wp.static(PATCH)
+        if n < slot_count(head):
+            copy_vector(X, node[n], n, pool_out)
+            copy_vector(u, node[n], n + wp.static(SLOTS), pool_out)
+
+
+@wp.func
+def begin_turns(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     patches: Patches,
-    patch: int,
+    block: int,
+    stride: int,
     lane: int,
+    ring_out: wp.array(dtype=wp.vec4i),
+    node_out: wp.array(dtype=wp.int32),
     pool_out: wp.array(dtype=wp.vec3d),
 ):
-    """Positions and displacements of a patch into shared memory; wait before they are read."""
-    begin = patches.slot_start[patch]
-    count = patches.slot_start[patch + 1] - begin
-    # two slots for each thread at once, because a thread waits long for each: first for the node, then for its place
-    second = lane + wp.static(PATCH)
-    i = patches.node[begin + wp.min(lane, count - 1)]
-    j = patches.node[begin + wp.min(second, count - 1)]
-    X_i = X[i]
-    u_i = u[i]
-    X_j = X[j]
-    u_j = u[j]
-    if lane < count:
-        pool_out[lane] = X_i
-        pool_out[lane + wp.static(SLOTS)] = u_i
-    if second < count:
-        pool_out[second] = X_j
-        pool_out[second + wp.static(SLOTS)] = u_j
-    for n in range(lane + wp.static(2 * PATCH), count, wp.static(PATCH)):
-        k = patches.node[begin + n]
-        pool_out[n] = X[k]
-        pool_out[n + wp.static(SLOTS)] = u[k]
+    """Heads of the first patches, nodes of the first of them, and the list of those of the second."""
+    if lane < wp.static(HEADS - 1):
+        copy_head(patches, block, stride, lane, ring_out)
+    wait_for_copies()
+    barrier()
+    copy_list(patches, ring_out[0], lane, node_out)
+    wait_for_copies()
+    copy_nodes(X, u, ring_out[0], lane, node_out, pool_out)
+    wait_for_copies()
+    copy_list(patches, ring_out[1], lane, node_out)
+    barrier()
+
+
+@cache
+def row_functions(precision: str, size: int) -> tuple[Any, Any]:
+    """Functions that read and write `size` entries of a column, which lie side by side, two at a time."""
+    R = scalars(precision).real
+    name = "float" if precision == "mixed" else "double"
+    row = wp.types.vector(size, R)
+    pairs = f"{name}2* pair = ({name}2*)wp::address(value, first, column);"
+    read = "".join(f"row[{2 * k}] = pair[{k}].x; row[{2 * k + 1}] = pair[{k}].y; " for k in range(size // 2))
+    write = "".join(f"pair[{k}] = make_{name}2(row[{2 * k}], row[{2 * k + 1}]); " for k in range(size // 2))
+
+    @wp.func_native(f"wp::vec_t<{size}, {name}> row; {pairs} {read} return row;")
+    def read_row(value: wp.array2d(dtype=R), first: int, column: int) -> row: ...
+
+    @wp.func_native(f"{pairs} {write}")
+    def write_row(row: row, first: int, column: int, value: wp.array2d(dtype=R)): ...
+
+    return read_row, write_row
 
 
 @wp.func
-def corners_of(patches: Patches, e: int):
-    """Slots of an element's corners within its patch, two in a word."""
+def corners_of(patches: Patches, head: wp.vec4i, lane: int):
+    """Slots of the corners of a thread's element within its patch, two in a word; of any where it has none."""
+    e = head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0))
     return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
 
 
 @cache
 def load_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (an element's nodes relative to its first, as `hexahedron.load_function`; one node so)."""
+    """Functions: an element's nodes relative to its first, as `hexahedron.load_function`; two of its corners so."""
     t = scalars(precision)
     R, vec3, mat83 = t.real, t.vec3, t.mat83
     # Fast math would also flush what is too small, in three instructions for each number.
@@ -178,27 +332,27 @@ def load_functions(precision: str) -> tuple[Any, Any]:
         return local
 
     @wp.func
-    def load_node(pool: wp.array(dtype=wp.vec3d), first: int, patches: Patches, e: int, a: int):
-        word = patches.corner[a // 2, e]
-        slot = int(wp.where(a % 2 == 0, word & wp.uint32(0xFFFF), word >> wp.uint32(16)))
-        return difference(pool, first + slot, pool[first + int(patches.corner[0, e] & wp.uint32(0xFFFF))])
+    def load_corners(pool: wp.array(dtype=wp.vec3d), patches: Patches, e: int, a: int):
+        """Position and displacement of corner a, then of a + 4."""
+        origin = int(patches.corner[0, e] & wp.uint32(0xFFFF))
+        shift = wp.uint32(16 * (a % 2))
+        lower = int((patches.corner[a // 2, e] >> shift) & wp.uint32(0xFFFF))
+        upper = int((patches.corner[a // 2 + 2, e] >> shift) & wp.uint32(0xFFFF))
+        X = pool[origin]
+        u = pool[origin + wp.static(SLOTS)]
+        return (
+            difference(pool, lower, X),
+            difference(pool, lower + wp.static(SLOTS), u),
+            difference(pool, upper, X),
+            difference(pool, upper + wp.static(SLOTS), u),
+        )
 
-    return load_element, load_node
-
-
-@wp.func
-def places_of(patches: Patches, n: int, end: int):
-    """Where the forces of slot n lie, two places in a word."""
-    w = wp.vec4ui()
-    if n < end:
-        for k in range(4):
-            w[k] = patches.places[k, n]
-    return w
+    return load_element, load_corners
 
 
 @cache
-def sum_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that store the forces of a thread's element in shared memory, and that sum those of a patch."""
+def sum_functions(precision: str) -> tuple[Any, Any, Any]:
+    """Functions that prepare shared memory, store the forces of a thread's element there, and sum those of a patch."""
     t = scalars(precision)
     R, vec3, mat83 = t.real, t.vec3, t.mat83
 
@@ -210,32 +364,36 @@ def sum_functions(precision: str) -> tuple[Any, Any]:
                 pool_out[(3 * a + i) * wp.static(PATCH) + lane] = f[a, i]
 
     @wp.func
+    def clear_nowhere(pool_out: wp.array(dtype=R), lane: int):
+        """Zeros for the places of slots where fewer forces meet."""
+        if lane < 3:
+            pool_out[wp.static(NOWHERE) + lane * wp.static(PATCH)] = R(0.0)
+
+    @wp.func
     def add(pool: wp.array(dtype=R), places: wp.uint32, total: vec3):
         """Adds the forces at two places, the low and the high half of a word."""
         low = int(places & wp.uint32(0xFFFF))
         high = int(places >> wp.uint32(16))
-        if low != wp.static(NOWHERE):
-            total += vec3(pool[low], pool[low + wp.static(PATCH)], pool[low + wp.static(2 * PATCH)])
-        if high != wp.static(NOWHERE):
-            total += vec3(pool[high], pool[high + wp.static(PATCH)], pool[high + wp.static(2 * PATCH)])
-        return total
+        total += vec3(pool[low], pool[low + wp.static(PATCH)], pool[low + wp.static(2 * PATCH)])
+        return total + vec3(pool[high], pool[high + wp.static(PATCH)], pool[high + wp.static(2 * PATCH)])
 
     @wp.func
     def sum_patch(
-        pool: wp.array(dtype=R), patches: Patches, patch: int, lane: int, slot: int, force_out: wp.array(dtype=vec3)
+        pool: wp.array(dtype=R),
+        places: wp.array(dtype=wp.vec4ui),
+        head: wp.vec4i,
+        lane: int,
+        slot: int,
+        force_out: wp.array(dtype=vec3),
     ):
         """Forces of a patch into its slots, when all threads have kept theirs."""
-        n = patches.slot_start[patch] + lane
-        end = patches.slot_start[patch + 1]
-        w = places_of(patches, n, end)  # on its way while others still compute
-        barrier()
-        while n < end:
-            coming = places_of(patches, n + wp.static(PATCH), end)
-            total = vec3()
-            for k in range(4):
-                total = add(pool, w[k], total)
-            force_out[slot + n] = total
-            w = coming
-            n += wp.static(PATCH)
+        for k in range(wp.static(SLOTS_OF_THREAD)):
+            n = lane + k * wp.static(PATCH)
+            if n < slot_count(head):
+                w = places[n]
+                total = add(pool, w[0], vec3())
+                for i in range(1, 4):
+                    total = add(pool, w[i], total)
+                force_out[slot + head[1] + n] = total
 
-    return keep_forces, sum_patch
+    return clear_nowhere, keep_forces, sum_patch

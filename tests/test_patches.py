@@ -94,9 +94,10 @@ def test_patches_that_yield_come_first_in_the_order_they_lie_in():
     for count in (1, 5, 256, 1000):
         flowing = np.random.default_rng(count).integers(0, 4, count) * np.random.default_rng(7).integers(0, 2, count)
         with wp.ScopedDevice("cpu"):
-            given, order = wp.array(flowing, dtype=wp.int32), wp.zeros(count, dtype=wp.int32)
+            given, turn = wp.array(flowing, dtype=wp.int32), wp.zeros(count, dtype=wp.vec4i)
+            head = wp.array(np.arange(4 * count).reshape(-1, 4), dtype=wp.vec4i)
             sums = wp.zeros(patch.SCHEDULERS, dtype=wp.int32)
             wp.launch(patch.count_flowing, patch.SCHEDULERS, inputs=[given], outputs=[sums])
-            wp.launch(patch.schedule, patch.SCHEDULERS, inputs=[given, sums], outputs=[order])
+            wp.launch(patch.schedule, patch.SCHEDULERS, inputs=[given, sums, head], outputs=[turn])
         expected = np.concatenate([np.flatnonzero(flowing > 0), np.flatnonzero(flowing == 0)])
-        np.testing.assert_array_equal(order.numpy(), expected)
+        np.testing.assert_array_equal(turn.numpy(), head.numpy()[expected])

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 PATCH = 128  # elements of a patch, and threads of its block
-SLOTS = 320  # that a patch may have
+SLOTS = 304  # that a patch may have: as many as shared memory holds in float64
 SUMMED = 8  # forces that a slot sums at most
-NOWHERE = 0xFFFF
+NOWHERE = 24 * PATCH  # behind the forces of all corners, where shared memory holds nothing but zeros
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -72,6 +72,11 @@ class Patches:
     node: Index
     corner: NDArray[np.uint32]
     places: NDArray[np.uint32]
+
+    def heads(self) -> Index:
+        """First element, first slot, counts of both, (slots << 16) + elements, and number: shape (patch_count, 4)."""
+        counts = (np.diff(self.slot_start) << 16) + np.diff(self.start)
+        return np.column_stack([self.start[:-1], self.slot_start[:-1], counts, np.arange(len(counts))]).astype(np.int32)
 
 
 def _slots(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import patch
-from warp_mca.patches import PATCH, Patches, make_patches
+from warp_mca.patches import PATCH, make_patches
 from warp_mca.threads import Split, whole
 
 if TYPE_CHECKING:
@@ -30,36 +29,39 @@ class PatchStage(ElementStage):
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
         host = make_patches(block.conn, block.ends)
         self.slot_node = host.node
-        self.patch_count = len(host.start) - 1
+        heads = host.heads()
+        resident = wp.get_device().sm_count * patch_kernels.resident(precision, block.plastic)
+        self.blocks = min(len(heads), resident)  # each computes one patch after another
         self.patches = patch.Patches()
-        for field in fields(Patches):
-            setattr(self.patches, field.name, wp.array(getattr(host, field.name)))
-        if points > 1:  # eight lanes read the points of one element together
+        self.patches.head = wp.array(heads, dtype=wp.vec4i)
+        self.patches.turn = wp.array(heads, dtype=wp.vec4i)
+        self.patches.node = wp.array(host.node, dtype=wp.int32)
+        self.patches.corner = wp.array(host.corner, dtype=wp.uint32)
+        self.patches.places = wp.array(np.ascontiguousarray(host.places.T), dtype=wp.vec4ui)
+        if points > 1:  # lanes read the points of one element together
             self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
-        listed = self.patch_count if block.plastic and points > 1 else 0
-        self.patches.order = wp.array(np.arange(listed, dtype=np.int32))
-        self.patches.flowing = wp.zeros(listed, dtype=wp.int32)
-        self.flowing_of_run = wp.zeros(patch.SCHEDULERS if listed else 0, dtype=wp.int32)
+        self.scheduled = block.plastic and points > 1
+        self.patches.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
+        self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [*super().kernels(), *([patch.schedule] if len(self.patches.order) else [])]
+        return [*super().kernels(), *([patch.schedule] if self.scheduled else [])]
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
-        if len(self.patches.order):
+        if self.scheduled:
             for kernel, inputs, output in (
                 (patch.count_flowing, [self.patches.flowing], self.flowing_of_run),
-                (patch.schedule, [self.patches.flowing, self.flowing_of_run], self.patches.order),
+                (patch.schedule, [self.patches.flowing, self.flowing_of_run, self.patches.head], self.patches.turn),
             ):
                 wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.patches, self.material, law, u, self.slot]
+        inputs = [X, self.patches, self.material, law, u, self.slot, self.blocks]
         outputs = [self.yielded, self.history, force]
-        threads = self.patch_count * PATCH
-        wp.launch(self.force_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 
 def hexahedral_stage(
