@@ -1,8 +1,37 @@
-"""Owns what binds nodes after they were advanced freely: the revolute re-joint and prescribed velocities."""
+"""Owns what binds a node while it is advanced: the revolute re-joint and prescribed velocities."""
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
+
+# Role of a node: the lowest three bits are its axes at rest, then at most one of these.
+LEADS = 8  # is the first of a hinge's pair, whose thread moves both
+FOLLOWS = 16  # is the second
+DRIVEN = 32
+
+
+@wp.struct
+class Bonds:
+    """What binds the nodes of a model; empty arrays where nothing does.
+
+    Attributes:
+        role: of each node, shape (node_count,), uint8.
+        entry: pair of a leading node, or place of a driven node among all driven ones, shape (node_count,), int32.
+        second: node that each pair's first is tied to, or -1 where that is the ground, shape (pair_count,), int32.
+        mass: of each node [kg], shape (node_count,), float64.
+        begin, end: entries of the table of each driven node's axes, -1 where an axis is free, shape (driven_count,),
+            vec3i.
+        times, values: of all tables [s], [m/s], float64.
+    """
+
+    role: wp.array(dtype=wp.uint8)
+    entry: wp.array(dtype=wp.int32)
+    second: wp.array(dtype=wp.int32)
+    mass: wp.array(dtype=wp.float64)
+    begin: wp.array(dtype=wp.vec3i)
+    end: wp.array(dtype=wp.vec3i)
+    times: wp.array(dtype=wp.float64)
+    values: wp.array(dtype=wp.float64)
 
 
 @wp.func
@@ -11,37 +40,17 @@ def weighted_mean(m_a: wp.float64, a: wp.vec3d, m_b: wp.float64, b: wp.vec3d) ->
     return (m_a * a + m_b * b) / (m_a + m_b)
 
 
-@wp.kernel(enable_backward=False)
-def rejoin(
-    mass: wp.array(dtype=wp.float64),
-    first: wp.array(dtype=wp.int32),
-    second: wp.array(dtype=wp.int32),
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    impulse_out: wp.array(dtype=wp.vec3d),
-):
-    """Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground.
-
-    impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
-    """
-    k = wp.tid()
-    i = first[k]
-    j = second[k]
-    u = wp.vec3d()
-    v = wp.vec3d()
-    if j >= 0:
-        u = weighted_mean(mass[i], u_out[i], mass[j], u_out[j])
-        v = weighted_mean(mass[i], v_out[i], mass[j], v_out[j])
-        u_out[j] = u
-        v_out[j] = v
-    impulse_out[k] = impulse_out[k] + mass[i] * (v - v_out[i])
-    u_out[i] = u
-    v_out[i] = v
+@wp.func
+def count_impulse(k: int, m: wp.float64, v: wp.vec3d, free: wp.vec3d, impulse_out: wp.array(dtype=wp.vec3d)):
+    """impulse_out [N s] sums the impulse that the joint gave to each pair's first node, which was free to take `free`."""
+    impulse_out[k] = impulse_out[k] + m * (v - free)
 
 
 @wp.func
 def table_value(times: wp.array(dtype=wp.float64), values: wp.array(dtype=wp.float64), a: int, b: int, t: wp.float64):
     """Linear interpolation in the entries [a, b) of a table, constant beyond its ends."""
+    if b == a + 1:
+        return values[a]
     if t <= times[a]:
         return values[a]
     for k in range(a + 1, b):
@@ -51,43 +60,38 @@ def table_value(times: wp.array(dtype=wp.float64), values: wp.array(dtype=wp.flo
     return values[b - 1]
 
 
-@wp.kernel(enable_backward=False)
-def prescribe(
-    mass: wp.array(dtype=wp.float64),
-    node: wp.array(dtype=wp.int32),
-    axis: wp.array(dtype=wp.int32),
-    table: wp.array(dtype=wp.int32),
-    table_offset: wp.array(dtype=wp.int32),
-    times: wp.array(dtype=wp.float64),
-    values: wp.array(dtype=wp.float64),
-    step: wp.array(dtype=wp.int32),
+@wp.func
+def drive(
+    k: int,
+    m: wp.float64,
     dt: wp.float64,
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    work_out: wp.array(dtype=wp.float64),
-    work_after_out: wp.array(dtype=wp.float64),
+    bonds: Bonds,
+    free: wp.vec3d,
+    work_out: wp.array(dtype=wp.vec3d),
+    work_after_out: wp.array(dtype=wp.vec3d),
+    clock_out: wp.array(dtype=wp.int32),
 ):
-    """Set v(n+1/2) from a table at its own time, and sum the work that this puts in.
+    """v(n+1/2) of a node whose driven axes take theirs from a table at its own time; sums the work that this puts in.
 
     The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
-    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step.
+    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each driven node counts its own steps
+    in clock_out, so that no thread waits for another.
     """
-    k = wp.tid()
-    i = node[k]
-    c = axis[k]
-    t = (wp.float64(step[0]) + wp.float64(0.5)) * dt
-    target = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t)
-    # one component alone: other threads drive the others of this node
-    free = v_out[i][c]
-    v_out[i][c] = target
-    u_out[i][c] = u_out[i][c] + dt * (target - free)
-    before = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t - dt)
-    half_impulse = wp.float64(0.5) * mass[i] * (target - free)
-    work_out[k] = work_after_out[k] + half_impulse * before
-    work_after_out[k] = work_out[k] + half_impulse * target
-
-
-@wp.kernel(enable_backward=False)
-def advance_clock(step_out: wp.array(dtype=wp.int32)):
-    """Count the step; launched with one thread, and only in scenes with tables over time."""
-    step_out[0] = step_out[0] + 1
+    t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
+    clock_out[k] = clock_out[k] + 1
+    begin = bonds.begin[k]
+    end = bonds.end[k]
+    v = free
+    work = work_after_out[k]
+    after = work
+    for c in range(3):
+        if begin[c] >= 0:
+            target = table_value(bonds.times, bonds.values, begin[c], end[c], t)
+            before = table_value(bonds.times, bonds.values, begin[c], end[c], t - dt)
+            half_impulse = wp.float64(0.5) * m * (target - free[c])
+            v[c] = target
+            work[c] = work[c] + half_impulse * before
+            after[c] = work[c] + half_impulse * target
+    work_out[k] = work
+    work_after_out[k] = after
+    return v
