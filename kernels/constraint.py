@@ -1,33 +1,32 @@
-"""Owns what binds a node while it is advanced: the revolute re-joint and prescribed velocities."""
+"""Owns how bound nodes are advanced: pairs in a revolute joint, and nodes with prescribed velocities."""
+
+from functools import cache
+from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.node import gather_function, hold
+from warp_mca.kernels.scalars import scalars
 
-# Role of a node: the lowest three bits are its axes at rest, then at most one of these.
-LEADS = 8  # is the first of a hinge's pair, whose thread moves both
-FOLLOWS = 16  # is the second
-DRIVEN = 32
+wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
 class Bonds:
-    """What binds the nodes of a model; empty arrays where nothing does.
+    """What binds the nodes of a model.
 
     Attributes:
-        role: of each node, shape (node_count,), uint8.
-        entry: pair of a leading node, or place of a driven node among all driven ones, shape (node_count,), int32.
-        second: node that each pair's first is tied to, or -1 where that is the ground, shape (pair_count,), int32.
-        mass: of each node [kg], shape (node_count,), float64.
+        first, second: nodes of each tied pair, second -1 where that is the ground, shape (pair_count,), int32.
+        node: driven nodes, shape (driven_count,), int32.
         begin, end: entries of the table of each driven node's axes, -1 where an axis is free, shape (driven_count,),
             vec3i.
         times, values: of all tables [s], [m/s], float64.
     """
 
-    role: wp.array(dtype=wp.uint8)
-    entry: wp.array(dtype=wp.int32)
+    first: wp.array(dtype=wp.int32)
     second: wp.array(dtype=wp.int32)
-    mass: wp.array(dtype=wp.float64)
+    node: wp.array(dtype=wp.int32)
     begin: wp.array(dtype=wp.vec3i)
     end: wp.array(dtype=wp.vec3i)
     times: wp.array(dtype=wp.float64)
@@ -38,12 +37,6 @@ class Bonds:
 def weighted_mean(m_a: wp.float64, a: wp.vec3d, m_b: wp.float64, b: wp.vec3d) -> wp.vec3d:
     """Mass-weighted mean of two vectors: the common velocity that keeps their momentum."""
     return (m_a * a + m_b * b) / (m_a + m_b)
-
-
-@wp.func
-def count_impulse(k: int, m: wp.float64, v: wp.vec3d, free: wp.vec3d, impulse_out: wp.array(dtype=wp.vec3d)):
-    """impulse_out [N s] sums the impulse that the joint gave to each pair's first node, which was free to take `free`."""
-    impulse_out[k] = impulse_out[k] + m * (v - free)
 
 
 @wp.func
@@ -74,8 +67,8 @@ def drive(
     """v(n+1/2) of a node whose driven axes take theirs from a table at its own time; sums the work that this puts in.
 
     The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
-    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each driven node counts its own steps
-    in clock_out, so that no thread waits for another.
+    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each node counts its own steps in
+    clock_out, so that none waits for a common clock.
     """
     t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
     clock_out[k] = clock_out[k] + 1
@@ -95,3 +88,66 @@ def drive(
     work_out[k] = work
     work_after_out[k] = after
     return v
+
+
+@cache
+def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
+    """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
+
+    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground.
+    impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
+    """
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    vec3 = scalars(precision).vec3
+    gather = gather_function(precision, contact)
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def advance_bound(
+        mass: wp.array(dtype=wp.float64),
+        inverse_mass: wp.array(dtype=wp.float64),
+        offset: wp.array(dtype=wp.int32),
+        slot: wp.array(dtype=wp.int32),
+        role: wp.array(dtype=wp.uint8),
+        force: wp.array(dtype=vec3),
+        scene: Index,
+        gravity: Vector,
+        bonds: Bonds,
+        dt: wp.float64,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d),
+        impulse_out: wp.array(dtype=wp.vec3d),
+        work_out: wp.array(dtype=wp.vec3d),
+        work_after_out: wp.array(dtype=wp.vec3d),
+        clock_out: wp.array(dtype=wp.int32),
+    ):
+        k = wp.tid()
+        pairs = bonds.first.shape[0]
+        i = int(-1)
+        if k < pairs:
+            i = bonds.first[k]
+        else:
+            i = bonds.node[k - pairs]
+        total = gather(i, offset[i], offset[i + 1], slot, force, contact_force_out)
+        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
+        free = v_out[i] + dt * a
+        u_free = u_out[i] + dt * free
+        u = wp.vec3d()
+        v = wp.vec3d()
+        if k < pairs:
+            j = bonds.second[k]
+            if j >= 0:
+                total = gather(j, offset[j], offset[j + 1], slot, force, contact_force_out)
+                v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
+                u = weighted_mean(mass[i], u_free, mass[j], u_out[j] + dt * v_j)
+                v = weighted_mean(mass[i], free, mass[j], v_j)
+                u_out[j] = u
+                v_out[j] = v
+            impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
+        else:
+            v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
+            u = u_free + dt * (v - free)
+        u_out[i] = u
+        v_out[i] = v
+
+    return advance_bound

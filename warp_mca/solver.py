@@ -6,7 +6,8 @@
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
 | 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval |
 | 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | the same, where a scene has paths or a frame is due |
-| 4 gather and integrate, re-joint, prescribed motion | `integrate` | every step |
+| 4 gather and integrate | `integrate` | every step |
+| 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
 | 5 record of motion | `record_motion` | first step of each output interval |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
@@ -27,7 +28,7 @@ from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM, gather_lists
 from warp_mca.errors import bad_value
-from warp_mca.kernels import contact, ledger, node, output
+from warp_mca.kernels import constraint, contact, ledger, node, output
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
 from warp_mca.ledger import PASS, PASS_COLUMNS
@@ -102,7 +103,7 @@ class Solver:
         self.summers = SUMMERS if wp.get_device().is_cuda else 1
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
-        self.bonds = BondStage(model, self.layout, self.mass)
+        self.bonds = BondStage(model, self.layout)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)  # of the latest record
         columns = PASS + PASS_COLUMNS * len(self.contacts)
@@ -115,8 +116,9 @@ class Solver:
         each = bool((model.gravity != model.gravity[0]).any())
         self.node_gravity = self.gravity if each else wp.vec3d(*model.gravity[0])
         self.node_scene = per_scene(self.layout.nodes) if each else 0
-        bound = (self.bonds.fixed, self.bonds.hinged, self.bonds.driven)
-        self.integrate_kernel = node.integrate_kernel(self.precision, bool(self.contacts), *bound, each)
+        contact, fixed = bool(self.contacts), bool(model.fixed_axes.any())
+        self.integrate_kernel = node.integrate_kernel(self.precision, contact, fixed, self.bonds.count > 0, each)
+        self.bound_kernel = constraint.bound_kernel(self.precision, contact, each) if self.bonds.count else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
     def _forces(self, split: Split = whole, beside: Callable[[], None] | None = None) -> None:
@@ -133,20 +135,34 @@ class Solver:
         if forked and self.side:
             wp.wait_stream(self.side)
 
-    def _integrate(self, kick: float, drift: float, bonds: Any, split: Split = whole) -> None:
+    def _integrate(self, kick: float, drift: float, role: wp.array, split: Split = whole) -> None:
         def launch(part: slice) -> None:
-            inputs = [part.start, self.inverse_mass, self.offset, self.slot, self.force, self.node_scene]
-            inputs += [self.node_gravity, bonds, kick, drift]
-            outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
+            scene = 0 if isinstance(self.node_scene, int) else self.node_scene[part]
+            contact_force = self.contact_force[part] if self.contacts else self.contact_force
+            inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot]
+            inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
+            outputs = [contact_force, self.u[part], self.v[part]]
             wp.launch(
                 self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM
             )
 
         split(self.model.node_count, launch, NODES)
 
+    def _advance(self, split: Split = whole) -> None:
+        """Advance all nodes by a step, bound ones beside the others."""
+        if self.bound_kernel:
+            inputs = [self.mass, self.inverse_mass, self.offset, self.slot, self.bonds.role, self.force]
+            inputs += [self.node_scene, self.node_gravity, self.bonds.bonds, self.dt]
+            outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
+            with wp.ScopedStream(self.side):
+                wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        self._integrate(self.dt, self.dt, self.bonds.role, split)
+        if self.bound_kernel and self.side:
+            wp.wait_stream(self.side)
+
     def _step(self, split: Split = whole) -> None:
         self._forces(split)
-        self._integrate(self.dt, self.dt, self.bonds.bonds, split)
+        self._advance(split)
 
     def _sum(self, kernel: Any, inputs: list[Any], *outputs: wp.array) -> None:
         """Partial sums of each scene, by a block of threads each."""
@@ -167,9 +183,9 @@ class Solver:
             self.output.before_step(needs)
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
+        self._advance(split)
         with wp.ScopedStream(self.side):
             self._sum(self.sum_elements_kernel, [self.energy, self.element_ranges])
-        self._integrate(self.dt, self.dt, self.bonds.bonds, split)
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
         motion += [self.bonds.work, self.bonds.driven_first, self.point_node]
         self._sum(ledger.record_motion, motion, self.point_velocity)
@@ -221,7 +237,7 @@ class Solver:
         """Those that are launched in blocks of BLOCK_DIM: a module is compiled for one size."""
         kernels = [kernel for stage in self.elements for kernel in stage.kernels()]
         kernels += [stage.stress_kernel for stage in self.elements if self._shows_stress]
-        return [self.integrate_kernel, *kernels]
+        return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else []), *kernels]
 
     def search(self) -> None:
         """Broad phase of every contact."""
@@ -235,7 +251,7 @@ class Solver:
         Bodies are free of stress then, and none presses on another.
         """
         with wp.ScopedDevice(self.device):
-            self._integrate(-0.5 * self.dt, 0.0, self.bonds.free)
+            self._integrate(-0.5 * self.dt, 0.0, self.bonds.at_rest)
 
     def record_and_step(self, count: int, needs: frozenset[str] = frozenset()) -> None:
         """Record the state, with a frame of `needs`, then advance `count` steps.
