@@ -10,11 +10,9 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.scalars import scalars
+from warp_mca.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
 
 wp.set_module_options({"enable_backward": False})
-
-# Columns of a record that these kernels write.
-KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK = range(8)
 
 
 @wp.func

@@ -148,14 +148,17 @@ class Solver:
 
         split(self.model.node_count, launch, NODES)
 
+    def _advance_bound(self) -> None:
+        inputs = [self.mass, self.inverse_mass, self.offset, self.slot, self.bonds.role, self.force, self.node_scene]
+        inputs += [self.node_gravity, self.bonds.bonds, self.dt]
+        outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
+        wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
     def _advance(self, split: Split = whole) -> None:
-        """Advance all nodes by a step, bound ones beside the others."""
+        """Advance all nodes by a step, those that are bound beside the others."""
         if self.bound_kernel:
-            inputs = [self.mass, self.inverse_mass, self.offset, self.slot, self.bonds.role, self.force]
-            inputs += [self.node_scene, self.node_gravity, self.bonds.bonds, self.dt]
-            outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
             with wp.ScopedStream(self.side):
-                wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+                self._advance_bound()
         self._integrate(self.dt, self.dt, self.bonds.role, split)
         if self.bound_kernel and self.side:
             wp.wait_stream(self.side)
