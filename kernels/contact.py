@@ -285,7 +285,7 @@ def sum_springs(
     impulse = wp.vec3d()
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
-    begin, end = run_of(first[scene], first[scene + 1], k, partial_out.shape[3])
+    begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         energy += spring.energy[s]
         friction += spring.friction[s]

@@ -1,7 +1,8 @@
 """Owns the sums of the energy ledger, of each scene apart, in an order that is fixed.
 
-Entries of a scene are cut into `width` equal runs, whose sums a record keeps apart. On a GPU a block of threads walks
-a run, side by side, and sums in its own fixed order what its threads found; on a CPU a block is one thread.
+Entries of a scene are cut into equal runs, SUM_WIDTH at most, whose sums a record keeps apart. On a GPU a block of
+threads walks a run, side by side, and sums in a fixed order of its own what its threads found; on a CPU a block is one
+thread.
 """
 
 from functools import cache
@@ -14,11 +15,14 @@ from warp_mca.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBI
 
 wp.set_module_options({"enable_backward": False})
 
+SUM_WIDTH = 256  # runs of a scene at most
+RUN = 256  # entries of a run at least, while there are so many: one for each thread of a block
+
 
 @wp.func
-def run_of(first: int, end: int, k: int, width: int):
-    """Beginning and end of the k-th of `width` equal runs of the entries [first, end)."""
-    size = (end - first + width - 1) // width
+def run_of(first: int, end: int, k: int):
+    """Beginning and end of the k-th run of the entries [first, end), which is empty beyond the last."""
+    size = wp.max((end - first + wp.static(SUM_WIDTH - 1)) // wp.static(SUM_WIDTH), wp.static(RUN))
     begin = wp.min(first + k * size, end)
     return begin, wp.min(begin + size, end)
 
@@ -45,13 +49,12 @@ def record_motion(
     and the first driven node of each scene.
     """
     scene, k, lane = wp.tid()
-    width = partial_out.shape[3]
     r = row[0]
     g = gravity[scene]
     weightless = wp.dot(g, g) == wp.float64(0.0)
     kinetic = wp.float64(0.0)
     fall = wp.float64(0.0)
-    begin, end = run_of(first[scene], first[scene + 1], k, width)
+    begin, end = run_of(first[scene], first[scene + 1], k)
     for i in range(begin + lane, end, wp.block_dim()):
         m = mass[i]
         v_i = v[i]
@@ -59,7 +62,7 @@ def record_motion(
         if not weightless:
             fall += m * wp.dot(g, u[i] - dt * v_i)
     driven = wp.float64(0.0)
-    begin, end = run_of(driven_first[scene], driven_first[scene + 1], k, width)
+    begin, end = run_of(driven_first[scene], driven_first[scene + 1], k)
     for i in range(begin + lane, end, wp.block_dim()):
         w = drive_work[i]
         driven += w[0] + w[1] + w[2]
@@ -100,7 +103,7 @@ def sum_elements_kernel(precision: str) -> Any:
         count = int(0)
         for b in range(ranges.shape[1]):
             count += ranges[scene, b, 1] - ranges[scene, b, 0]
-        begin, end = run_of(0, count, k, partial_out.shape[3])
+        begin, end = run_of(0, count, k)
         for b in range(ranges.shape[1]):
             first = ranges[scene, b, 0]
             size = ranges[scene, b, 1] - first

@@ -6,9 +6,9 @@ import warp as wp
 
 import warp_mca as mca
 from warp_mca.kernels import ledger
+from warp_mca.kernels.ledger import RUN, SUM_WIDTH
 from warp_mca.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
 
-WIDTH = 256
 COLUMNS = 8
 
 
@@ -17,15 +17,15 @@ def offsets(*counts: int) -> np.ndarray:
 
 
 def record(kernel, scenes: int, inputs: list, *more: wp.array) -> np.ndarray:
-    """Row 1 of two, shape (scene_count, COLUMNS, WIDTH), not a number where nothing was written."""
-    partial = wp.full((2, scenes, COLUMNS, WIDTH), np.nan, dtype=wp.float64, device="cpu")
+    """Row 1 of two, shape (scene_count, COLUMNS, SUM_WIDTH), not a number where nothing was written."""
+    partial = wp.full((2, scenes, COLUMNS, SUM_WIDTH), np.nan, dtype=wp.float64, device="cpu")
     row = wp.array([1], dtype=wp.int32, device="cpu")
-    wp.launch(kernel, (scenes, WIDTH, 1), inputs=[row, *inputs], outputs=[partial, *more], device="cpu")
+    wp.launch(kernel, (scenes, SUM_WIDTH, 1), inputs=[row, *inputs], outputs=[partial, *more], device="cpu")
     assert np.isnan(partial.numpy()[0]).all()
     return partial.numpy()[1]
 
 
-@pytest.mark.parametrize("counts", [(1000,), (1, 255, 257, 5000)])
+@pytest.mark.parametrize("counts", [(1000,), (1, RUN - 1, RUN + 1, RUN * SUM_WIDTH + 5)])
 def test_motion(counts: tuple[int, ...]):
     rng = np.random.default_rng(0)
     first, driven = offsets(*counts), offsets(*(k // 3 for k in counts))

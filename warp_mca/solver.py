@@ -31,7 +31,7 @@ from warp_mca.errors import bad_value
 from warp_mca.kernels import constraint, contact, ledger, node, output
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
-from warp_mca.ledger import PASS, PASS_COLUMNS
+from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
 from warp_mca.model import Model
 from warp_mca.threads import ELEMENTS as RANGE
 from warp_mca.threads import NODES, Pool, Split, Stages, whole
@@ -39,8 +39,6 @@ from warp_mca.threads import NODES, Pool, Split, Stages, whole
 if TYPE_CHECKING:
     from warp_mca.output import Output
 
-SUM_WIDTH = 256  # partial sums of a record
-SUMMERS = 256  # threads of a GPU for each of them, which is Warp's own size of a block
 ROWS = 32  # records kept on the device before the host reads them
 
 
@@ -100,16 +98,18 @@ class Solver:
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         # contact and sums have few threads and wait long for memory
         self.side = wp.Stream() if wp.get_device().is_cuda else None
-        self.summers = SUMMERS if wp.get_device().is_cuda else 1
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
         self.bonds = BondStage(model, self.layout)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)  # of the latest record
         columns = PASS + PASS_COLUMNS * len(self.contacts)
-        self.partial = wp.zeros((ROWS, scenes, columns, SUM_WIDTH), dtype=wp.float64)
+        self.partial = wp.zeros((ROWS, scenes, columns, ledger.SUM_WIDTH), dtype=wp.float64)
+        self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written
         self.node_first = wp.array(self.layout.nodes, dtype=wp.int32)
         self.element_ranges = wp.array(self.layout.elements, dtype=wp.int32)
+        self.most_nodes = int(np.diff(self.layout.nodes).max())  # of any scene
+        self.most_elements = int(np.diff(self.layout.elements).sum(axis=(1, 2)).max())
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
         self.gravity = wp.array(model.gravity, dtype=wp.vec3d)
@@ -167,9 +167,10 @@ class Solver:
         self._forces(split)
         self._advance(split)
 
-    def _sum(self, kernel: Any, inputs: list[Any], *outputs: wp.array) -> None:
-        """Partial sums of each scene, by a block of threads each."""
-        threads = (self.layout.count, SUM_WIDTH, self.summers)
+    def _sum(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
+        """Sums of each run of entries, by a block of threads each; no scene has more entries than `largest`."""
+        runs = min(max(-(-largest // ledger.RUN), 1), ledger.SUM_WIDTH)
+        threads = (self.layout.count, runs, ledger.RUN if self.side else 1)
         wp.launch(kernel, threads, inputs=[self.row, *inputs], outputs=[self.partial, *outputs])
 
     def _begin_record(self) -> None:
@@ -177,7 +178,7 @@ class Solver:
         wp.copy(self.v_before, self.v)
         wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
         for stage in self.contacts:
-            self._sum(contact.sum_springs, [stage.column, stage.first, stage.spring])
+            self._sum(contact.sum_springs, int(np.diff(stage.slaves).max()), [stage.column, stage.first, stage.spring])
 
     def _record_step(self, needs: frozenset[str], split: Split = whole) -> None:
         """One step that also writes a record of the state at its start, and a frame of `needs`."""
@@ -188,10 +189,10 @@ class Solver:
             stage.energies(self.X, self.law, self.u, self.energy, split)
         self._advance(split)
         with wp.ScopedStream(self.side):
-            self._sum(self.sum_elements_kernel, [self.energy, self.element_ranges])
+            self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
         motion += [self.bonds.work, self.bonds.driven_first, self.point_node]
-        self._sum(ledger.record_motion, motion, self.point_velocity)
+        self._sum(ledger.record_motion, self.most_nodes, motion, self.point_velocity)
         if self.output:
             self.output.after_step(needs)
         if self.side:
