@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import warp as wp
 
-import warp_mca as mca
 from warp_mca.kernels import ledger
 from warp_mca.kernels.ledger import RUN, SUM_WIDTH
 from warp_mca.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
