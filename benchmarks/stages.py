@@ -23,8 +23,8 @@ def bodies(held: Held) -> dict[str, Callable[[], None]]:
     return {
         "element forces": elements,
         "contact": contact,
-        "gather and integrate": lambda: s._integrate(s.dt, s.dt),
-        "hinge and driven face": s._constrain,
+        "gather and integrate": lambda: s._integrate(s.dt, s.dt, s.bonds.role),
+        "hinge and driven face": s._advance_bound,
     }
 
 

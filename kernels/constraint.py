@@ -1,8 +1,36 @@
-"""Owns what binds nodes after they were advanced freely: the revolute re-joint and prescribed velocities."""
+"""Owns how bound nodes are advanced: pairs in a revolute joint, and nodes with prescribed velocities."""
+
+from functools import cache
+from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.node import gather_function, hold
+from warp_mca.kernels.scalars import scalars
+
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Bonds:
+    """What binds the nodes of a model.
+
+    Attributes:
+        first, second: nodes of each tied pair, second -1 where that is the ground, shape (pair_count,), int32.
+        node: driven nodes, shape (driven_count,), int32.
+        begin, end: entries of the table of each driven node's axes, -1 where an axis is free, shape (driven_count,),
+            vec3i.
+        times, values: of all tables [s], [m/s], float64.
+    """
+
+    first: wp.array(dtype=wp.int32)
+    second: wp.array(dtype=wp.int32)
+    node: wp.array(dtype=wp.int32)
+    begin: wp.array(dtype=wp.vec3i)
+    end: wp.array(dtype=wp.vec3i)
+    times: wp.array(dtype=wp.float64)
+    values: wp.array(dtype=wp.float64)
 
 
 @wp.func
@@ -11,37 +39,11 @@ def weighted_mean(m_a: wp.float64, a: wp.vec3d, m_b: wp.float64, b: wp.vec3d) ->
     return (m_a * a + m_b * b) / (m_a + m_b)
 
 
-@wp.kernel(enable_backward=False)
-def rejoin(
-    mass: wp.array(dtype=wp.float64),
-    first: wp.array(dtype=wp.int32),
-    second: wp.array(dtype=wp.int32),
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    impulse_out: wp.array(dtype=wp.vec3d),
-):
-    """Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground.
-
-    impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
-    """
-    k = wp.tid()
-    i = first[k]
-    j = second[k]
-    u = wp.vec3d()
-    v = wp.vec3d()
-    if j >= 0:
-        u = weighted_mean(mass[i], u_out[i], mass[j], u_out[j])
-        v = weighted_mean(mass[i], v_out[i], mass[j], v_out[j])
-        u_out[j] = u
-        v_out[j] = v
-    impulse_out[k] = impulse_out[k] + mass[i] * (v - v_out[i])
-    u_out[i] = u
-    v_out[i] = v
-
-
 @wp.func
 def table_value(times: wp.array(dtype=wp.float64), values: wp.array(dtype=wp.float64), a: int, b: int, t: wp.float64):
     """Linear interpolation in the entries [a, b) of a table, constant beyond its ends."""
+    if b == a + 1:
+        return values[a]
     if t <= times[a]:
         return values[a]
     for k in range(a + 1, b):
@@ -51,43 +53,101 @@ def table_value(times: wp.array(dtype=wp.float64), values: wp.array(dtype=wp.flo
     return values[b - 1]
 
 
-@wp.kernel(enable_backward=False)
-def prescribe(
-    mass: wp.array(dtype=wp.float64),
-    node: wp.array(dtype=wp.int32),
-    axis: wp.array(dtype=wp.int32),
-    table: wp.array(dtype=wp.int32),
-    table_offset: wp.array(dtype=wp.int32),
-    times: wp.array(dtype=wp.float64),
-    values: wp.array(dtype=wp.float64),
-    step: wp.array(dtype=wp.int32),
+@wp.func
+def drive(
+    k: int,
+    m: wp.float64,
     dt: wp.float64,
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    work_out: wp.array(dtype=wp.float64),
-    work_after_out: wp.array(dtype=wp.float64),
+    bonds: Bonds,
+    free: wp.vec3d,
+    work_out: wp.array(dtype=wp.vec3d),
+    work_after_out: wp.array(dtype=wp.vec3d),
+    clock_out: wp.array(dtype=wp.int32),
 ):
-    """Set v(n+1/2) from a table at its own time, and sum the work that this puts in.
+    """v(n+1/2) of a node whose driven axes take theirs from a table at its own time; sums the work that this puts in.
 
     The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
-    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step.
+    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each node counts its own steps in
+    clock_out, so that none waits for a common clock.
     """
-    k = wp.tid()
-    i = node[k]
-    c = axis[k]
-    t = (wp.float64(step[0]) + wp.float64(0.5)) * dt
-    target = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t)
-    # one component alone: other threads drive the others of this node
-    free = v_out[i][c]
-    v_out[i][c] = target
-    u_out[i][c] = u_out[i][c] + dt * (target - free)
-    before = table_value(times, values, table_offset[table[k]], table_offset[table[k] + 1], t - dt)
-    half_impulse = wp.float64(0.5) * mass[i] * (target - free)
-    work_out[k] = work_after_out[k] + half_impulse * before
-    work_after_out[k] = work_out[k] + half_impulse * target
+    t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
+    clock_out[k] = clock_out[k] + 1
+    begin = bonds.begin[k]
+    end = bonds.end[k]
+    v = free
+    work = work_after_out[k]
+    after = work
+    for c in range(3):
+        if begin[c] >= 0:
+            target = table_value(bonds.times, bonds.values, begin[c], end[c], t)
+            before = table_value(bonds.times, bonds.values, begin[c], end[c], t - dt)
+            half_impulse = wp.float64(0.5) * m * (target - free[c])
+            v[c] = target
+            work[c] = work[c] + half_impulse * before
+            after[c] = work[c] + half_impulse * target
+    work_out[k] = work
+    work_after_out[k] = after
+    return v
 
 
-@wp.kernel(enable_backward=False)
-def advance_clock(step_out: wp.array(dtype=wp.int32)):
-    """Count the step; launched with one thread, and only in scenes with tables over time."""
-    step_out[0] = step_out[0] + 1
+@cache
+def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
+    """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
+
+    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground.
+    impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
+    """
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    vec3 = scalars(precision).vec3
+    gather = gather_function(precision, contact)
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def advance_bound(
+        mass: wp.array(dtype=wp.float64),
+        inverse_mass: wp.array(dtype=wp.float64),
+        offset: wp.array(dtype=wp.int32),
+        slot: wp.array(dtype=wp.int32),
+        role: wp.array(dtype=wp.uint8),
+        force: wp.array(dtype=vec3),
+        scene: Index,
+        gravity: Vector,
+        bonds: Bonds,
+        dt: wp.float64,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d),
+        impulse_out: wp.array(dtype=wp.vec3d),
+        work_out: wp.array(dtype=wp.vec3d),
+        work_after_out: wp.array(dtype=wp.vec3d),
+        clock_out: wp.array(dtype=wp.int32),
+    ):
+        k = wp.tid()
+        pairs = bonds.first.shape[0]
+        i = int(-1)
+        if k < pairs:
+            i = bonds.first[k]
+        else:
+            i = bonds.node[k - pairs]
+        total = gather(i, offset[i], offset[i + 1], slot, force, contact_force_out)
+        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
+        free = v_out[i] + dt * a
+        u_free = u_out[i] + dt * free
+        u = wp.vec3d()
+        v = wp.vec3d()
+        if k < pairs:
+            j = bonds.second[k]
+            if j >= 0:
+                total = gather(j, offset[j], offset[j + 1], slot, force, contact_force_out)
+                v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
+                u = weighted_mean(mass[i], u_free, mass[j], u_out[j] + dt * v_j)
+                v = weighted_mean(mass[i], free, mass[j], v_j)
+                u_out[j] = u
+                v_out[j] = v
+            impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
+        else:
+            v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
+            u = u_free + dt * (v - free)
+        u_out[i] = u
+        v_out[i] = v
+
+    return advance_bound

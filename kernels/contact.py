@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.friction import release, stick_slip
+from warp_mca.kernels.ledger import run_of
 from warp_mca.kernels.projection import interpolate, project
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
 
@@ -269,23 +270,23 @@ def plane_kernel(friction: bool, each: bool) -> Any:
 def sum_springs(
     row: wp.array(dtype=wp.int32),
     column: int,
-    width: int,
     first: wp.array(dtype=wp.int32),
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves of each scene, which begin at `first`, into eight columns.
+    """Sums over the slaves of each scene, which begin at `first`, into eight columns, as `kernels.ledger` sums.
 
     What is summed over the record interval then starts afresh.
     """
-    scene, k = wp.tid()
+    scene, k, lane = wp.tid()
     energy = wp.float64(0.0)
     friction = wp.float64(0.0)
     drive = wp.float64(0.0)
     impulse = wp.vec3d()
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
-    for s in range(first[scene] + k, first[scene + 1], width):
+    begin, end = run_of(first[scene], first[scene + 1], k)
+    for s in range(begin + lane, end, wp.block_dim()):
         energy += spring.energy[s]
         friction += spring.friction[s]
         drive += spring.drive[s]
@@ -295,12 +296,21 @@ def sum_springs(
         spring.impulse[s] = wp.vec3d()
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
-    r = row[0]
-    partial_out[r, scene, column, k] = energy
-    partial_out[r, scene, column + 1, k] = friction
-    partial_out[r, scene, column + 2, k] = drive
-    partial_out[r, scene, column + 3, k] = impulse[0]
-    partial_out[r, scene, column + 4, k] = impulse[1]
-    partial_out[r, scene, column + 5, k] = impulse[2]
-    partial_out[r, scene, column + 6, k] = normal
-    partial_out[r, scene, column + 7, k] = stick
+    energy_sum = wp.tile_sum(wp.tile(energy))
+    friction_sum = wp.tile_sum(wp.tile(friction))
+    drive_sum = wp.tile_sum(wp.tile(drive))
+    x_sum = wp.tile_sum(wp.tile(impulse[0]))
+    y_sum = wp.tile_sum(wp.tile(impulse[1]))
+    z_sum = wp.tile_sum(wp.tile(impulse[2]))
+    normal_sum = wp.tile_sum(wp.tile(normal))
+    stick_sum = wp.tile_sum(wp.tile(stick))
+    if lane == 0:
+        r = row[0]
+        partial_out[r, scene, column, k] = energy_sum[0]
+        partial_out[r, scene, column + 1, k] = friction_sum[0]
+        partial_out[r, scene, column + 2, k] = drive_sum[0]
+        partial_out[r, scene, column + 3, k] = x_sum[0]
+        partial_out[r, scene, column + 4, k] = y_sum[0]
+        partial_out[r, scene, column + 5, k] = z_sum[0]
+        partial_out[r, scene, column + 6, k] = normal_sum[0]
+        partial_out[r, scene, column + 7, k] = stick_sum[0]

@@ -388,7 +388,8 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     read_plastic_strain, _ = history_functions(precision)
     plastic_energy = j2.plastic_energy(precision)
 
-    @wp.kernel(enable_backward=False, module="unique")
+    # logarithms need all their digits
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
     def hex8_energy(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
@@ -430,11 +431,11 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
                     eps_p, p = read_plastic_strain(history, g, e)
                     dissipated += det * plastic_energy(eps_p, p, law[m, 2], law[m, 3], law[m, 4])
             elastic += det * law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
-            largest = wp.max(largest, wp.sqrt(R(2.0) / R(3.0) * wp.ddot(strain, strain)))
+            largest = wp.max(largest, wp.ddot(strain, strain))
             smallest = wp.min(smallest, wp.determinant(identity + grad))
         energy_out[0, first + e] = elastic + volume * volumetric_energy(law[m, 0], dilation / volume)
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = largest
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         energy_out[4, first + e] = R(0.0)
         # an inverted element's Q is a reflection, which would hide the inversion in its own frame
         energy_out[3, first + e] = smallest * wp.determinant(identity + W)

@@ -240,7 +240,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     k = kinematics(precision, finite)
     dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
 
-    @wp.kernel(enable_backward=False, module="unique")
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
     def hex8r_energy(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),

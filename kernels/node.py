@@ -10,23 +10,64 @@ from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
+BOUND = 8  # in the role of a node, whose lowest three bits are its axes at rest: `kernels.constraint` advances it
+
 
 @cache
-def integrate_kernel(precision: str, contact: bool, fixed: bool, each: bool = False) -> Any:
+def gather_function(precision: str, contact: bool) -> Any:
+    """The function that sums the forces on a node, in slots [begin, end); with `contact` that force too, once."""
+    vec3 = scalars(precision).vec3
+
+    @wp.func
+    def gather(
+        i: int,
+        begin: int,
+        end: int,
+        slot: wp.array(dtype=wp.int32),
+        force: wp.array(dtype=vec3),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+    ):
+        total = wp.vec3d()
+        for j in range(begin, end):
+            f = force[slot[j]]
+            total += wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
+        if wp.static(contact):
+            fc = contact_force_out[i]
+            if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
+                total += fc
+                contact_force_out[i] = wp.vec3d()
+        return total
+
+    return gather
+
+
+@wp.func
+def hold(role: int, a: wp.vec3d):
+    """The acceleration without that of the axes at rest."""
+    for k in range(3):
+        if (role >> k) & 1 != 0:
+            a[k] = wp.float64(0.0)
+    return a
+
+
+@cache
+def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = False, each: bool = False) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in the fixed order of a compressed list, so that runs repeat bit for bit.
+    `fixed`: some axes are at rest; `bound`: some nodes are left to `constraint.bound_kernel`.
     With `each`, gravity differs between the scenes of a batch, and nodes know their scene.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
+    gather = gather_function(precision, contact)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
         inverse_mass: wp.array(dtype=wp.float64),
         offset: wp.array(dtype=wp.int32),
         slot: wp.array(dtype=wp.int32),
-        fixed_axes: wp.array(dtype=wp.int32),
+        role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
         scene: Index,
         gravity: Vector,
@@ -37,22 +78,13 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, each: bool = Fa
         v_out: wp.array(dtype=wp.vec3d),
     ):
         i = wp.tid()
-        total = wp.vec3d()
-        for j in range(offset[i], offset[i + 1]):
-            f = force[slot[j]]
-            total += wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
-        if wp.static(contact):
-            fc = contact_force_out[i]
-            if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
-                total += fc
-                contact_force_out[i] = wp.vec3d()
+        if wp.static(bound):
+            if int(role[i]) >= wp.static(BOUND):
+                return
+        total = gather(i, offset[i], offset[i + 1], slot, force, contact_force_out)
         a = inverse_mass[i] * total + of(gravity, of(scene, i))
         if wp.static(fixed):
-            axes = fixed_axes[i]
-            if axes != 0:
-                for k in range(3):
-                    if (axes >> k) & 1 != 0:
-                        a[k] = wp.float64(0.0)
+            a = hold(int(role[i]), a)
         v = v_out[i] + kick * a
         v_out[i] = v
         u_out[i] = u_out[i] + drift * v

@@ -88,6 +88,19 @@ def test_a_node_driven_along_all_axes_follows_all_of_them():
     np.testing.assert_allclose(device.paths[0].stress, host.paths[0].stress, rtol=1e-5, atol=1e3)
 
 
+def test_hinges_and_driven_axes_beside_the_other_nodes_give_the_figures_of_the_cpu():
+    from test_batch import driven
+
+    scene = driven(1.0, 0.3, (0.0, 1.0, 0.0))
+    host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))
+    impulse = np.array(host.summary["joint_impulse"]["A"])
+    np.testing.assert_allclose(device.summary["joint_impulse"]["A"], impulse, atol=1e-7 * np.abs(impulse).max())
+    for name in ("F_n_N", "E_kinetic", "E_plastic"):
+        assert device[name] == pytest.approx(host[name], abs=1e-7 * np.abs(host[name]).max())
+    work = host.summary["energy"]["external_work"]
+    assert device.summary["energy"]["external_work"] == pytest.approx(work, rel=1e-7)
+
+
 def test_elements_that_yield_are_listed_once_and_give_the_same_forces():
     scene = oblique()
     host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))

@@ -69,6 +69,33 @@ def test_spinning_bar_pulls_its_ground_hinge(monkeypatch):
     assert result.summary["energy_error"] < 1e-4
 
 
+def test_hinge_nodes_that_strike_a_wall_take_its_force_once(monkeypatch):
+    """Both bodies press there: the wall's impulse is the momentum that the pair loses, step for step."""
+    state = final_state(monkeypatch)
+    wall = mca.RigidPlane(point=(0.1, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
+    flying = {"material": SOFT, "velocity": (1.0, 0.0, 0.0)}
+    scene = mca.Scene(
+        name="pair",
+        bodies=(
+            mca.Body(name="a", geometry=BAR, **flying),
+            mca.Body(name="b", geometry=BAR, position=(0.1, 0.0, 0.0), **flying),
+        ),
+        joints=(mca.Revolute(name="A", body="a", at=(0.1, 0.0, 0.0), other="b"),),
+        contacts=tuple(
+            mca.Contact(slave=mca.Surface(body=body, nodes=nodes), master=wall)
+            for body, nodes in (("a", "xmax"), ("b", "xmin"))
+        ),
+        impact=mca.ImpactPhase(duration=1e-4, output_interval=1e-6),
+    )
+    result = mca.run(scene, precision="float64")
+    model = state["model"]
+    assert set(model.joint_first) < set(model.passes[0].slave)
+    assert set(model.joint_second) < set(model.passes[1].slave)
+    lost = model.mass @ (model.V - state["v"])
+    assert lost[0] > 0.1 * model.mass.sum()
+    assert result.F_n.sum() * result.time[1] == pytest.approx(lost[0], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("other", "at", "match"),
     [
@@ -137,6 +164,27 @@ def test_driven_nodes_follow_their_table_at_every_step(monkeypatch):
     driven = state["model"].X[:, 0] < 1e-4
     assert state["u"][driven][:, 1] == pytest.approx(0.5 * 1e4 * t**2, rel=1e-10)
     assert result.summary["energy_error"] < 1e-4
+
+
+def test_axes_of_a_node_follow_tables_of_their_own(monkeypatch):
+    """x by a ramp, y at constant speed, z at rest, all of one end; nothing else binds the bar."""
+    state = final_state(monkeypatch)
+    tables = {"x": ((0.0, 1.0), (0.0, 1e4)), "y": ((0.0,), (0.3,))}
+    scene = mca.Scene(
+        name="axes",
+        bodies=(mca.Body(name="bar", geometry=BAR, material=SOFT),),
+        fixed=(mca.Fixed(body="bar", nodes="xmin", axes="z"),),
+        prescribed=tuple(
+            mca.Prescribed(body="bar", nodes="xmin", axis=axis, times=times, velocities=velocities)
+            for axis, (times, velocities) in tables.items()
+        ),
+        impact=mca.ImpactPhase(duration=1e-4, output_interval=1e-5),
+    )
+    result = mca.run(scene)
+    t = 1e-4 + result.summary["dt"]
+    end = state["u"][state["model"].X[:, 0] < 1e-4]
+    assert end == pytest.approx(np.broadcast_to([0.5 * 1e4 * t**2, 0.3 * t, 0.0], end.shape), rel=1e-10, abs=0.0)
+    assert result.summary["energy_error"] < 1e-3
 
 
 def test_fixed_nodes_that_move_do_work_too(monkeypatch):

@@ -165,8 +165,12 @@ def launched(scene, monkeypatch):
 def test_scene_launches_only_what_it_has(monkeypatch):
     free = mca.Scene(**{**vars(bar()), "contacts": ()})
     base = launched(free, monkeypatch)
-    assert not {"rejoin", "prescribe", "touch_plane", "touch_surface", "react", "sum_springs"} & base
+    assert not {"advance_bound", "touch_plane", "touch_surface", "react", "sum_springs"} & base
     assert launched(bar(), monkeypatch) - base == {"touch_plane", "sum_springs"}
+    joint = mca.Revolute(name="O", body="bar", at=(0.0, 0.0, 0.0))
+    driven = mca.Prescribed(body="bar", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,))
+    for bound in ({"joints": (joint,)}, {"prescribed": (driven,)}):
+        assert launched(mca.Scene(**{**vars(free), **bound}), monkeypatch) - base == {"advance_bound"}
 
 
 def test_elastic_scene_keeps_no_history(monkeypatch):

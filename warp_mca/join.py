@@ -68,7 +68,6 @@ def join_models(models: Sequence[Model]) -> Model:
         stable=replace(stable, element=stable.element + int(elements[fastest])),
         batch=Layout(
             nodes=nodes,
-            driven=offsets([len(model.prescribed_node) for model in models]),
             hinges=offsets([len(model.hinges) for model in models]),
             elements=ranges,
         ),

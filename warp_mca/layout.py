@@ -21,14 +21,12 @@ class Layout:
 
     Attributes:
         nodes: first node of each scene, and the number of all, shape (scene_count + 1,), int32.
-        driven: first driven axis of each scene, and the number of all, shape (scene_count + 1,), int32.
         hinges: first hinge of each scene, and the number of all, shape (scene_count + 1,), int32.
         elements: first and end of each scene's elements in each block, in the model's order, shape
             (scene_count, block_count, 2), int32.
     """
 
     nodes: Index
-    driven: Index
     hinges: Index
     elements: Index
 
@@ -59,7 +57,6 @@ def layout_of(model: Model) -> Layout:
     ends = [[block.first, block.first + block.conn.shape[1]] for block in model.blocks]
     return Layout(
         nodes=offsets([model.node_count]),
-        driven=offsets([len(model.prescribed_node)]),
         hinges=offsets([len(model.hinges)]),
         elements=np.array([ends], dtype=np.int32),
     )

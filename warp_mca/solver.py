@@ -7,9 +7,8 @@
 | 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval |
 | 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | the same, where a scene has paths or a frame is due |
 | 4 gather and integrate | `integrate` | every step |
-| 5 re-joint | `rejoin` | every step, in scenes with joints |
-| 6 prescribed motion | `prescribe` | every step, in scenes with driven axes |
-| 7 record of motion | `sum_nodes`, `record_points` | first step of each output interval |
+| 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
+| 5 record of motion | `record_motion` | first step of each output interval |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
 between two searches raise a flag, which stops the run. On the CPU, stages 1 and 4 and the energies of stage 3 are cut
@@ -24,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.bonds import BondStage
 from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM, gather_lists
@@ -31,7 +31,7 @@ from warp_mca.errors import bad_value
 from warp_mca.kernels import constraint, contact, ledger, node, output
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
-from warp_mca.ledger import DRIVE_WORK, HOURGLASS, PASS, PASS_COLUMNS
+from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
 from warp_mca.model import Model
 from warp_mca.threads import ELEMENTS as RANGE
 from warp_mca.threads import NODES, Pool, Split, Stages, whole
@@ -39,9 +39,6 @@ from warp_mca.threads import NODES, Pool, Split, Stages, whole
 if TYPE_CHECKING:
     from warp_mca.output import Output
 
-SUM_WIDTH = 256  # partial sums of a record, in a fixed order
-SHARE = 16  # elements for each thread that sums them at first, while there are at most SPREAD threads for a partial sum
-SPREAD = 64
 ROWS = 32  # records kept on the device before the host reads them
 
 
@@ -93,68 +90,57 @@ class Solver:
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
         self.law = wp.array(model.law, dtype=t.real)
-        self.fixed_axes = wp.array(model.fixed_axes if model.fixed_axes.any() else model.fixed_axes[:0], dtype=wp.int32)
         self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
         offset, slot = gather_lists(self.elements, model.node_count)
         self.offset, self.slot = wp.array(offset, dtype=wp.int32), wp.array(slot, dtype=wp.int32)
         self.force = wp.zeros(len(slot), dtype=t.vec3)
         scenes, passes = self.layout.count, len(model.passes) // self.layout.count
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
-        # contact has few threads and waits long for memory
-        self.side = wp.Stream() if self.contacts and wp.get_device().is_cuda else None
+        # contact and sums have few threads and wait long for memory
+        self.side = wp.Stream() if wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
-        self._allocate_constraints()
+        self.bonds = BondStage(model, self.layout)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
-        self.row = wp.zeros(1, dtype=wp.int32)
+        self.row = wp.full(1, ROWS - 1, dtype=wp.int32)  # of the latest record
         columns = PASS + PASS_COLUMNS * len(self.contacts)
-        self.partial = wp.zeros((ROWS, scenes, columns, SUM_WIDTH), dtype=wp.float64)
-        largest = int((self.layout.elements[:, :, 1] - self.layout.elements[:, :, 0]).sum(axis=1).max())
-        spread = min(max(largest // (SHARE * SUM_WIDTH), 1), SPREAD)
-        self.wide = wp.zeros((scenes, HOURGLASS + 1, spread * SUM_WIDTH), dtype=wp.float64)
-        self.node_first, self.driven_first, self.element_ranges = (
-            wp.array(value, dtype=wp.int32) for value in (self.layout.nodes, self.layout.driven, self.layout.elements)
-        )
+        self.partial = wp.zeros((ROWS, scenes, columns, ledger.SUM_WIDTH), dtype=wp.float64)
+        self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written
+        self.node_first = wp.array(self.layout.nodes, dtype=wp.int32)
+        self.element_ranges = wp.array(self.layout.elements, dtype=wp.int32)
+        self.most_nodes = int(np.diff(self.layout.nodes).max())  # of any scene
+        self.most_elements = int(np.diff(self.layout.elements).sum(axis=(1, 2)).max())
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
         self.gravity = wp.array(model.gravity, dtype=wp.vec3d)
         each = bool((model.gravity != model.gravity[0]).any())
         self.node_gravity = self.gravity if each else wp.vec3d(*model.gravity[0])
         self.node_scene = per_scene(self.layout.nodes) if each else 0
-        fixed = bool(model.fixed_axes.any())
-        self.integrate_kernel = node.integrate_kernel(self.precision, bool(self.contacts), fixed, each)
+        contact, fixed = bool(self.contacts), bool(model.fixed_axes.any())
+        self.integrate_kernel = node.integrate_kernel(self.precision, contact, fixed, self.bonds.count > 0, each)
+        self.bound_kernel = constraint.bound_kernel(self.precision, contact, each) if self.bonds.count else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
-    def _allocate_constraints(self) -> None:
-        model = self.model
-        self.joint_first = wp.array(model.joint_first, dtype=wp.int32)
-        self.joint_second = wp.array(model.joint_second, dtype=wp.int32)
-        self.joint_impulse = wp.zeros(len(model.joint_first), dtype=wp.vec3d)
-        self.driven = [
-            wp.array(value, dtype=wp.int32)
-            for value in (model.prescribed_node, model.prescribed_axis, model.prescribed_table, model.table_offset)
-        ]
-        self.driven += [wp.array(value, dtype=wp.float64) for value in (model.table_time, model.table_value)]
-        self.drive_work = wp.zeros(len(model.prescribed_node), dtype=wp.float64)
-        self.drive_work_after = wp.zeros(len(model.prescribed_node), dtype=wp.float64)
-        self.step_count = wp.zeros(1, dtype=wp.int32)
-
-    def _forces(self, split: Split = whole) -> None:
-        with wp.ScopedStream(self.side):  # beside the elements, where there is a stream for it
-            for stage in self.contacts:
-                stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
+    def _forces(self, split: Split = whole, beside: Callable[[], None] | None = None) -> None:
+        """Contact and what is launched `beside`, in a stream of their own where there is one; elements."""
+        forked = self.contacts or beside
+        if forked:
+            with wp.ScopedStream(self.side):
+                for stage in self.contacts:
+                    stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
+                if beside:
+                    beside()
         for stage in self.elements:
             stage.forces(self.X, self.law, self.u, self.force, split)
-        if self.side:
+        if forked and self.side:
             wp.wait_stream(self.side)
 
-    def _integrate(self, kick: float, drift: float, split: Split = whole) -> None:
+    def _integrate(self, kick: float, drift: float, role: wp.array, split: Split = whole) -> None:
         def launch(part: slice) -> None:
             scene = 0 if isinstance(self.node_scene, int) else self.node_scene[part]
-            fixed_axes = self.fixed_axes[part] if len(self.fixed_axes) else self.fixed_axes
             contact_force = self.contact_force[part] if self.contacts else self.contact_force
-            inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot, fixed_axes]
-            inputs += [self.force, scene, self.node_gravity, kick, drift]
+            inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot]
+            inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part]]
             wp.launch(
                 self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM
@@ -162,51 +148,55 @@ class Solver:
 
         split(self.model.node_count, launch, NODES)
 
-    def _constrain(self) -> None:
-        if len(self.joint_first):
-            inputs = [self.mass, self.joint_first, self.joint_second]
-            outputs = [self.u, self.v, self.joint_impulse]
-            wp.launch(constraint.rejoin, len(self.joint_first), inputs=inputs, outputs=outputs)
-        if len(self.drive_work):
-            inputs = [self.mass, *self.driven, self.step_count, self.dt]
-            outputs = [self.u, self.v, self.drive_work, self.drive_work_after]
-            wp.launch(constraint.prescribe, len(self.drive_work), inputs=inputs, outputs=outputs)
-            wp.launch(constraint.advance_clock, 1, outputs=[self.step_count])
+    def _advance_bound(self) -> None:
+        inputs = [self.mass, self.inverse_mass, self.offset, self.slot, self.bonds.role, self.force, self.node_scene]
+        inputs += [self.node_gravity, self.bonds.bonds, self.dt]
+        outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
+        wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+    def _advance(self, split: Split = whole) -> None:
+        """Advance all nodes by a step, those that are bound beside the others."""
+        if self.bound_kernel:
+            with wp.ScopedStream(self.side):
+                self._advance_bound()
+        self._integrate(self.dt, self.dt, self.bonds.role, split)
+        if self.bound_kernel and self.side:
+            wp.wait_stream(self.side)
 
     def _step(self, split: Split = whole) -> None:
         self._forces(split)
-        self._integrate(self.dt, self.dt, split)
-        self._constrain()
+        self._advance(split)
 
-    def _sum(self, kernel: Any, *inputs: Any) -> None:
-        wp.launch(kernel, (self.layout.count, SUM_WIDTH), inputs=list(inputs), outputs=[self.partial])
+    def _sum(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
+        """Sums of each run of entries, by a block of threads each; no scene has more entries than `largest`."""
+        runs = min(max(-(-largest // ledger.RUN), 1), ledger.SUM_WIDTH)
+        threads = (self.layout.count, runs, ledger.RUN if self.side else 1)
+        wp.launch(kernel, threads, inputs=[self.row, *inputs], outputs=[self.partial, *outputs])
+
+    def _begin_record(self) -> None:
+        """What a record takes of the time before its step, and of contact."""
+        wp.copy(self.v_before, self.v)
+        wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
+        for stage in self.contacts:
+            self._sum(contact.sum_springs, int(np.diff(stage.slaves).max()), [stage.column, stage.first, stage.spring])
 
     def _record_step(self, needs: frozenset[str], split: Split = whole) -> None:
         """One step that also writes a record of the state at its start, and a frame of `needs`."""
-        self._forces(split)
+        self._forces(split, self._begin_record)
         if self.output:
             self.output.before_step(needs)
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
-        width = self.wide.shape[2]
-        wide = (self.layout.count, width)
-        inputs = [self.energy, width, self.element_ranges]
-        wp.launch(self.sum_elements_kernel, wide, inputs=inputs, outputs=[self.wide])
-        for stage in self.contacts:
-            self._sum(contact.sum_springs, self.row, stage.column, SUM_WIDTH, stage.first, stage.spring)
-        wp.copy(self.v_before, self.v)
-        self._integrate(self.dt, self.dt, split)
-        self._constrain()
-        if len(self.drive_work):
-            self._sum(ledger.sum_scalars, self.drive_work, self.row, DRIVE_WORK, SUM_WIDTH, self.driven_first)
-        inputs = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, width, self.node_first]
-        wp.launch(ledger.sum_nodes, wide, inputs=inputs, outputs=[self.wide])
-        self._sum(ledger.fold, self.wide, self.row, SUM_WIDTH)
-        inputs = [self.point_node, self.v_before, self.v, self.row]
-        wp.launch(ledger.record_points, len(self.point_node), inputs=inputs, outputs=[self.point_velocity])
+        self._advance(split)
+        with wp.ScopedStream(self.side):
+            self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
+        motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
+        motion += [self.bonds.work, self.bonds.driven_first, self.point_node]
+        self._sum(ledger.record_motion, self.most_nodes, motion, self.point_velocity)
         if self.output:
             self.output.after_step(needs)
-        wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
+        if self.side:
+            wp.wait_stream(self.side)
 
     def _schedule(self) -> None:
         for stage in self.elements:
@@ -243,7 +233,7 @@ class Solver:
 
     def _kernels(self) -> list[Any]:
         """One of each module that is launched in blocks of Warp's own size."""
-        kernels = [constraint.rejoin, ledger.sum_nodes, contact.sum_springs, self.sum_elements_kernel]
+        kernels = [ledger.record_motion, contact.sum_springs, self.sum_elements_kernel]
         kernels += [output.nodal_stress] if self._shows_stress else []
         return kernels + [kernel for stage in self.contacts for kernel in stage.kernels()]
 
@@ -251,7 +241,7 @@ class Solver:
         """Those that are launched in blocks of BLOCK_DIM: a module is compiled for one size."""
         kernels = [kernel for stage in self.elements for kernel in stage.kernels()]
         kernels += [stage.stress_kernel for stage in self.elements if self._shows_stress]
-        return [self.integrate_kernel, *kernels]
+        return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else []), *kernels]
 
     def search(self) -> None:
         """Broad phase of every contact."""
@@ -265,7 +255,7 @@ class Solver:
         Bodies are free of stress then, and none presses on another.
         """
         with wp.ScopedDevice(self.device):
-            self._integrate(-0.5 * self.dt, 0.0)
+            self._integrate(-0.5 * self.dt, 0.0, self.bonds.at_rest)
 
     def record_and_step(self, count: int, needs: frozenset[str] = frozenset()) -> None:
         """Record the state, with a frame of `needs`, then advance `count` steps.
@@ -327,7 +317,7 @@ class Solver:
 
     def joint_impulses(self, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each joint of a scene gave to its first body [N s], by name."""
-        impulse = self.joint_impulse.numpy()
+        impulse = self.bonds.impulse.numpy()
         hinges = self.model.hinges[self.layout.hinges[scene] : self.layout.hinges[scene + 1]]
         return {h.name: impulse[h.start : h.end].sum(axis=0).tolist() for h in hinges}
 

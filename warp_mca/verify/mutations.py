@@ -197,8 +197,8 @@ MUTATIONS: dict[str, Mutation] = {
     "joint_impulse_halved": Mutation(
         "the impulse of a joint is counted by half",
         "kernels/constraint.py",
-        "impulse_out[k] + mass[i] * (v - v_out[i])",
-        "impulse_out[k] + wp.float64(0.5) * mass[i] * (v - v_out[i])",
+        "impulse_out[k] + mass[i] * (v - free)",
+        "impulse_out[k] + wp.float64(0.5) * mass[i] * (v - free)",
     ),
     "shown_pressure_halved": Mutation(
         "the pressure in the stress that is shown is halved",
