@@ -14,10 +14,7 @@ from warp_mca.kernels import j2
 from warp_mca.kernels.hex8 import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
 from warp_mca.kernels.patch import (
-    FORCES,
-    HEADS,
     Patches,
-    barrier,
     begin_turns,
     copy_head,
     copy_list,
@@ -25,20 +22,25 @@ from warp_mca.kernels.patch import (
     copy_places,
     corners_of,
     element_count,
+    load_functions,
+    sum_functions,
+)
+from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.shared_memory import (
+    FORCES,
+    HEADS,
+    barrier,
     head_ring,
     list_pool,
-    load_functions,
     node_list,
     node_pool,
     places_pool,
     row_functions,
     shared_functions,
-    sum_functions,
     wait_for_copies,
     wait_for_older_copies,
     warp_barrier,
 )
-from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
@@ -293,8 +295,9 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                         todo[1 + wp.atomic_add(todo, 0, 1)] = lane
                         for i in range(9):
                             forces[i * wp.static(PATCH) + lane] = W[i // 3, i % 3]
+            wait_for_copies()
+            barrier()
             if wp.static(plastic):
-                barrier()
                 listed = todo[0]
                 if lane == 0:
                     patches.flowing[head[3]] = listed
@@ -304,11 +307,11 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                     mine = head[0] + thread
                     valid = item < listed
                     flow(pool, patches, mine, law, material[mine], thread, lane % 4, valid, history_out, forces)
-            corners = corners_of(patches, coming, lane)
-            wait_for_copies()
-            barrier()
-            if wp.static(plastic):  # the nodes of elements that yield were needed until now
+                if listed > 0:
+                    barrier()
+                # only now does no lane need the nodes of this patch any more
                 copy_nodes(X, u, coming, lane, node, pool)
+            corners = corners_of(patches, coming, lane)
             if lane == wp.static(PATCH - 1):
                 copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring)
             copy_list(patches, ring[(k + 2) % wp.static(HEADS)], lane, node)

@@ -7,10 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.patch import (
-    FORCES,
-    HEADS,
     Patches,
-    barrier,
     begin_turns,
     copy_head,
     copy_list,
@@ -18,18 +15,23 @@ from warp_mca.kernels.patch import (
     copy_places,
     corners_of,
     element_count,
-    head_ring,
     load_functions,
+    sum_functions,
+)
+from warp_mca.kernels.patterns import pattern_functions
+from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.shared_memory import (
+    FORCES,
+    HEADS,
+    barrier,
+    head_ring,
     node_list,
     node_pool,
     places_pool,
     shared_functions,
-    sum_functions,
     wait_for_copies,
     wait_for_older_copies,
 )
-from warp_mca.kernels.patterns import pattern_functions
-from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})

@@ -1,9 +1,10 @@
-"""Owns what force kernels of a GPU share: a block of threads loads a patch of elements and sums its forces.
+"""Owns what force kernels of a GPU share: a block of threads computes one patch of elements after another.
 
 A patch is up to PATCH elements, one for each thread. Its nodes are read once, into shared memory; its forces are summed
 there in a fixed order, so that what leaves the multiprocessor is one force for each node of a patch in place of eight
-for each element, and runs repeat bit for bit. Shared memory, barriers and the exchange between the lanes of a warp are
-CUDA's own; of this module only the order of patches can be found on a CPU.
+for each element, and runs repeat bit for bit. What the next patch needs is on its way while one is computed: its nodes,
+and before these the list of them, and before that its head. Of this module only the order of patches can be found on a
+CPU.
 """
 
 from functools import cache
@@ -12,60 +13,22 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.shared_memory import (
+    HEADS,
+    barrier,
+    close_group,
+    copy_entry,
+    copy_index,
+    copy_vector,
+    copy_words,
+    wait_for_copies,
+)
 from warp_mca.patches import NOWHERE, PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
-FORCES = NOWHERE + 2 * PATCH + 1  # of a patch in shared memory, with zeros behind them
 SLOTS_OF_THREAD = (SLOTS + PATCH - 1) // PATCH
 
-HEADS = 4  # patches whose heads are in shared memory: this one, two to come, and one on its way
-
-_COPY = """asm volatile("cp.async.ca.shared.global [%0], [%1], {size};" ::
-    "r"((unsigned)__cvta_generic_to_shared({to})), "l"({of}) : "memory");"""
-
 wp.set_module_options({"enable_backward": False})
-
-
-@wp.func_native("__syncthreads();")
-def barrier():
-    """Wait for all threads of the block."""
-    ...
-
-
-@wp.func_native("__syncwarp();")
-def warp_barrier():
-    """Wait for all lanes of the warp."""
-    ...
-
-
-@wp.func_native(f"__shared__ int pool[{SLOTS}]; return (unsigned long long)pool;")
-def node_list() -> wp.uint64:
-    """Address of shared memory for the nodes of a patch."""
-    ...
-
-
-@wp.func_native(f"__shared__ double pool[{6 * SLOTS}]; return (unsigned long long)pool;")
-def node_pool() -> wp.uint64:
-    """Address of shared memory for reference positions, then displacements, of the slots of a patch."""
-    ...
-
-
-@wp.func_native(f"__shared__ int pool[{PATCH + 1}]; return (unsigned long long)pool;")
-def list_pool() -> wp.uint64:
-    """Address of shared memory for a list of elements of a patch, its length first."""
-    ...
-
-
-@wp.func_native(f"__shared__ uint4 pool[{SLOTS}]; return (unsigned long long)pool;")
-def places_pool() -> wp.uint64:
-    """Address of shared memory for where the forces of the slots of a patch lie."""
-    ...
-
-
-@wp.func_native(f"__shared__ int4 pool[{HEADS}]; return (unsigned long long)pool;")
-def head_ring() -> wp.uint64:
-    """Address of shared memory for the heads of the patches that a block of threads computes next."""
-    ...
 
 
 @wp.struct
@@ -92,21 +55,6 @@ class Patches:
     corner: wp.array2d(dtype=wp.uint32)
     places: wp.array(dtype=wp.vec4ui)
     flowing: wp.array(dtype=wp.int32)
-
-
-@cache
-def shared_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (address of shared memory for the forces of a patch; value of the lane that differs in `mask`)."""
-    R = scalars(precision).real
-    name = "float" if precision == "mixed" else "double"
-
-    @wp.func_native(f"__shared__ {name} pool[{FORCES}]; return (unsigned long long)pool;")
-    def force_pool() -> wp.uint64: ...
-
-    @wp.func_native("return __shfl_xor_sync(0xffffffffu, value, mask);")
-    def exchange(value: R, mask: int) -> R: ...
-
-    return force_pool, exchange
 
 
 @wp.kernel(enable_backward=False)
@@ -142,52 +90,6 @@ def schedule(
             before += 1
         else:
             turn_out[total + patch - before] = head[patch]
-
-
-def _begin_copy(size: int, to: str, of: str) -> str:
-    return _COPY.format(size=size, to=to, of=of)
-
-
-@wp.func_native("\n".join(_begin_copy(8, f"&to.data[slot].c[{i}]", f"&value.data[k].c[{i}]") for i in range(3)))
-def copy_vector(value: wp.array(dtype=wp.vec3d), k: int, slot: int, to: wp.array(dtype=wp.vec3d)):
-    """Begin to copy an entry into shared memory, past the registers."""
-    ...
-
-
-@wp.func_native(_begin_copy(4, "&to.data[slot]", "&value.data[k]"))
-def copy_index(value: wp.array(dtype=wp.int32), k: int, slot: int, to: wp.array(dtype=wp.int32)):
-    """Begin to copy an entry into shared memory, past the registers."""
-    ...
-
-
-@wp.func_native(_begin_copy(16, "&to.data[slot]", "&value.data[k]"))
-def copy_words(value: wp.array(dtype=wp.vec4ui), k: int, slot: int, to: wp.array(dtype=wp.vec4ui)):
-    """Begin to copy an entry into shared memory, past the registers."""
-    ...
-
-
-@wp.func_native(_begin_copy(16, "&to.data[slot]", "&value.data[k]"))
-def copy_entry(value: wp.array(dtype=wp.vec4i), k: int, slot: int, to: wp.array(dtype=wp.vec4i)):
-    """Begin to copy an entry into shared memory, past the registers."""
-    ...
-
-
-@wp.func_native('asm volatile("cp.async.commit_group;" ::: "memory");')
-def close_group():
-    """What this thread began to copy since the last group is one."""
-    ...
-
-
-@wp.func_native('asm volatile("cp.async.wait_group 1;" ::: "memory");')
-def wait_for_older_copies():
-    """Wait until what this thread began to copy has arrived, but for its last group."""
-    ...
-
-
-@wp.func_native('asm volatile("cp.async.wait_all;" ::: "memory");')
-def wait_for_copies():
-    """Wait until what this thread began to copy has arrived."""
-    ...
 
 
 @wp.func
@@ -277,25 +179,6 @@ def begin_turns(
     wait_for_copies()
     copy_list(patches, ring_out[1], lane, node_out)
     barrier()
-
-
-@cache
-def row_functions(precision: str, size: int) -> tuple[Any, Any]:
-    """Functions that read and write `size` entries of a column, which lie side by side, two at a time."""
-    R = scalars(precision).real
-    name = "float" if precision == "mixed" else "double"
-    row = wp.types.vector(size, R)
-    pairs = f"{name}2* pair = ({name}2*)wp::address(value, first, column);"
-    read = "".join(f"row[{2 * k}] = pair[{k}].x; row[{2 * k + 1}] = pair[{k}].y; " for k in range(size // 2))
-    write = "".join(f"pair[{k}] = make_{name}2(row[{2 * k}], row[{2 * k + 1}]); " for k in range(size // 2))
-
-    @wp.func_native(f"wp::vec_t<{size}, {name}> row; {pairs} {read} return row;")
-    def read_row(value: wp.array2d(dtype=R), first: int, column: int) -> row: ...
-
-    @wp.func_native(f"{pairs} {write}")
-    def write_row(row: row, first: int, column: int, value: wp.array2d(dtype=R)): ...
-
-    return read_row, write_row
 
 
 @wp.func

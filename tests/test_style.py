@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -54,13 +55,19 @@ def root(target: ast.expr) -> str:
     return target.id if isinstance(target, ast.Name) else ""
 
 
+@cache
+def outputs_of_functions() -> dict[str, list[int]]:
+    """Which arguments each function of the kernels writes, by its name."""
+    native = [f for path in KERNEL_FILES for f in decorated(parse(path), "func_native")]
+    return {
+        item.name: [k for k, name in enumerate(parameters(item)) if name.endswith("_out")]
+        for item in [*native, *(item.values[0] for item in device_functions())]
+    }
+
+
 def written(function: ast.FunctionDef) -> set[str]:
     """Names that the function writes through: assigned entries, atomics, and outputs of the functions it calls."""
     found = set()
-    outputs = {
-        item.values[0].name: [k for k, name in enumerate(parameters(item.values[0])) if name.endswith("_out")]
-        for item in device_functions()
-    }
     for node in ast.walk(function):
         if isinstance(node, ast.Assign | ast.AugAssign):
             for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
@@ -68,7 +75,7 @@ def written(function: ast.FunctionDef) -> set[str]:
                 found |= {root(part) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)}
         if isinstance(node, ast.Call):
             name = ast.unparse(node.func)
-            places = [0] if name.startswith("wp.atomic") else outputs.get(name, [])
+            places = [0] if name.startswith("wp.atomic") else outputs_of_functions().get(name, [])
             found |= {root(node.args[k]) for k in places}
     return found
 
