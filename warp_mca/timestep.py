@@ -36,7 +36,8 @@ def stable_step(
     """Stable step from max over elements of (element eigenvalue + contact eigenvalue), both upper bounds of their part.
 
     The largest eigenvalue of an assembly never exceeds the largest of its elements (Irons and Treharne, 1971). A
-    closed-form bound ranks the elements; the exact eigenvalue is then found for those that could still be the worst.
+    coarse bound ranks the elements, a closer one those that could still be the worst after the first exact
+    eigenvalues, and exact ones decide.
 
     Args:
         formulation: of the elements.
@@ -45,15 +46,19 @@ def stable_step(
         contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,).
         index: number that each element goes by, shape (element_count,).
     """
-    bound = formulation.eigenvalue_bounds(x, K, G, mass) + contact
 
     def exact(part: NDArray[np.intp]) -> Array:
         return formulation.largest_eigenvalues(x[part], K[part], G[part], mass[part]) + contact[part]
 
-    order = np.argsort(-bound)
-    first = exact(order[:BATCH])
-    worst, element = float(first.max()), int(order[first.argmax()])
-    left = order[BATCH:][bound[order[BATCH:]] > worst]
+    bound = formulation.eigenvalue_bounds(x, K, G, mass, coarse=True) + contact
+    first = _greatest(bound, BATCH)
+    value = exact(first)
+    worst, element = float(value.max()), int(first[value.argmax()])
+    bound[first] = 0.0
+    left = np.flatnonzero(bound > worst)
+    bound[left] = formulation.eigenvalue_bounds(x[left], K[left], G[left], mass[left]) + contact[left]
+    left = left[bound[left] > worst]
+    left = left[np.argsort(-bound[left], kind="stable")]
     if len(left) > MOST:
         left = left[_different(np.column_stack([bound[left], (x[left] - x[left, :1]).reshape(len(left), -1)]))]
     for start in range(0, len(left), BATCH):
@@ -68,6 +73,13 @@ def stable_step(
             worst, element = float(value.max()), int(part[value.argmax()])
     share = float(contact[element] / worst)
     return StableStep(dt=2.0 / np.sqrt(worst), element=int(index[element]), contact_share=share)
+
+
+def _greatest(value: Array, count: int) -> NDArray[np.intp]:
+    """Indices of the `count` greatest values, from the greatest on."""
+    least = np.partition(value, len(value) - count)[len(value) - count] if count < len(value) else -np.inf
+    found = np.flatnonzero(value >= least)
+    return found[np.argsort(-value[found], kind="stable")][:count]
 
 
 def _different(rows: Array) -> NDArray[np.intp]:
