@@ -57,7 +57,7 @@ def test_corners_and_sums_are_those_of_the_mesh(name: str):
 def test_compact_order_keeps_most_nodes_of_a_patch_inside_it():
     """Layers of 16 x 16 would leave 2.26 slots for each element; cubes of 128 elements 1.76 to 2."""
     mesh = mca.Box(size=(1.0, 1.0, 1.0), divisions=(16, 16, 16)).build()
-    order = compact_order(mesh.points[mesh.hexahedra], PATCH)
+    order = compact_order(mesh.points, mesh.hexahedra, PATCH)
     np.testing.assert_array_equal(np.sort(order), np.arange(len(order)))
     slots = len(make_patches(np.ascontiguousarray(mesh.hexahedra[order].T)).node) / len(order)
     as_it_comes = len(make_patches(np.ascontiguousarray(mesh.hexahedra.T)).node) / len(order)

@@ -210,7 +210,7 @@ class Assembly:
                 mine = np.flatnonzero(plastic[part.index] == flag)
                 if len(mine):
                     if part.element.corners == 8:  # tetrahedra are not computed by patches
-                        mine = mine[compact_order(self.X[part.conn[mine]], PATCH)]
+                        mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
                     index = part.index[mine]
                     blocks.append(
                         Block(
