@@ -228,18 +228,13 @@ class Assembly:
 
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
-        steps = [
-            stable_step(
-                part.element,
-                self.X[part.conn],
-                self.K[part.index],
-                self.G[part.index],
-                mass,
-                added[part.conn].max(axis=1),
-                part.index,
-            )
-            for part, mass in zip(self.cells, self.element_mass, strict=True)
-        ]
+        steps = []
+        for part, mass in zip(self.cells, self.element_mass, strict=True):
+            touched = np.flatnonzero((added != 0.0)[part.conn].any(axis=1))
+            contact = np.zeros(len(part.conn))
+            contact[touched] = added[part.conn[touched]].max(axis=1)
+            moduli = self.K[part.index], self.G[part.index]
+            steps.append(stable_step(part.element, self.X, part.conn, *moduli, mass, contact, part.index))
         return min(steps, key=lambda step: step.dt)
 
     def nodes(self, body: str, name: str) -> Index:

@@ -26,7 +26,7 @@ def boundary_faces(hexahedra: Index, tetrahedra: Index, node_count: int) -> tupl
     near = _near_boundary(hexahedra, tetrahedra, node_count)
     faces, owners = [], []
     for cells, table, first in ((hexahedra, HEX_FACES, 0), (tetrahedra, TET_FACES, len(hexahedra))):
-        index = np.flatnonzero(near[cells].view(f"u{cells.shape[1]}"))  # that any corner is
+        index = np.flatnonzero(near[cells].any(axis=1))
         found = _triangles_last(cells[index][:, table].reshape(-1, 4))
         kept = near[found].any(axis=1)  # all cells around such a face are among these
         faces.append(found[kept])
