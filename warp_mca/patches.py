@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.elements.hexahedron import CHUNK, chunks
+from warp_mca.elements.hexahedron import chunks
+from warp_mca.geometry.boxes import cell_boxes
 
 PATCH = 128  # elements of a patch, and threads of its block
 SLOTS = 320  # that a patch may have
@@ -35,7 +36,8 @@ def compact_order(X: Array, conn: Index, size: int) -> Index:
         Elements in their new order, shape (element_count,), int32.
     """
     count = len(conn)
-    box, order = _boxes(X, conn), np.arange(count, dtype=np.int32)
+    lower, upper = cell_boxes(X, conn)
+    box, order = np.concatenate([0.5 * (lower + upper), upper - lower]), np.arange(count, dtype=np.int32)
     begin, end = np.array([0]), np.array([count])
     while len(begin):
         large = end - begin > size
@@ -50,17 +52,6 @@ def compact_order(X: Array, conn: Index, size: int) -> Index:
     order[:full].reshape(-1, size).sort(axis=1)  # neighbours stay neighbours: threads read what lies side by side
     order[full:].sort()
     return order
-
-
-def _boxes(X: Array, conn: Index) -> Array:
-    """Centres and extents of the boxes around elements [m], each three rows, shape (6, element_count)."""
-    found = np.empty((6, len(conn)))
-    for part in chunks(len(conn), CHUNK):
-        x = np.ascontiguousarray(X[conn[part].T].transpose(2, 0, 1))
-        lower, upper = x.min(axis=1), x.max(axis=1)
-        found[:3, part] = 0.5 * (lower + upper)
-        found[3:, part] = upper - lower
-    return found
 
 
 def _cut(box: Array, order: Index, begin: NDArray[np.int64], length: int, half: int) -> None:
@@ -81,7 +72,8 @@ def _layers(box: Array) -> Array:
     """Keys that cut across the longest direction, in elements, and a layer of that across the next.
 
     Args:
-        box: of the elements of each part as from `_boxes`, shape (6, part_count, element_count).
+        box: centres and extents of the boxes around the elements of each part [m], shape (6, part_count,
+            element_count).
     """
     centre, size, part = box[:3], box[3:].mean(axis=2), np.arange(box.shape[1])
     low = centre.min(axis=2)
