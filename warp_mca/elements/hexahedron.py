@@ -171,18 +171,26 @@ def eigenvalue_bounds(x: Array, K: Array, G: Array, mass: Array, coarse: bool = 
     return bound
 
 
+def _product(matrix: Array, columns: Array) -> Array:
+    """matrix @ columns, a few columns at a time: so many as BLAS leaves to one thread, since threads would wait."""
+    found = np.empty((len(matrix), columns.shape[1]))
+    for part in chunks(columns.shape[1], 128):
+        np.matmul(matrix, columns[:, part], out=found[:, part])
+    return found
+
+
 def _laplacians(x: Array, mass: Array) -> tuple[Array, Array]:
     """Entries (_ROW, _COLUMN) of M^-1/2 (sum over points w grad N_a . grad N_b) M^-1/2 [m/kg], shape (36,
     element_count), and the eigenvalue of the mean dilatation's matrix without K [m/kg], shape (element_count,)."""
     cofactor, det = _cofactors(x)
     metric = np.stack([(cofactor[k] * cofactor[j]).sum(axis=0) / det for k, j in _PAIRS])
     root = 1.0 / np.sqrt(mass.T)
-    laplacian = _METRIC @ metric.reshape(48, -1)
+    laplacian = _product(_METRIC, metric.reshape(48, -1))
     laplacian *= root[_ROW]
     laplacian *= root[_COLUMN]
     square = 0.0
     for i in range(3):
-        mean = _MEAN @ cofactor[:, i].reshape(24, -1)
+        mean = _product(_MEAN, cofactor[:, i].reshape(24, -1))
         square = square + ((mean * root) ** 2).sum(axis=0)
     return laplacian, square / det.reshape(8, -1).sum(axis=0)
 
