@@ -37,7 +37,11 @@ def compact_order(X: Array, conn: Index, size: int) -> Index:
     """
     count = len(conn)
     lower, upper = cell_boxes(X, conn)
-    box, order = np.concatenate([0.5 * (lower + upper), upper - lower]), np.arange(count, dtype=np.int32)
+    box, order = np.concatenate([lower, upper]), np.arange(count, dtype=np.int32)
+    box[:3] += upper
+    box[:3] *= 0.5
+    box[3:] -= lower
+    del lower, upper
     begin, end = np.array([0]), np.array([count])
     while len(begin):
         large = end - begin > size
