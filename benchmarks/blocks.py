@@ -96,9 +96,9 @@ def assemble(element: str, count: int) -> Model:
         return build_model(scene, meshes, {name: m.points for name, m in meshes.items()}, rest)
 
 
-def _stable_step(formulation: Element, *arrays: NDArray) -> StableStep:
+def _stable_step(formulation: Element, X: NDArray, *arrays: NDArray) -> StableStep:
     """That of the first elements: all are alike, and eigenvalues of millions would take minutes."""
-    return stable_step(formulation, *(array[:20_000] for array in arrays))
+    return stable_step(formulation, X, *(array[:20_000] for array in arrays))
 
 
 def without(model: Model, case: Case) -> Model:

@@ -150,8 +150,11 @@ def test_bounds_hold_the_largest_eigenvalue(element: str):
     K, G, rho = np.full(n, 175e9), np.full(n, 80e9), np.full(n, 7850.0)
     mass = kind.lumped_masses(x, rho)
     exact, bound = kind.largest_eigenvalues(x, K, G, mass), kind.eigenvalue_bounds(x, K, G, mass)
+    coarse = kind.eigenvalue_bounds(x, K, G, mass, coarse=True)
     assert (bound >= exact * (1.0 - 1e-12)).all()
     assert (bound <= 1.7 * exact).all()
+    assert (coarse >= bound * (1.0 - 1e-12)).all()
+    assert (coarse <= 1.5 * bound).all()
 
 
 @pytest.mark.parametrize(("element", "kinematics"), KINDS)

@@ -177,7 +177,8 @@ def test_eigenvalues_bound_each_other_and_meet_the_cubes_closed_form():
     mass = lumped_masses(x, rho)
     exact = largest_eigenvalues(x, *moduli, mass)
     assert (eigenvalue_bounds(x, *moduli, mass) >= exact).all()
-    found = stable_step(ELEMENTS["hex8"], x, *moduli, mass, np.zeros(200), np.arange(200))
+    conn = np.arange(1600).reshape(200, 8)
+    found = stable_step(ELEMENTS["hex8"], x.reshape(-1, 3), conn, *moduli, mass, np.zeros(200), np.arange(200))
     assert found.element == exact.argmax()
     assert found.dt == pytest.approx(2.0 / np.sqrt(exact.max()), rel=1e-12)
     cube = 1e-3 * CUBE[None]  # uniform dilatation is its fastest mode: energy 9 K / 2 on masses of 1/8 rho h^3

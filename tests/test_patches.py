@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.patches import NOWHERE, PATCH, SLOTS, SUMMED, Patches, compact_order, make_patches
+from warp_mca.patches import LOT, NOWHERE, PATCH, SLOTS, SUMMED, Patches, compact_order, make_patches
 
 
 def halves(words: np.ndarray) -> np.ndarray:
@@ -57,11 +57,39 @@ def test_corners_and_sums_are_those_of_the_mesh(name: str):
 def test_compact_order_keeps_most_nodes_of_a_patch_inside_it():
     """Layers of 16 x 16 would leave 2.26 slots for each element; cubes of 128 elements 1.76 to 2."""
     mesh = mca.Box(size=(1.0, 1.0, 1.0), divisions=(16, 16, 16)).build()
-    order = compact_order(mesh.points[mesh.hexahedra], PATCH)
+    order = compact_order(mesh.points, mesh.hexahedra, PATCH)
     np.testing.assert_array_equal(np.sort(order), np.arange(len(order)))
     slots = len(make_patches(np.ascontiguousarray(mesh.hexahedra[order].T)).node) / len(order)
     as_it_comes = len(make_patches(np.ascontiguousarray(mesh.hexahedra.T)).node) / len(order)
     assert slots < 1.8 < as_it_comes
+
+
+@pytest.mark.parametrize("divisions", [(16, 16, 16), (24, 24, 12), (7, 30, 30)])
+def test_order_does_not_hang_on_rounding(divisions: tuple[int, int, int]):
+    """Sides of equal length, and of equal cells, are cut alike when their nodes move by less than an atom's width."""
+    mesh = mca.Box(size=tuple(0.001 * n for n in divisions), divisions=divisions).build()
+    order = compact_order(mesh.points, mesh.hexahedra, PATCH)
+    for seed in range(3):
+        moved = mesh.points + np.random.default_rng(seed).uniform(-1e-13, 1e-13, mesh.points.shape)
+        np.testing.assert_array_equal(compact_order(moved, mesh.hexahedra, PATCH), order)
+
+
+def test_patches_are_those_of_each_scene_alone():
+    """Scenes of a batch begin new patches, wherever the ranges that are computed together end."""
+    count, ends = 3 * LOT + 40, (LOT - 5, 2 * LOT + 77, 3 * LOT + 40)
+    conn = np.random.default_rng(4).integers(0, 5000, (8, count)).astype(np.int32)
+    conn[:, LOT:] = np.arange(8)[:, None] + np.arange(count - LOT) // 3  # patches with few nodes, and with too many
+    joined = make_patches(conn, ends)
+    first = slots = 0
+    for begin, end in zip((0, *ends), ends, strict=False):
+        alone = make_patches(conn[:, begin:end])
+        patches, nodes = len(alone.start) - 1, len(alone.node)
+        np.testing.assert_array_equal(joined.start[first : first + patches + 1], alone.start + begin)
+        np.testing.assert_array_equal(joined.slot_start[first : first + patches + 1], alone.slot_start + slots)
+        np.testing.assert_array_equal(joined.node[slots : slots + nodes], alone.node)
+        np.testing.assert_array_equal(joined.corner[:, begin:end], alone.corner)
+        np.testing.assert_array_equal(joined.places[:, slots : slots + nodes], alone.places)
+        first, slots = first + patches, slots + nodes
 
 
 def test_elements_of_a_model_come_patch_by_patch():

@@ -142,13 +142,14 @@ def test_worst_of_many_elements_is_found_wherever_it_lies():
     """The ranking by a bound and the batches of exact eigenvalues skip no element that could be the worst."""
     rng = np.random.default_rng(1)
     n, ranks = 900, []
+    conn = np.arange(8 * n).reshape(n, 8)
     for _ in range(8):
         x = H * (CUBE + rng.uniform(-0.02, 0.02, (n, 8, 3)))
         K, rho = rng.uniform(9e10, 1e11, n), np.full(n, 2e3)
         G = K * rng.uniform(0.01, 0.6, n)  # the bound is close for small G only
         mass, contact = lumped_masses(x, rho), rng.uniform(0.0, 1e12, n)
         exact = largest_eigenvalues(x, K, G, mass) + contact
-        found = stable_step(ELEMENTS["hex8"], x, K, G, mass, contact, np.arange(len(x)))
+        found = stable_step(ELEMENTS["hex8"], x.reshape(-1, 3), conn, K, G, mass, contact, np.arange(n))
         assert found.element == exact.argmax()
         assert found.dt == pytest.approx(2.0 / np.sqrt(exact.max()), rel=1e-12)
         assert found.contact_share == pytest.approx(contact[found.element] / exact.max(), rel=1e-12)

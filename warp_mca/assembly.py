@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.elements import ELEMENTS, Element
+from warp_mca.elements.hexahedron import CHUNK, chunks
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.patches import PATCH, compact_order
@@ -105,6 +106,14 @@ def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
     return found
 
 
+def _masses(cells: Cells, points: Array, rho: Array) -> Array:
+    """Lumped masses of cells [kg], shape (cell_count, corners); `rho` [kg/m^3] is that of every element."""
+    mass = np.empty(cells.conn.shape)
+    for part in chunks(len(mass), CHUNK):
+        mass[part] = cells.element.lumped_masses(points[cells.conn[part]], rho[cells.index[part]])
+    return mass
+
+
 def _sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
     """Sum of what each element gives its corners, shape (node_count,), float64."""
     return np.bincount(conn.ravel(), value.ravel(), minlength=node_count).astype(np.float64)
@@ -120,8 +129,7 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
             rho[cells] = material.rho
         total = np.zeros(len(mesh.points))
         for part in body_cells(body, mesh):
-            value = part.element.lumped_masses(mesh.points[part.conn], rho[part.index])
-            total += _sum_to_nodes(part.conn, value, len(total))
+            total += _sum_to_nodes(part.conn, _masses(part, mesh.points, rho), len(total))
         masses[body.name] = total
     return masses
 
@@ -163,10 +171,10 @@ class Assembly:
         self.mass = np.zeros(nodes)
         self.element_mass = []
         for part in self.cells:
-            corners = self.X[part.conn]
-            self.volume[part.index] = part.element.volumes(corners)
-            self.element_mass.append(part.element.lumped_masses(corners, rho[part.index]))
-            self.mass += _sum_to_nodes(part.conn, self.element_mass[-1], nodes)
+            mass = _masses(part, self.X, rho)
+            self.volume[part.index] = mass.sum(axis=1) / rho[part.index]
+            self.element_mass.append(mass)
+            self.mass += _sum_to_nodes(part.conn, mass, nodes)
 
     def _merged_cells(self) -> list[Cells]:
         found: dict[tuple[str, bool], list[Cells]] = {}
@@ -202,7 +210,7 @@ class Assembly:
                 mine = np.flatnonzero(plastic[part.index] == flag)
                 if len(mine):
                     if part.element.corners == 8:  # tetrahedra are not computed by patches
-                        mine = mine[compact_order(self.X[part.conn[mine]], PATCH)]
+                        mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
                     index = part.index[mine]
                     blocks.append(
                         Block(
@@ -220,18 +228,13 @@ class Assembly:
 
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
-        steps = [
-            stable_step(
-                part.element,
-                self.X[part.conn],
-                self.K[part.index],
-                self.G[part.index],
-                mass,
-                added[part.conn].max(axis=1),
-                part.index,
-            )
-            for part, mass in zip(self.cells, self.element_mass, strict=True)
-        ]
+        steps = []
+        for part, mass in zip(self.cells, self.element_mass, strict=True):
+            touched = np.flatnonzero((added != 0.0)[part.conn].any(axis=1))
+            contact = np.zeros(len(part.conn))
+            contact[touched] = added[part.conn[touched]].max(axis=1)
+            moduli = self.K[part.index], self.G[part.index]
+            steps.append(stable_step(part.element, self.X, part.conn, *moduli, mass, contact, part.index))
         return min(steps, key=lambda step: step.dt)
 
     def nodes(self, body: str, name: str) -> Index:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import gc
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -36,6 +37,8 @@ elastoplastic finite elements with frictional contact take over.
   warp-mca scenes                                  scenes, presets and parameters
 
 warp-mca COMMAND --help lists the options; README.md has an example in Python."""
+
+COLLECT = 100_000  # objects between two collections: what imports and figures make stays, looking at it takes 0.2 s
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit status.
     """
+    collect = gc.get_threshold()
+    gc.set_threshold(COLLECT)
     try:
         args = _parser().parse_args(argv)
         args.command(args)
@@ -84,6 +89,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
     except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands
         return stop.code if isinstance(stop.code, int) else 2
+    finally:
+        gc.set_threshold(*collect)
     return 0
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.elements.hexahedron import shape_functions
 from warp_mca.elements.tet4 import gradients
 from warp_mca.errors import bad_value
+from warp_mca.geometry.boxes import cell_boxes
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene import Line, Path, Scene
 
@@ -64,6 +65,7 @@ class PathHistory:
 
 
 Place = tuple[NDArray[np.int32], Array]  # corners of the cells around the probes of a line, and their weights
+Boxes = tuple[Array, Array]  # as from `cell_boxes`
 Found = dict[tuple[int, Line, float], Place]  # by mesh, line and spacing
 
 
@@ -80,14 +82,18 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
     position: dict[str, Array] = {}
     corner, weight = [np.zeros((0, 8), np.int32)], [np.zeros((0, 8))]
     found = {} if found is None else found
+    boxes: dict[str, list[Boxes]] = {}
     for path in scene.paths:
         along = []
         for line in path.lines:
+            mesh = meshes[line.body]
             share = np.linspace(0.0, 1.0, int(np.ceil(line.length / path.spacing - 1e-9)) + 1)
-            key = (id(meshes[line.body]), line, path.spacing)
+            key = (id(mesh), line, path.spacing)
             if key not in found:
                 at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
-                found[key] = _elements_around(at, meshes[line.body], path)
+                if line.body not in boxes:
+                    boxes[line.body] = [cell_boxes(mesh.points, cells) for cells in (mesh.hexahedra, mesh.tetrahedra)]
+                found[key] = _elements_around(at, mesh, boxes[line.body], path)
             nodes, weights = found[key]
             along.append(line.position + share * line.length)
             corner.append((nodes + model.node_start[line.body]).astype(np.int32))
@@ -96,7 +102,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
     return Probes(position, np.concatenate(corner), np.concatenate(weight))
 
 
-def _elements_around(at: Array, mesh: Mesh, path: Path) -> Place:
+def _elements_around(at: Array, mesh: Mesh, boxes: Sequence[Boxes], path: Path) -> Place:
     """Corners of the cell around each point, shape (point_count, 8), and their weights there.
 
     Raises:
@@ -104,9 +110,9 @@ def _elements_around(at: Array, mesh: Mesh, path: Path) -> Place:
     """
     found = []
     if len(mesh.hexahedra):
-        found.append(_in_hexahedra(at, mesh))
+        found.append(_in_hexahedra(at, mesh, boxes[0]))
     if len(mesh.tetrahedra):
-        found.append(_in_tetrahedra(at, mesh))
+        found.append(_in_tetrahedra(at, mesh, boxes[1]))
     corners, weights, apart, allowed = (np.stack(parts) for parts in zip(*found, strict=True))
     rows = np.arange(len(at))
     best = (apart - allowed).argmin(axis=0)
@@ -118,39 +124,58 @@ def _elements_around(at: Array, mesh: Mesh, path: Path) -> Place:
     return corners[best, rows], weights[best, rows]
 
 
-def _nearest(at: Array, corners: Array) -> NDArray[np.intp]:
-    """The cells whose centres lie nearest to each point, shape (point_count, candidate_count)."""
+def _nearest(at: Array, points: Array, cells: NDArray[np.int32], boxes: Boxes) -> NDArray[np.intp]:
+    """The cells whose centres lie nearest to each point, shape (point_count, candidate_count).
+
+    Only cells near the line are looked at, unless there are none: then the message tells how far it runs outside.
+    """
     from scipy.spatial import KDTree
 
-    _, near = KDTree(corners.mean(axis=1)).query(at, k=min(CANDIDATES, len(corners)))
-    return np.asarray(near).reshape(len(at), -1)
+    lower, upper = boxes
+    margin = OUTSIDE * np.linalg.norm(upper - lower, axis=0)
+    beside = (lower - margin > at.max(axis=0)[:, None]) | (upper + margin < at.min(axis=0)[:, None])
+    index = np.flatnonzero(~beside.any(axis=0))
+    index = index if len(index) else np.arange(len(cells))
+    _, near = KDTree(points[cells[index]].mean(axis=1)).query(at, k=min(CANDIDATES, len(index)))
+    return index[np.asarray(near).reshape(len(at), -1)]
 
 
-def _in_hexahedra(at: Array, mesh: Mesh) -> tuple[NDArray[np.int32], Array, Array, Array]:
+def _in_hexahedra(at: Array, mesh: Mesh, boxes: Boxes) -> tuple[NDArray[np.int32], Array, Array, Array]:
     """Best hexahedron for each point: corners, weights, distance from the point [m], and what may count as none."""
-    corners = mesh.points[mesh.hexahedra]
-    near = _nearest(at, corners)
-    x = corners[near]  # (point, candidate, corner, axis)
-    xi = np.zeros((*near.shape, 3))
+    near = _nearest(at, mesh.points, mesh.hexahedra, boxes)
+    x = mesh.points[mesh.hexahedra[near]]  # (point, candidate, corner, axis)
+    # No point of an element is nearer than its box: few candidates remain.
+    gap = np.linalg.norm(at[:, None] - np.clip(at[:, None], x.min(axis=2), x.max(axis=2)), axis=2)
+    apart, weight = np.full(near.shape, np.inf), np.zeros((*near.shape, 8))
+    round_off = 1e-12 * np.ptp(x)
+    tried = gap <= gap.min(axis=1, keepdims=True) + round_off
+    while tried.any():
+        weight[tried], apart[tried] = _weights(np.repeat(at, tried.sum(axis=1), axis=0), x[tried])
+        tried = np.isinf(apart) & (gap <= apart.min(axis=1, keepdims=True) + round_off)
+    alike = apart <= apart.min(axis=1, keepdims=True) + round_off  # a point on a face: the first of its cells
+    best, rows = np.where(alike, near, len(mesh.hexahedra)).argmin(axis=1), np.arange(len(at))
+    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
+    return mesh.hexahedra[near[rows, best]], weight[rows, best], apart[rows, best], allowed
+
+
+def _weights(at: Array, x: Array) -> tuple[Array, Array]:
+    """Shape functions at the place in a hexahedron nearest to a point, shape (count, 8), and its distance [m]."""
+    xi = np.zeros_like(at)
     for _ in range(8):  # Newton's method on x(xi) = at, kept within the element
         value, slope = shape_functions(xi)
-        J = np.einsum("pcak,pcai->pcik", slope, x)
-        missing = at[:, None] - np.einsum("pca,pcai->pci", value, x)
+        J = np.einsum("cak,cai->cik", slope, x)
+        missing = at - np.einsum("ca,cai->ci", value, x)
         # the Jacobian has no inverse where corners of a wedge or a pyramid coincide
         xi = np.clip(xi + (np.linalg.pinv(J) @ missing[..., None])[..., 0], -1.0, 1.0)
     value, _ = shape_functions(xi)
-    apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", value, x), axis=-1)
-    best, rows = apart.argmin(axis=1), np.arange(len(at))
-    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
-    return mesh.hexahedra[near[rows, best]], value[rows, best], apart[rows, best], allowed
+    return value, np.linalg.norm(at - np.einsum("ca,cai->ci", value, x), axis=-1)
 
 
-def _in_tetrahedra(at: Array, mesh: Mesh) -> tuple[NDArray[np.int32], Array, Array, Array]:
+def _in_tetrahedra(at: Array, mesh: Mesh, boxes: Boxes) -> tuple[NDArray[np.int32], Array, Array, Array]:
     """The same of tetrahedra, with their last corner repeated at no weight."""
-    corners = mesh.points[mesh.tetrahedra]
-    near = _nearest(at, corners)
-    x = corners[near]
-    slope = gradients(corners)[near]
+    near = _nearest(at, mesh.points, mesh.tetrahedra, boxes)
+    x = mesh.points[mesh.tetrahedra[near]]
+    slope = gradients(x.reshape(-1, 4, 3)).reshape(x.shape)
     weight = np.einsum("pcai,pci->pca", slope, at[:, None] - x.mean(axis=2)) + 0.25
     weight = np.clip(weight, 0.0, None)
     weight /= weight.sum(axis=-1, keepdims=True)

@@ -262,7 +262,7 @@ def prepare(
     meshes = mesh(scene) if meshes is None else _cut(scene, meshes)
     clock.lap("mesh")
     tell("rigid", 0.0)
-    start = hand_off(scene, meshes, nodal_masses(scene, meshes))
+    start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})
     clock.lap("rigid")
     model = build_model(scene, meshes, start.positions, start.velocities)
     probes = locate(scene, model, meshes, found)

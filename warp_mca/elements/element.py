@@ -36,8 +36,8 @@ class Element(Protocol):
         """Lumped masses [kg], shape (element_count, corners), that keep the mass and the centre of mass exactly."""
         ...
 
-    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
-        """Upper bounds on the largest eigenvalue omega^2 [1/s^2], shape (element_count,)."""
+    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
+        """Upper bounds on the largest eigenvalue omega^2 [1/s^2], shape (element_count,); `coarse` ones are quicker."""
         ...
 
     def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
@@ -47,3 +47,9 @@ class Element(Protocol):
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device; `X` are the model's positions [m]."""
         ...
+
+
+def largest(matrices: Array, coarse: bool = False) -> Array:
+    """Largest eigenvalue of symmetric positive matrices, shape (count, n, n), or what bounds it: their norm."""
+    found = np.linalg.norm(matrices, axis=(1, 2)) if coarse else np.linalg.eigvalsh(matrices)[:, -1]
+    return found.astype(np.float64)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.elements.element import Array
+from warp_mca.elements.element import Array, largest
 from warp_mca.elements.hexahedron import CORNERS, chunks, gradients, lumped_masses, volumes
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Hex8r:
     volumes = staticmethod(volumes)
     lumped_masses = staticmethod(lumped_masses)
 
-    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
         """Sum of bounds of the mean strain's part, as for hex8 with 3 x 3 problems, and of the hourglass part."""
         bound = np.empty(len(x))
         for part in chunks(len(x), 20000):
@@ -68,9 +68,9 @@ class Hex8r:
             b, gamma = b * root[..., None], gamma * root[:, None, :]
             tensor = np.einsum("eai,eaj->eij", b, b, optimize=True)
             modes = np.einsum("ema,ena->emn", gamma, gamma, optimize=True)
-            mean = K[part] * np.trace(tensor, axis1=1, axis2=2) + 2.0 * G[part] * np.linalg.eigvalsh(tensor)[:, -1]
-            stiff = np.linalg.eigvalsh(_hourglass_stiffness(volume, a, K[part], G[part]))[:, -1]
-            bound[part] = volume * mean + stiff * np.linalg.eigvalsh(modes)[:, -1]
+            mean = K[part] * np.trace(tensor, axis1=1, axis2=2) + 2.0 * G[part] * largest(tensor, coarse)
+            stiff = largest(_hourglass_stiffness(volume, a, K[part], G[part]), coarse)
+            bound[part] = volume * mean + stiff * largest(modes, coarse)
         return bound
 
     def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:

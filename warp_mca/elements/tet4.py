@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.elements.element import Array
+from warp_mca.elements.element import Array, largest
 from warp_mca.elements.hexahedron import chunks
 
 if TYPE_CHECKING:
@@ -36,13 +36,13 @@ class Tet4:
         """A quarter of the mass at each corner."""
         return np.repeat((0.25 * rho * volumes(x))[:, None], 4, axis=1)
 
-    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
+    def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
         """Bounds without the averaging of the pressure, which only takes energy away (Jensen's inequality)."""
         bound = np.empty(len(x))
         for part in chunks(len(x), 50000):
             b = gradients(x[part]) / np.sqrt(mass[part])[..., None]
             tensor = np.einsum("eai,eaj->eij", b, b)
-            spread = 2.0 * G[part] * np.linalg.eigvalsh(tensor)[:, -1]
+            spread = 2.0 * G[part] * largest(tensor, coarse)
             bound[part] = volumes(x[part]) * (K[part] * np.trace(tensor, axis1=1, axis2=2) + spread)
         return bound
 

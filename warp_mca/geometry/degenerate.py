@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.elements import hexahedron, tet4
-from warp_mca.geometry.mesh import HEX_FACES, Mesh
+from warp_mca.geometry.boundary import HEX_FACES
+from warp_mca.geometry.mesh import Mesh
 
 Cells = NDArray[np.int32]
 

@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
-
-# Faces of a hexahedron in VTK/gmsh node order, each listed counter-clockwise seen from outside.
-HEX_FACES = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]], dtype=np.int32
-)
-
-
-TET_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], dtype=np.int32)
+from warp_mca.geometry.boundary import boundary_faces
 
 
 @dataclass(frozen=True)
@@ -54,22 +47,7 @@ class Mesh:
 
         Triangles have their last corner twice.
         """
-        quads = _triangles_last(self.hexahedra[:, HEX_FACES].reshape(-1, 4))
-        triangles = self.tetrahedra[:, TET_FACES].reshape(-1, 3)
-        faces = np.concatenate([quads, triangles[:, [0, 1, 2, 2]]])
-        cells = np.concatenate(
-            [
-                np.repeat(np.arange(len(self.hexahedra)), len(HEX_FACES)),
-                len(self.hexahedra) + np.repeat(np.arange(len(self.tetrahedra)), len(TET_FACES)),
-            ]
-        )
-        key = faces.copy()
-        key[faces[:, 2] == faces[:, 3], 3] = -1
-        key = np.sort(key, axis=1)
-        _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
-        own = np.sort(first[count == 1])
-        own = own[faces[own, 1] != faces[own, 2]]  # what collapsed to an edge or a point is no face
-        return faces[own].astype(np.int32), cells[own].astype(np.int32)
+        return boundary_faces(self.hexahedra, self.tetrahedra, len(self.points))
 
     def surface(self, name: str) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Boundary faces whose nodes all lie in the node set `name` ("boundary": all of them).
@@ -99,22 +77,3 @@ class Mesh:
         if name not in self.node_sets:
             raise bad_value("node set", name, f"the mesh has {', '.join(sorted(self.node_sets)) or 'no sets'}")
         return self.node_sets[name]
-
-
-def _triangles_last(faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Faces turned so that a corner that appears twice comes last; with more than two alike, corners 1 and 2 are."""
-    turned = faces.copy()
-    for k in range(3):
-        twice = faces[:, k] == faces[:, k + 1]
-        turned[twice] = np.roll(faces, 2 - k, axis=1)[twice]
-    ends = (faces[:, 0] == faces[:, 3]) & (faces[:, 0] != faces[:, 1])
-    turned[ends] = np.roll(faces, -1, axis=1)[ends]
-    collapsed = _kinds(faces) < 3
-    turned[collapsed] = faces[collapsed][:, :1]
-    return turned
-
-
-def _kinds(faces: NDArray[np.int32]) -> NDArray[np.intp]:
-    """Number of different corners of each face."""
-    ordered = np.sort(faces, axis=1)
-    return 1 + (np.diff(ordered, axis=1) != 0).sum(axis=1)
