@@ -32,11 +32,9 @@ from warp_mca.kernels.shared_memory import (
     barrier,
     head_ring,
     list_pool,
-    node_list,
-    node_pool,
-    places_pool,
     row_functions,
     shared_functions,
+    slot_pools,
     wait_for_copies,
     wait_for_older_copies,
     warp_barrier,
@@ -175,6 +173,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     force_pool, _ = shared_functions(precision)
+    node_pool, list_of_nodes, places_pool = slot_pools(precision)
+    slots = SLOTS[precision]
     load_element, load_corners = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
@@ -254,15 +254,15 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
-        pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
-        node = wp.array(ptr=node_list(), shape=(SLOTS,), dtype=wp.int32)
-        places = wp.array(ptr=places_pool(), shape=(SLOTS,), dtype=wp.vec4ui)
+        pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
+        node = wp.array(ptr=list_of_nodes(), shape=(slots,), dtype=wp.int32)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4ui)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
         if wp.static(plastic):
             if lane == 0:
                 todo[0] = 0
-        begin_turns(X, u, patches, block, stride, lane, ring, node, pool)
+        begin_turns(X, u, patches, block, stride, lane, wp.static(slots), ring, node, pool)
         head = ring[0]
         corners = corners_of(patches, head, lane)
         k = int(0)
@@ -270,12 +270,12 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             copy_places(patches, head, lane, places)
             e = head[0] + lane
             Xl = load_element(pool, 0, corners)
-            ul = load_element(pool, wp.static(SLOTS), corners)
+            ul = load_element(pool, wp.static(slots), corners)
             coming = ring[(k + 1) % wp.static(HEADS)]
             if wp.static(not plastic):
                 wait_for_older_copies()
                 barrier()
-                copy_nodes(X, u, coming, lane, node, pool)
+                copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
             if lane < element_count(head):
                 m = material[e]
                 W = element_rotation(Xl, ul)
@@ -310,7 +310,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                 if listed > 0:
                     barrier()
                 # only now does no lane need the nodes of this patch any more
-                copy_nodes(X, u, coming, lane, node, pool)
+                copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
             corners = corners_of(patches, coming, lane)
             if lane == wp.static(PATCH - 1):
                 copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring)

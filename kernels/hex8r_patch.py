@@ -25,10 +25,8 @@ from warp_mca.kernels.shared_memory import (
     HEADS,
     barrier,
     head_ring,
-    node_list,
-    node_pool,
-    places_pool,
     shared_functions,
+    slot_pools,
     wait_for_copies,
     wait_for_older_copies,
 )
@@ -48,6 +46,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
+    node_pool, list_of_nodes, places_pool = slot_pools(precision)
+    slots = SLOTS[precision]
     load_element, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
@@ -75,12 +75,12 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         lane = wp.tid() % wp.static(PATCH)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
-        pool = wp.array(ptr=node_pool(), shape=(2 * SLOTS,), dtype=wp.vec3d)
-        node = wp.array(ptr=node_list(), shape=(SLOTS,), dtype=wp.int32)
-        places = wp.array(ptr=places_pool(), shape=(SLOTS,), dtype=wp.vec4ui)
+        pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
+        node = wp.array(ptr=list_of_nodes(), shape=(slots,), dtype=wp.int32)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4ui)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
-        begin_turns(X, u, patches, block, stride, lane, ring, node, pool)
+        begin_turns(X, u, patches, block, stride, lane, wp.static(slots), ring, node, pool)
         head = ring[0]
         corners = corners_of(patches, head, lane)
         k = int(0)
@@ -88,11 +88,11 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             copy_places(patches, head, lane, places)
             e = head[0] + lane
             x = to_patterns(load_element(pool, 0, corners))
-            du = to_patterns(load_element(pool, wp.static(SLOTS), corners))
+            du = to_patterns(load_element(pool, wp.static(slots), corners))
             coming = ring[(k + 1) % wp.static(HEADS)]
             wait_for_older_copies()
             barrier()
-            copy_nodes(X, u, coming, lane, node, pool)
+            copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
             if lane < element_count(head):
                 b, volume, W, H, q = shape_and_strain(x, du)
                 P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)

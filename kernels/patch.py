@@ -26,7 +26,7 @@ from warp_mca.kernels.shared_memory import (
 from warp_mca.patches import NOWHERE, PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
-SLOTS_OF_THREAD = (SLOTS + PATCH - 1) // PATCH
+SLOTS_OF_THREAD = (max(SLOTS.values()) + PATCH - 1) // PATCH
 
 wp.set_module_options({"enable_backward": False})
 
@@ -146,14 +146,18 @@ def copy_nodes(
     head: wp.vec4i,
     lane: int,
     node: wp.array(dtype=wp.int32),
+    slots: int,
     pool_out: wp.array(dtype=wp.vec3d),
 ):
-    """Begin to copy positions and displacements of a patch into shared memory; its own list of nodes has arrived."""
+    """Begin to copy positions and displacements of a patch into shared memory; its own list of nodes has arrived.
+
+    Displacements stand `slots` behind positions.
+    """
     for k in range(wp.static(SLOTS_OF_THREAD)):
         n = lane + k * wp.static(PATCH)
         if n < slot_count(head):
             copy_vector(X, node[n], n, pool_out)
-            copy_vector(u, node[n], n + wp.static(SLOTS), pool_out)
+            copy_vector(u, node[n], n + slots, pool_out)
 
 
 @wp.func
@@ -164,6 +168,7 @@ def begin_turns(
     block: int,
     stride: int,
     lane: int,
+    slots: int,
     ring_out: wp.array(dtype=wp.vec4i),
     node_out: wp.array(dtype=wp.int32),
     pool_out: wp.array(dtype=wp.vec3d),
@@ -175,7 +180,7 @@ def begin_turns(
     barrier()
     copy_list(patches, ring_out[0], lane, node_out)
     wait_for_copies()
-    copy_nodes(X, u, ring_out[0], lane, node_out, pool_out)
+    copy_nodes(X, u, ring_out[0], lane, node_out, slots, pool_out)
     wait_for_copies()
     copy_list(patches, ring_out[1], lane, node_out)
     barrier()
@@ -192,7 +197,7 @@ def corners_of(patches: Patches, head: wp.vec4i, lane: int):
 def load_functions(precision: str) -> tuple[Any, Any]:
     """Functions: an element's nodes relative to its first, as `hexahedron.load_function`; two of its corners so."""
     t = scalars(precision)
-    R, vec3, mat83 = t.real, t.vec3, t.mat83
+    R, vec3, mat83, slots = t.real, t.vec3, t.mat83, SLOTS[precision]
     # Fast math would also flush what is too small, in three instructions for each number.
     convert = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
 
@@ -222,12 +227,12 @@ def load_functions(precision: str) -> tuple[Any, Any]:
         lower = int((patches.corner[a // 2, e] >> shift) & wp.uint32(0xFFFF))
         upper = int((patches.corner[a // 2 + 2, e] >> shift) & wp.uint32(0xFFFF))
         X = pool[origin]
-        u = pool[origin + wp.static(SLOTS)]
+        u = pool[origin + wp.static(slots)]
         return (
             difference(pool, lower, X),
-            difference(pool, lower + wp.static(SLOTS), u),
+            difference(pool, lower + wp.static(slots), u),
             difference(pool, upper, X),
-            difference(pool, upper + wp.static(SLOTS), u),
+            difference(pool, upper + wp.static(slots), u),
         )
 
     return load_element, load_corners

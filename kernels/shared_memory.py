@@ -29,27 +29,9 @@ def warp_barrier():
     ...
 
 
-@wp.func_native(f"__shared__ int pool[{SLOTS}]; return (unsigned long long)pool;")
-def node_list() -> wp.uint64:
-    """Address of shared memory for the nodes of a patch."""
-    ...
-
-
-@wp.func_native(f"__shared__ double pool[{6 * SLOTS}]; return (unsigned long long)pool;")
-def node_pool() -> wp.uint64:
-    """Address of shared memory for reference positions, then displacements, of the slots of a patch."""
-    ...
-
-
 @wp.func_native(f"__shared__ int pool[{PATCH + 1}]; return (unsigned long long)pool;")
 def list_pool() -> wp.uint64:
     """Address of shared memory for a list of elements of a patch, its length first."""
-    ...
-
-
-@wp.func_native(f"__shared__ uint4 pool[{SLOTS}]; return (unsigned long long)pool;")
-def places_pool() -> wp.uint64:
-    """Address of shared memory for where the forces of the slots of a patch lie."""
     ...
 
 
@@ -57,6 +39,26 @@ def places_pool() -> wp.uint64:
 def head_ring() -> wp.uint64:
     """Address of shared memory for the heads of the patches that a block of threads computes next."""
     ...
+
+
+@cache
+def slot_pools(precision: str) -> tuple[Any, Any, Any]:
+    """Functions: addresses of shared memory for what each slot of a patch has.
+
+    (Reference positions, then displacements; nodes; where the forces lie.)
+    """
+    slots = SLOTS[precision]
+
+    @wp.func_native(f"__shared__ double pool[{6 * slots}]; return (unsigned long long)pool;")
+    def node_pool() -> wp.uint64: ...
+
+    @wp.func_native(f"__shared__ int pool[{slots}]; return (unsigned long long)pool;")
+    def list_of_nodes() -> wp.uint64: ...
+
+    @wp.func_native(f"__shared__ uint4 pool[{slots}]; return (unsigned long long)pool;")
+    def places_pool() -> wp.uint64: ...
+
+    return node_pool, list_of_nodes, places_pool
 
 
 @cache

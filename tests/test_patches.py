@@ -43,7 +43,7 @@ def test_corners_and_sums_are_those_of_the_mesh(name: str):
     conn = np.ascontiguousarray(meshes()[name].astype(np.int32))
     patches = make_patches(conn)
     assert np.diff(patches.start).max() <= PATCH
-    assert np.diff(patches.slot_start).max() <= SLOTS
+    assert np.diff(patches.slot_start).max() <= SLOTS["mixed"]
     first = patches.slot_start[patch_of_elements(patches)]
     np.testing.assert_array_equal(patches.node[halves(patches.corner) + first[:, None]], conn.T)
     force = np.random.default_rng(1).normal(size=conn.shape)

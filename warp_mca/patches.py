@@ -13,7 +13,7 @@ from warp_mca.elements.hexahedron import chunks
 from warp_mca.geometry.boxes import cell_boxes
 
 PATCH = 128  # elements of a patch, and threads of its block
-SLOTS = 304  # that a patch may have: as many as shared memory holds in float64
+SLOTS = {"mixed": 384, "float64": 304}  # that a patch may have, as far as shared memory holds them
 SUMMED = 8  # forces that a slot sums at most
 NOWHERE = 24 * PATCH  # behind the forces of all corners, where shared memory holds nothing but zeros
 LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
@@ -118,7 +118,7 @@ class Patches:
         return np.column_stack([self.start[:-1], self.slot_start[:-1], counts, np.arange(len(counts))]).astype(np.int32)
 
 
-def make_patches(conn: Index, ends: Sequence[int] = ()) -> Patches:
+def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixed"]) -> Patches:
     """Patches of elements that stand in a compact order; those with too many nodes are halved.
 
     A node has a slot in each patch around it, and one more for every SUMMED corners that meet there.
@@ -126,12 +126,13 @@ def make_patches(conn: Index, ends: Sequence[int] = ()) -> Patches:
     Args:
         conn: nodes of each element, shape (corners, element_count), int32.
         ends: where the elements of each scene of a batch end; each has patches of its own, as if it were alone.
+        slots: that a patch may have.
     """
     count = conn.shape[1]
     ends = sorted({0, *ends, count})
     start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
     lots = chunks(len(start) - 1, LOT // PATCH)
-    made = [_patches(conn[:, start[lot.start] : start[lot.stop]], start[lot.start : lot.stop + 1]) for lot in lots]
+    made = [_patches(conn[:, start[a.start] : start[a.stop]], start[a.start : a.stop + 1], slots) for a in lots]
     starts, slot_starts = [part.start[:-1] for part in made], [np.diff(part.slot_start) for part in made]
     return Patches(
         start=np.append(np.concatenate(starts), count).astype(np.int32),
@@ -142,7 +143,7 @@ def make_patches(conn: Index, ends: Sequence[int] = ()) -> Patches:
     )
 
 
-def _patches(conn: Index, start: NDArray[np.int64]) -> Patches:
+def _patches(conn: Index, start: NDArray[np.int64], slots: int) -> Patches:
     """Patches of one range of elements; `start` counts from the first element of all."""
     corners, count = conn.shape
     bits = conn.size.bit_length()
@@ -157,7 +158,7 @@ def _patches(conn: Index, start: NDArray[np.int64]) -> Patches:
         rank, head, slot = _slots(key)
         opened = key[head]
         slot_start = np.searchsorted(opened, np.arange(len(start)) << 32)
-        large = np.flatnonzero(np.diff(slot_start) > SLOTS)
+        large = np.flatnonzero(np.diff(slot_start) > slots)
         if not len(large):
             break
         start = np.sort(np.append(start, (start[large] + start[large + 1]) // 2))

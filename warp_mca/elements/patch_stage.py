@@ -9,7 +9,7 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import patch
-from warp_mca.patches import PATCH, make_patches
+from warp_mca.patches import PATCH, SLOTS, make_patches
 from warp_mca.threads import Split, whole
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class PatchStage(ElementStage):
         """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
-        host = make_patches(block.conn, block.ends)
+        host = make_patches(block.conn, block.ends, SLOTS[precision])
         self.slot_node = host.node
         heads = host.heads()
         resident = wp.get_device().sm_count * patch_kernels.resident(precision, block.plastic)
