@@ -183,7 +183,11 @@ class Held:
         return not self.solver.flag.numpy().any() and bool(np.isfinite(self.solver.u.numpy()).all())
 
     def forces(self) -> NDArray[np.float64]:
-        """Element forces [N] at the state."""
+        """Forces of the elements on each node at the state [N], shape (node_count, 3)."""
         self.reset()
         self.solver.step(1)
-        return self.solver.force.numpy().astype(np.float64)
+        # slots of patches are other ones in each precision
+        node = np.concatenate([stage.slot_node for stage in self.solver.elements])
+        slots = self.solver.force.numpy().astype(np.float64)
+        count = self.solver.model.node_count
+        return np.stack([np.bincount(node, slots[:, k], minlength=count) for k in range(3)], axis=1)

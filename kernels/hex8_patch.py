@@ -65,19 +65,19 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any]:
     @wp.func
     def to_point_lines(lower: vec3, upper: vec3, xi: R, eta: R):
         r = R(LINE_RATIO)
-        s0 = lower + r * upper
-        s1 = upper + r * lower
-        d = upper - lower  # edge along zeta
-        o0 = other(s0, 2)
-        o1 = other(s1, 2)
-        e0 = eta * (s0 - o0)  # edge along eta
-        e1 = eta * (s1 - o1)
-        s0 = s0 + r * o0
-        s1 = s1 + r * o1
-        d = d + r * other(d, 2)
-        gx0 = xi * (s0 - other(s0, 1))
-        gx1 = xi * (s1 - other(s1, 1))
-        return gx0, gx1, e0 + r * other(e0, 1), e1 + r * other(e1, 1), d + r * other(d, 1)
+        x0 = other(lower, 1)  # across xi
+        x1 = other(upper, 1)
+        y0 = other(lower, 2)  # across eta
+        y1 = other(upper, 2)
+        z0 = other(x0, 2)  # across both
+        z1 = other(x1, 2)
+        # first the differences of corners, which lose nothing to rounding, then their means
+        a0 = xi * ((lower - x0) + r * (y0 - z0))
+        a1 = xi * ((upper - x1) + r * (y1 - z1))
+        b0 = eta * ((lower - y0) + r * (x0 - z0))
+        b1 = eta * ((upper - y1) + r * (x1 - z1))
+        c = (upper - lower) + r * (y1 - y0) + r * ((x1 - x0) + r * (z1 - z0))
+        return a0 + r * a1, a1 + r * a0, b0 + r * b1, b1 + r * b0, c
 
     @wp.func
     def to_corners(Fx0: vec3, Fx1: vec3, Fy0: vec3, Fy1: vec3, Fz: vec3, xi: R, eta: R):

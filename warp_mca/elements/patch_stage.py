@@ -48,6 +48,10 @@ class PatchStage(ElementStage):
         """Those of a step."""
         return [*super().kernels(), *([patch.schedule] if self.scheduled else [])]
 
+    def make_room(self) -> None:
+        """A block for each patch: as they come to an end, contact finds registers and shared memory."""
+        self.blocks = len(self.patches.head)
+
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
         if self.scheduled:
