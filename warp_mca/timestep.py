@@ -64,13 +64,12 @@ def stable_step(
     worst, element = float(value.max()), int(first[value.argmax()])
     bound[first] = 0.0
     left = np.flatnonzero(bound > worst)
+    if len(left) > MOST:
+        left = left[_different(X, conn[left], bound[left])]
     for part in chunks(len(left), CHUNK):
         bound[left[part]] = bounds(left[part], False)
     left = left[bound[left] > worst]
     left = left[np.argsort(-bound[left], kind="stable")]
-    if len(left) > MOST:
-        x = X[conn[left]]
-        left = left[_different(np.column_stack([bound[left], (x - x[:, :1]).reshape(len(left), -1)]))]
     for start in range(0, len(left), BATCH):
         part = left[start : start + BATCH]
         if bound[part[0]] <= worst:
@@ -92,10 +91,21 @@ def _greatest(value: Array, count: int) -> NDArray[np.intp]:
     return found[np.argsort(-value[found], kind="stable")][:count]
 
 
-def _different(rows: Array) -> NDArray[np.intp]:
-    """First of each lot of rows that agree to a millionth of their columns' largest entries, in order."""
-    digits = np.round(rows / np.abs(rows).max(axis=0).clip(np.finfo(float).tiny) * 1e6).astype(np.int32)
-    _, kept = np.unique(
-        np.ascontiguousarray(digits).view(f"V{digits.itemsize * digits.shape[1]}").ravel(), return_index=True
-    )
-    return np.sort(kept)
+def _different(X: Array, conn: Index, bound: Array) -> NDArray[np.intp]:
+    """First of each lot of elements whose shapes and bounds agree to a millionth of the greatest, in order."""
+    size = max(float(np.abs(X[conn[:, k]] - X[conn[:, 0]]).max()) for k in range(1, conn.shape[1]))
+    weights = np.random.default_rng(0).integers(1, 2**62, 1 + 3 * conn.shape[1]) | 1
+
+    def digits(part: NDArray[np.intp] | slice) -> NDArray[np.int64]:
+        shape = (X[conn[part]] - X[conn[part, :1]]).reshape(-1, 3 * conn.shape[1]) / size
+        return np.rint(1e6 * np.column_stack([bound[part] / bound.max(), shape])).astype(np.int64)
+
+    key = np.empty(len(conn), dtype=np.int64)
+    for part in chunks(len(conn), CHUNK):
+        key[part] = (digits(part) * weights).sum(axis=1)
+    _, first, lot = np.unique(key, return_index=True, return_inverse=True)
+    kept = np.zeros(len(conn), dtype=bool)
+    kept[first] = True
+    for part in chunks(len(conn), CHUNK):  # lots that only have a key in common are told apart
+        kept[part] |= (digits(part) != digits(first[lot[part]])).any(axis=1)
+    return np.flatnonzero(kept)
