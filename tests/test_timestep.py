@@ -12,7 +12,7 @@ from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues,
 from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.solver import Solver
-from warp_mca.timestep import stable_step
+from warp_mca.timestep import MOST, stable_step
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01
@@ -155,6 +155,20 @@ def test_worst_of_many_elements_is_found_wherever_it_lies():
         assert found.contact_share == pytest.approx(contact[found.element] / exact.max(), rel=1e-12)
         ranks.append((eigenvalue_bounds(x, K, G, mass) + contact > (exact + 0.0).max()).sum())
     assert max(ranks) > 256  # some had to look beyond the first batch
+
+
+def test_odd_element_is_found_among_many_alike():
+    """Elements that repeat another are left out, one that differs in shape or in moduli alone is not."""
+    n, odd = MOST + 1000, MOST + 500
+    conn, mass, contact = np.arange(8 * n).reshape(n, 8), np.full((n, 8), 2e3 * H**3 / 8.0), np.zeros(n)
+    for larger, stiffer in ((1.001, 1.0), (1.0, 1.001)):
+        x, K = np.tile(H * CUBE, (n, 1, 1)), np.full(n, 1e11)
+        x[odd] *= larger  # its mass is that of the others
+        K[odd] *= stiffer
+        exact = largest_eigenvalues(x[odd : odd + 1], K[odd : odd + 1], 0.5 * K[odd : odd + 1], mass[:1])
+        found = stable_step(ELEMENTS["hex8"], x.reshape(-1, 3), conn, K, 0.5 * K, mass, contact, np.arange(n))
+        assert found.element == odd
+        assert found.dt == pytest.approx(2.0 / np.sqrt(exact[0]), rel=1e-12)
 
 
 def clamped() -> mca.Scene:
