@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import simulation
+from warp_mca import simulation, timestep
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.solver import Solver
-from warp_mca.timestep import MOST, stable_step
+from warp_mca.timestep import stable_step
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01
@@ -157,9 +157,14 @@ def test_worst_of_many_elements_is_found_wherever_it_lies():
     assert max(ranks) > 256  # some had to look beyond the first batch
 
 
-def test_odd_element_is_found_among_many_alike():
-    """Elements that repeat another are left out, one that differs in shape or in moduli alone is not."""
-    n, odd = MOST + 1000, MOST + 500
+@pytest.mark.parametrize("key", [timestep.KEY, 0 * timestep.KEY])
+def test_odd_element_is_found_among_many_alike(key: np.ndarray, monkeypatch: pytest.MonkeyPatch):
+    """Elements that repeat another are left out, one that differs in shape or in moduli alone is not.
+
+    Nor where all have one key.
+    """
+    monkeypatch.setattr(timestep, "KEY", key)
+    n, odd = timestep.MOST + 1000, timestep.MOST + 500
     conn, mass, contact = np.arange(8 * n).reshape(n, 8), np.full((n, 8), 2e3 * H**3 / 8.0), np.zeros(n)
     for larger, stiffer in ((1.001, 1.0), (1.0, 1.001)):
         x, K = np.tile(H * CUBE, (n, 1, 1)), np.full(n, 1e11)

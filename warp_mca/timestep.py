@@ -15,6 +15,7 @@ Index = NDArray[np.int32]
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
 MOST = 100 * BATCH  # of them: 24 x 24 problems cost 50 us each
+KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,6 @@ def _greatest(value: Array, count: int) -> NDArray[np.intp]:
 def _different(X: Array, conn: Index, bound: Array) -> NDArray[np.intp]:
     """First of each lot of elements whose shapes and bounds agree to a millionth of the greatest, in order."""
     size = max(float(np.abs(X[conn[:, k]] - X[conn[:, 0]]).max()) for k in range(1, conn.shape[1]))
-    weights = np.random.default_rng(0).integers(1, 2**62, 1 + 3 * conn.shape[1]) | 1
 
     def digits(part: NDArray[np.intp] | slice) -> NDArray[np.int64]:
         shape = (X[conn[part]] - X[conn[part, :1]]).reshape(-1, 3 * conn.shape[1]) / size
@@ -102,7 +102,7 @@ def _different(X: Array, conn: Index, bound: Array) -> NDArray[np.intp]:
 
     key = np.empty(len(conn), dtype=np.int64)
     for part in chunks(len(conn), CHUNK):
-        key[part] = (digits(part) * weights).sum(axis=1)
+        key[part] = (digits(part) * KEY[: 1 + 3 * conn.shape[1]]).sum(axis=1)
     _, first, lot = np.unique(key, return_index=True, return_inverse=True)
     kept = np.zeros(len(conn), dtype=bool)
     kept[first] = True
