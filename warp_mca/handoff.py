@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from warp_mca.chain import Array, Chain, link_axes
 from warp_mca.errors import bad_value
@@ -14,6 +13,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid import Swing, chain_from_scene, swing
 from warp_mca.scene import Body, RigidPlane, Scene, Surface
 from warp_mca.target import TargetPlane, target_plane, tip_gap
+from warp_mca.turn import turn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,11 +159,10 @@ def hand_off(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str
 def _own_placement(body: Body, t: float) -> Placement:
     """Pose and motion of a free body after t [s] at its own velocity and angular velocity."""
     omega, velocity = np.array(body.angular_velocity), np.array(body.velocity)
-    turn = Rotation.from_rotvec(omega * t) * Rotation.from_rotvec(body.rotation)
     return Placement(
         pivot=np.zeros(3),
         origin=np.array(body.position) + velocity * t,
-        rotation=turn.as_matrix(),
+        rotation=turn(omega * t) @ turn(body.rotation),
         velocity=velocity,
         angular_velocity=omega,
     )

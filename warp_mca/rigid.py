@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
-from scipy.optimize import OptimizeResult, brentq
-from scipy.spatial.transform import Rotation
 
 from warp_mca.chain import Array, Chain, Link, Vec2, mesh_link, slender_link
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene import Revolute, Scene, Tip, Vec3
+from warp_mca.turn import turn
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Gap = Callable[[float, Array], float]
 
@@ -79,6 +81,7 @@ def swing(chain: Chain, theta0: ArrayLike, theta_dot0: ArrayLike, gap: Gap, t_ma
     start = np.concatenate([np.asarray(theta0, dtype=np.float64), np.asarray(theta_dot0, dtype=np.float64)])
     if start.shape != (2 * count,) or not np.isfinite(start).all():
         raise bad_value("RigidPhase.theta", theta0, f"give a finite angle and rate for each of {count} links")
+    from scipy.integrate import solve_ivp  # whose import takes a tenth of a second
 
     def flow(_t: float, y: Array) -> Array:
         return np.concatenate([y[count:], chain.acceleration(y[:count], y[count:])])
@@ -121,6 +124,8 @@ def _check_start(gap: float, approach: float, reach: float) -> bool:
 
 def _touch(run: OptimizeResult, distance: Callable[[float, Array], float], t_max: float) -> float:
     """First time at which the gap closes [s]: the terminal event, or an earlier dip within one step."""
+    from scipy.optimize import brentq
+
     closes = [float(t) for t in run.t_events[0]]
     nearest = [(distance(t, run.sol(t)), float(t)) for t in (*run.t_events[1], run.t[-1])]
     for gap, t in nearest[:-1]:
@@ -220,7 +225,7 @@ def _apex(tip: Tip, hinge: Vec2) -> Vec2:
 def _ground_hinge(scene: Scene, name: str, hinge: Vec2) -> Vec2:
     """World position of the first hinge [m]: position + R(rotation) hinge, in the plane."""
     body = scene.body(name)
-    turned = Rotation.from_rotvec(body.rotation).apply((*hinge, 0.0))
+    turned = turn(body.rotation) @ (*hinge, 0.0)
     return (body.position[0] + float(turned[0]), body.position[1] + float(turned[1]))
 
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from warp_mca.chain import Array, Chain
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid import Gap
 from warp_mca.scene import RigidPlane, Scene, Surface, Tip
+from warp_mca.turn import turn
 
 FLATNESS = 1e-6  # of a target surface, as a share of its extent
 
@@ -55,8 +55,8 @@ def target_plane(scene: Scene, target: Surface | RigidPlane, meshes: Mapping[str
                 f"Body {body.name}.angular_velocity", body.angular_velocity, "a target must not turn; give 0"
             )
         point, normal = _mean_plane(meshes[target.body], target)
-        turn = Rotation.from_rotvec(body.rotation).as_matrix()
-        point, normal = np.asarray(body.position) + turn @ point, turn @ normal
+        turned = turn(body.rotation)
+        point, normal = np.asarray(body.position) + turned @ point, turned @ normal
         velocity = np.array(body.velocity, dtype=np.float64)
     normal = normal / np.linalg.norm(normal)
     if math.hypot(normal[0], normal[1]) < 1e-6:
