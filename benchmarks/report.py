@@ -117,14 +117,19 @@ def at_ceiling(data: Data, row: dict) -> dict[str, float]:
     }
 
 
+def is_largest(row: dict, rows: list[dict]) -> bool:
+    """Whether none of `rows` has more of the same element in the same precision."""
+    return row["size"] == sizes_of([q for q in rows if all(q[k] == row[k] for k in ("element", "precision"))])[-1]
+
+
 def memory(data: Data) -> str:
-    """Memory held and moved, operations, and how near the ceilings are, at the largest size of each element."""
+    """Memory held and moved, operations, and how near the ceilings are, at the largest size they are known for."""
     rows = [r for r in data.get("rates", []) if "bytes_per_element" in r]
     if not rows or "ceilings" not in data or "flops" not in data:
         return ""
     lines = []
     for r in rows:
-        if r["size"] != sizes_of([q for q in rows if q["element"] == r["element"]])[-1]:
+        if not is_largest(r, rows):
             continue
         at = at_ceiling(data, r)
         words = [r["element"], r["precision"], r["case"], r["size"], figure(r["bytes_per_element"])]
@@ -263,9 +268,9 @@ def roofline(paths: list[Path], target: Path) -> None:
             line = sorted([x[0], min(max(ridge, x[0]), x[1]), x[1]])
             y = [min(top["bytes"] * value, top[name]) / 1e9 for value in line]
             axes.plot(line, y, style, color=BLACK, linewidth=1.2, label={"f32": "float32", "f64": "float64"}[name])
-        elastic = [r for r in data["rates"] if r["case"] == "elastic"]
+        elastic = [r for r in data["rates"] if r["case"] == "elastic" and "bytes_per_element" in r]
         for r in elastic:
-            if r["size"] == sizes_of([q for q in elastic if q["element"] == r["element"]])[-1]:
+            if is_largest(r, elastic):
                 at = at_ceiling(data, r)
                 marker = "o" if r["precision"] == "mixed" else "s"
                 label = f"{r['element']} {r['precision']}"
