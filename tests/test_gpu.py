@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 
 import warp_mca as mca
 
@@ -121,3 +122,31 @@ def test_scenes_of_a_batch_give_the_bits_that_they_give_alone():
         assert all(np.array_equal(one[name], result[name], equal_nan=True) for name in one.history)
         assert one.summary["max_plastic_strain"] == result.summary["max_plastic_strain"]
     assert len({float(result.F_t.max()) for result in results[:3]}) == 3
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex8r"])
+@pytest.mark.parametrize("yielding", [None, 0.0, 0.3, 1.0])
+def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element, yielding):
+    """More patches than the device holds blocks for: each takes some in turn, those where elements yield first."""
+    from benchmarks.blocks import Case, Held, assemble
+
+    model = assemble(element, 90_000)
+    exact = Held(model, Case(yielding), "cpu", "float64").forces()
+    for precision, tolerance in (("mixed", 1e-4), ("float64", 1e-11)):
+        held = Held(model, Case(yielding), "cuda:0", precision)
+        stage = held.solver.elements[0]
+        assert stage.blocks < len(stage.patches.head)
+        one = held.forces()
+        with wp.ScopedDevice("cuda:0"):
+            stage.schedule()
+        assert np.array_equal(held.forces(), one)
+        assert np.abs(one - exact).max() < tolerance * np.abs(exact).max()
+        stage.make_room()  # a block for each patch, as where there is contact
+        held.solver.graphs.clear()
+        assert np.array_equal(held.forces(), one)
+        host = Held(model, Case(yielding), "cpu", precision)
+        host.forces()
+        assert held.yielded() == host.yielded()
+        for a, b in zip(held.solver.elements, host.solver.elements, strict=True):
+            scale = np.abs(b.history.numpy()).max(initial=1e-30)
+            np.testing.assert_allclose(a.history.numpy(), b.history.numpy(), rtol=0, atol=10.0 * tolerance * scale)
