@@ -14,7 +14,6 @@ from warp_mca.history import (
     force_peaks,
     interval_edges,
     intervals,
-    prominent_peaks,
     reverses,
     stick_intervals,
 )
@@ -94,19 +93,6 @@ def test_peaks_are_not_confused_by_nodes_entering_and_leaving_contact():
     peaks = force_peaks(TIME, two_bumps() * jitter)
     assert [peak[0] for peak in peaks] == pytest.approx([1e-4, 3e-4], abs=3e-6)
     assert [peak[1] for peak in peaks] == pytest.approx([3e3, 2e3], rel=0.09)
-
-
-@pytest.mark.parametrize("levels", [3, 12, 10_000])
-def test_prominent_peaks_are_those_of_scipy(levels: int):
-    """Also flat ones, equal ones, and none."""
-    from scipy.signal import find_peaks
-
-    rng = np.random.default_rng(levels)
-    for length in (0, 1, 2, 3, 60, 400):
-        value = rng.integers(levels, size=length).astype(float)
-        for prominence in (0.0, 0.3 * levels, 0.9 * levels):
-            expected, _ = find_peaks(value, prominence=prominence)
-            np.testing.assert_array_equal(prominent_peaks(value, prominence), expected)
 
 
 def test_the_largest_peak_is_the_largest_force():

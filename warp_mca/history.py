@@ -87,30 +87,6 @@ def reverses(F_t: Array) -> bool:
     return bool(size > 0.0 and F_t.max() > size and F_t.min() < -size)
 
 
-def prominent_peaks(value: Array, prominence: float) -> NDArray[np.intp]:
-    """Indices of the local maxima that stand out by `prominence` or more, the middle of those that are flat.
-
-    A peak's prominence is its height over the higher of the lowest values on either side of it, up to where the curve
-    rises above it. As `scipy.signal.find_peaks` has it, whose import takes a quarter of a second.
-
-    Args:
-        value: shape (count,).
-    """
-    begin = np.flatnonzero(np.diff(value, prepend=np.nan) != 0.0)
-    level = value[begin]  # one entry for each run of equal values
-    end = np.append(begin[1:], len(value)) - 1
-    inner = np.arange(1, len(level) - 1)
-    found = []
-    for k in inner[(level[inner] > level[inner - 1]) & (level[inner] > level[inner + 1])]:
-        higher = np.flatnonzero(level > level[k])
-        left, right = higher[higher < k], higher[higher > k]
-        before = level[left[-1] + 1 if len(left) else 0 : k].min()
-        behind = level[k + 1 : right[0] if len(right) else len(level)].min()
-        if level[k] - max(before, behind) >= prominence:
-            found.append((begin[k] + end[k]) // 2)
-    return np.array(found, dtype=np.intp)
-
-
 def force_peaks(time: Array, F_n: Array) -> list[Interval]:
     """Time [s] and value [N] of each peak of F_n, in order: one for each turn from compression to restitution.
 
@@ -124,13 +100,14 @@ def force_peaks(time: Array, F_n: Array) -> list[Interval]:
         F_n: normal force [N], shape (row_count,).
     """
     from scipy.ndimage import gaussian_filter1d
+    from scipy.signal import find_peaks
 
     if np.max(F_n, initial=0.0) <= 0.0:
         return []
     sigma = SMOOTHING / float(np.median(np.diff(interval_edges(time))))
     smooth = gaussian_filter1d(F_n, sigma, mode="nearest")
     # A zero on either side lets a force that begins or ends high count as a peak.
-    found = prominent_peaks(np.pad(smooth, 1), PROMINENCE * float(smooth.max()))
+    found, _ = find_peaks(np.pad(smooth, 1), prominence=PROMINENCE * float(smooth.max()))
     valleys = [a + int(np.argmin(smooth[a:b])) for a, b in zip(found[:-1] - 1, found[1:] - 1, strict=True)]
     bounds = [0, *valleys, len(F_n)]
     rows = [a + int(np.argmax(F_n[a:b])) for a, b in itertools.pairwise(bounds)]

@@ -28,10 +28,6 @@ class Element(Protocol):
     name: str
     corners: int
 
-    def volumes(self, x: Array) -> Array:
-        """Volumes [m^3], shape (element_count,)."""
-        ...
-
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """Lumped masses [kg], shape (element_count, corners), that keep the mass and the centre of mass exactly."""
         ...

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from warp_mca.elements.element import Array
-from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses, volumes
+from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
@@ -17,7 +17,6 @@ class Hex8:
 
     name = "hex8"
     corners = 8
-    volumes = staticmethod(volumes)
     lumped_masses = staticmethod(lumped_masses)
     eigenvalue_bounds = staticmethod(eigenvalue_bounds)
     largest_eigenvalues = staticmethod(largest_eigenvalues)

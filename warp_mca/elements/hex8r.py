@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.elements.element import Array, largest
-from warp_mca.elements.hexahedron import CORNERS, chunks, gradients, lumped_masses, volumes
+from warp_mca.elements.hexahedron import CORNERS, chunks, gradients, lumped_masses
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
@@ -56,7 +56,6 @@ class Hex8r:
 
     name = "hex8r"
     corners = 8
-    volumes = staticmethod(volumes)
     lumped_masses = staticmethod(lumped_masses)
 
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:

@@ -30,7 +30,6 @@ class Tet4:
 
     name = "tet4"
     corners = 4
-    volumes = staticmethod(volumes)
 
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """A quarter of the mass at each corner."""
