@@ -98,8 +98,8 @@ class Solver:
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         for stage in self.elements if self.contacts else ():
             stage.make_room()
-        # contact and sums have few threads and wait long for memory
-        self.side = wp.Stream() if wp.get_device().is_cuda else None
+        # contact and sums have few threads and wait long for memory, so that they go first where there is room
+        self.side = wp.Stream(priority=-1) if wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
         self.bonds = BondStage(model, self.layout)
