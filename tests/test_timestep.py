@@ -176,6 +176,18 @@ def test_odd_element_is_found_among_many_alike(key: np.ndarray, monkeypatch: pyt
         assert found.dt == pytest.approx(2.0 / np.sqrt(exact[0]), rel=1e-12)
 
 
+def test_element_that_shortens_the_step_is_named():
+    """A bar of equal elements but for one, a twentieth as thick."""
+    for thickness, named in ((1.0, False), (0.05, True)):
+        mesh = box(8, 1, 1, size=(8 * H, H, H))
+        mesh.points[:, 0] -= (1.0 - thickness) * H * (mesh.points[:, 0] > 3.5 * H)
+        body = mca.Body(name="bar", geometry=mesh, material=STEEL)
+        result = mca.run(mca.Scene(name="thin", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6)))
+        said = [warning for warning in result.warnings if "times shorter" in warning]
+        assert bool(said) == named
+        assert all("element 3 of body bar" in warning for warning in said)
+
+
 def clamped() -> mca.Scene:
     """A distorted bar that sags from one end."""
     body = mca.Body(name="bar", geometry=shaken(box(4, 1, 1, size=(4 * H, H, H)), 0.05), material=STEEL)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from warp_mca.simulation import Steps
     from warp_mca.solver import Solver
 
+SHORTENED = 10.0  # an element that makes the time step so many times shorter is worth a look
 COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
 
 
@@ -139,6 +140,15 @@ class Account:
             found.append(
                 f"strain reached {ledger.max_strain:.2f}; the co-rotational element takes strains as small, "
                 f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose kinematics='finite'"
+            )
+        stable = self.ready.model.stable
+        if stable.shortened > SHORTENED:
+            name, element = self.ready.model.owner(stable.element)
+            mesh = self.ready.meshes[name]
+            x, y, z = mesh.points[mesh.cell(element)].mean(axis=0)
+            found.append(
+                f"element {element} of body {name}, at ({x:.4g}, {y:.4g}, {z:.4g}) m in the body's frame, makes the "
+                f"time step {stable.shortened:.0f} times shorter than half of the elements need; improve the mesh there"
             )
         if scene.rigid and scene.rigid.inertia == "slender":
             found.append(

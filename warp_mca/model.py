@@ -74,6 +74,11 @@ class Model:
     stable: StableStep
     batch: Layout | None = None
 
+    def owner(self, element: int) -> tuple[str, int]:
+        """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""
+        first, name = max((first, name) for name, first in self.element_start.items() if first <= element)
+        return name, element - first
+
     @property
     def node_count(self) -> int:
         """Number of nodes."""

@@ -73,9 +73,7 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     )
     start = hand_off(scene, meshes, nodal_masses(scene, meshes))
     model = build_model(scene, meshes, start.positions, start.velocities)
-    worst = model.stable.element
-    first, owner = max((first, name) for name, first in model.element_start.items() if first <= worst)
-    element = worst - first
+    owner, element = model.owner(model.stable.element)
     x, y, z = meshes[owner].points[meshes[owner].cell(element)].mean(axis=0).tolist()
     return Quality(
         bodies=bodies,
