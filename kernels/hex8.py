@@ -12,6 +12,8 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
+from warp_mca.kernels.hex8_finite import finite_force_kernel
 from warp_mca.kernels.hexahedron import (
     LINE_SCALE,
     edge_functions,
@@ -33,105 +35,6 @@ _THIRD = 1.0 / 3.0
 
 
 @cache
-def stress_functions(precision: str) -> tuple[Any, Any]:
-    """Functions of the symmetric stress (xx, yy, zz, xy, yz, xz): (S b + c; six sums of products l b, as strains)."""
-    t = scalars(precision)
-    R, vec3 = t.real, t.vec3
-
-    @wp.func
-    def add_traction(xx: R, yy: R, zz: R, xy: R, yz: R, xz: R, b: vec3, c: vec3):
-        # nested so that every product fuses with a sum
-        return vec3(
-            xx * b[0] + (xy * b[1] + (xz * b[2] + c[0])),
-            xy * b[0] + (yy * b[1] + (yz * b[2] + c[1])),
-            xz * b[0] + (yz * b[1] + (zz * b[2] + c[2])),
-        )
-
-    @wp.func
-    def symmetric_gradient(l0: vec3, l1: vec3, l2: vec3, b0: vec3, b1: vec3, b2: vec3):
-        """Direct components, and twice the shear ones, of the sum of l b."""
-        xx = l0[0] * b0[0] + l1[0] * b1[0] + l2[0] * b2[0]
-        yy = l0[1] * b0[1] + l1[1] * b1[1] + l2[1] * b2[1]
-        zz = l0[2] * b0[2] + l1[2] * b1[2] + l2[2] * b2[2]
-        xy = l0[0] * b0[1] + l1[0] * b1[1] + l2[0] * b2[1] + l0[1] * b0[0] + l1[1] * b1[0] + l2[1] * b2[0]
-        yz = l0[1] * b0[2] + l1[1] * b1[2] + l2[1] * b2[2] + l0[2] * b0[1] + l1[2] * b1[1] + l2[2] * b2[1]
-        xz = l0[0] * b0[2] + l1[0] * b1[2] + l2[0] * b2[2] + l0[2] * b0[0] + l1[2] * b1[0] + l2[2] * b2[0]
-        return xx, yy, zz, xy, yz, xz
-
-    return add_traction, symmetric_gradient
-
-
-@cache
-def elastic_function(precision: str) -> Any:
-    """The function (corners, local displacements, frame W, K, G) -> (corner forces, greatest S : S of a point).
-
-    Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli: K, G and stresses are
-    those of the material times that.
-    """
-    t = scalars(precision)
-    R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
-    edges, to_lines = line_functions(precision)
-    edge_to_node = node_force_function(precision)
-    add_traction, symmetric_gradient = stress_functions(precision)
-
-    @wp.func
-    def elastic_forces(Xl: mat83, ul: mat83, W: mat33, K: R, G: R):
-        gx = to_lines(edges(Xl, 0))
-        gy = to_lines(edges(Xl, 1))
-        gz = to_lines(edges(Xl, 2))
-        lx = to_lines(edges(ul, 0))
-        ly = to_lines(edges(ul, 1))
-        lz = to_lines(edges(ul, 2))
-        Sx = mat43()  # stress times cofactor, summed over the two points of each Gauss line
-        Sy = mat43()
-        Sz = mat43()
-        Bx = mat43()  # cofactors alone, which carry the element's one pressure
-        By = mat43()
-        Bz = mat43()
-        volume = R(0.0)
-        dilation = R(0.0)
-        largest = R(0.0)
-        for g in range(8):
-            i = g & 1
-            j = (g >> 1) & 1
-            k = g >> 2
-            jx = j + 2 * k
-            jy = i + 2 * k
-            jz = i + 2 * j
-            b0 = wp.cross(gy[jy], gz[jz])
-            b1 = wp.cross(gz[jz], gx[jx])
-            b2 = wp.cross(gx[jx], gy[jy])
-            det = wp.dot(gx[jx], b0)
-            xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
-            trace = xx + yy + zz
-            volume += det
-            dilation += trace
-            shear = G / det
-            direct = shear + shear
-            mean = R(_THIRD) * trace
-            xx = direct * (xx - mean)
-            yy = direct * (yy - mean)
-            zz = direct * (zz - mean)
-            xy = shear * xy
-            yz = shear * yz
-            xz = shear * xz
-            largest = wp.max(largest, xx * xx + yy * yy + zz * zz + R(2.0) * (xy * xy + yz * yz + xz * xz))
-            Sx[jx] = add_traction(xx, yy, zz, xy, yz, xz, b0, Sx[jx])
-            Sy[jy] = add_traction(xx, yy, zz, xy, yz, xz, b1, Sy[jy])
-            Sz[jz] = add_traction(xx, yy, zz, xy, yz, xz, b2, Sz[jz])
-            Bx[jx] = Bx[jx] + b0
-            By[jy] = By[jy] + b1
-            Bz[jz] = Bz[jz] + b2
-        pressure = K * dilation / volume
-        Fx = to_lines(Sx + pressure * Bx)
-        Fy = to_lines(Sy + pressure * By)
-        Fz = to_lines(Sz + pressure * Bz)
-        return edge_to_node(Fx, Fy, Fz, W), largest
-
-    return elastic_forces
-
-
-@cache
 def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where `plastic`.
 
@@ -139,7 +42,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     runs `kernels.hex8_patch`.
     """
     if finite:
-        return _finite_force_kernel(precision, plastic)
+        return finite_force_kernel(precision, plastic)
     if plastic:
         return _plastic_force_kernel(precision)
     t = scalars(precision)
@@ -282,96 +185,6 @@ def _plastic_force_kernel(precision: str) -> Any:
             store_force(force_out, slot + a * count + e, f, a)
 
     return hex8_plastic_force
-
-
-@cache
-def _finite_force_kernel(precision: str, plastic: bool) -> Any:
-    """The force kernel at finite strain: volumes first, because the pressure's direction varies within an element."""
-    t = scalars(precision)
-    R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
-    half_edges, to_gauss = edge_functions(precision)
-    element_rotation, local_displacement = frame_functions(precision, True)
-    edge_to_node = node_force_function(precision)
-    load_element = load_function(precision)
-    store_force = store_function(precision)
-    point_gradient = gradient_function(precision)
-    read_plastic_strain, write_plastic_strain = history_functions(precision)
-    j2_return = j2.return_map(precision)
-    k = kinematics(precision, True)
-    dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def hex8_finite_force(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        slot: int,
-        count: int,
-        yielded_out: wp.array(dtype=wp.int32),
-        history_out: wp.array2d(dtype=R),
-        force_out: wp.array(dtype=vec3),
-    ):
-        e = wp.tid()
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, W)
-        gx = to_gauss(half_edges(Xl, 0))
-        gy = to_gauss(half_edges(Xl, 1))
-        gz = to_gauss(half_edges(Xl, 2))
-        lx = to_gauss(half_edges(ul, 0))
-        ly = to_gauss(half_edges(ul, 1))
-        lz = to_gauss(half_edges(ul, 2))
-        m = material[e]
-        G = law[m, 1]
-        volume = R(0.0)
-        dilation = R(0.0)
-        for g in range(8):
-            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
-            volume += det
-            dilation += dilation_of(grad) * det
-        pressure = pressure_of(law[m, 0], dilation / volume)
-        flag = int(0)
-        if wp.static(plastic):
-            flag = yielded_out[e]
-        flag_new = flag
-        Sx = mat43()
-        Sy = mat43()
-        Sz = mat43()
-        for g in range(8):
-            i = g & 1
-            j = (g >> 1) & 1
-            k = g >> 2
-            jx = j + 2 * k
-            jy = i + 2 * k
-            jz = i + 2 * j
-            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
-            strain, N, d = deviator(grad)
-            S = (R(2.0) * G) * strain
-            if wp.static(plastic):
-                eps_p = mat33()
-                p = R(0.0)
-                if flag != 0:
-                    eps_p, p = read_plastic_strain(history_out, g, e)
-                S, eps_new, p_new = j2_return(strain, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
-                if p_new > p:
-                    write_plastic_strain(history_out, g, e, eps_new, p_new)
-                    flag_new = int(1)
-            P = nominal(grad, S, N, d) + pressure * cofactor(grad)
-            Sx[jx] = Sx[jx] + P * wp.cross(gy[jy], gz[jz])
-            Sy[jy] = Sy[jy] + P * wp.cross(gz[jz], gx[jx])
-            Sz[jz] = Sz[jz] + P * wp.cross(gx[jx], gy[jy])
-        if wp.static(plastic):
-            if flag_new != flag:
-                yielded_out[e] = flag_new
-        half = R(0.5)
-        f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz), W)
-        for a in range(8):
-            store_force(force_out, slot + a * count + e, f, a)
-
-    return hex8_finite_force
 
 
 @cache

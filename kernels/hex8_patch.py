@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
-from warp_mca.kernels.hex8 import elastic_function, stress_functions
+from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
 from warp_mca.kernels.patch import (
     Patches,
