@@ -16,6 +16,7 @@ from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hex8_finite import finite_force_kernel
 from warp_mca.kernels.hexahedron import (
     LINE_SCALE,
+    THIRD,
     edge_functions,
     frame_functions,
     gradient_function,
@@ -30,8 +31,6 @@ from warp_mca.kernels.kinematics import kinematics
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
-
-_THIRD = 1.0 / 3.0
 
 
 @cache
@@ -156,7 +155,7 @@ def _plastic_force_kernel(precision: str) -> Any:
             dilation += trace
             shear = R(0.5) / det
             direct = shear + shear
-            mean = R(_THIRD) * trace
+            mean = R(THIRD) * trace
             xx = direct * (xx - mean)
             yy = direct * (yy - mean)
             zz = direct * (zz - mean)

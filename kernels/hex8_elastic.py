@@ -5,15 +5,10 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hexahedron import (
-    line_functions,
-    node_force_function,
-)
+from warp_mca.kernels.hexahedron import THIRD, line_functions, node_force_function
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
-
-_THIRD = 1.0 / 3.0
 
 
 @cache
@@ -92,7 +87,7 @@ def elastic_function(precision: str) -> Any:
             dilation += trace
             shear = G / det
             direct = shear + shear
-            mean = R(_THIRD) * trace
+            mean = R(THIRD) * trace
             xx = direct * (xx - mean)
             yy = direct * (yy - mean)
             zz = direct * (zz - mean)

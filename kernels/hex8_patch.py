@@ -12,12 +12,12 @@ import warp as wp
 
 from warp_mca.kernels import j2
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
-from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
+from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, THIRD, frame_functions
 from warp_mca.kernels.patch import (
+    RESIDENT,
     Patches,
     begin_turns,
-    copy_head,
-    copy_list,
+    copy_ahead,
     copy_nodes,
     copy_places,
     corners_of,
@@ -42,8 +42,6 @@ from warp_mca.kernels.shared_memory import (
 from warp_mca.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
-
-_THIRD = 1.0 / 3.0
 
 
 @cache
@@ -138,7 +136,7 @@ def point_functions(precision: str) -> tuple[Any, Any, Any]:
         """Direct `sums` are strains times det, the others twice that."""
         shear = R(0.5) / det
         direct = shear + shear
-        mean = R(_THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
+        mean = R(THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
         xx = direct * (sums[0, 0] - mean)
         yy = direct * (sums[1, 1] - mean)
         zz = direct * (sums[2, 2] - mean)
@@ -160,11 +158,6 @@ def point_functions(precision: str) -> tuple[Any, Any, Any]:
         return add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b, pressure * b)
 
     return shape_of_point, stress_of_point, force_of_edge
-
-
-def resident(precision: str, plastic: bool) -> int:
-    """Blocks of threads that a multiprocessor holds, by their registers."""
-    return 4 if precision == "mixed" else 2
 
 
 @cache
@@ -235,7 +228,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         enable_backward=False,
         module="unique",
         grid_stride=False,
-        launch_bounds=(PATCH, resident(precision, plastic)),
+        launch_bounds=(PATCH, RESIDENT[precision]),
         module_options={"fast_math": True},
     )
     def hex8_patch_force(
@@ -256,7 +249,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
         pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         node = wp.array(ptr=list_of_nodes(), shape=(slots,), dtype=wp.int32)
-        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4ui)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
         if wp.static(plastic):
@@ -312,9 +305,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                 # only now does no lane need the nodes of this patch any more
                 copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
             corners = corners_of(patches, coming, lane)
-            if lane == wp.static(PATCH - 1):
-                copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring)
-            copy_list(patches, ring[(k + 2) % wp.static(HEADS)], lane, node)
+            copy_ahead(patches, block, stride, k, lane, ring, node)
             sum_patch(forces, places, head, lane, slot, force_out)
             if wp.static(plastic):
                 if lane == 0:

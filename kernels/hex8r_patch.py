@@ -7,10 +7,10 @@ import warp as wp
 
 from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.patch import (
+    RESIDENT,
     Patches,
     begin_turns,
-    copy_head,
-    copy_list,
+    copy_ahead,
     copy_nodes,
     copy_places,
     corners_of,
@@ -35,11 +35,6 @@ from warp_mca.patches import PATCH, SLOTS
 wp.set_module_options({"enable_backward": False})
 
 
-def resident(precision: str, plastic: bool) -> int:
-    """Blocks of threads that a multiprocessor holds, by their registers."""
-    return 4 if precision == "mixed" else 2
-
-
 @cache
 def force_kernel(precision: str, plastic: bool) -> Any:
     """Kernel: forces of each patch on its nodes, and the plastic history where `plastic`."""
@@ -57,7 +52,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         enable_backward=False,
         module="unique",
         grid_stride=False,
-        launch_bounds=(PATCH, resident(precision, plastic)),
+        launch_bounds=(PATCH, RESIDENT[precision]),
         module_options={"fast_math": True},
     )
     def hex8r_patch_force(
@@ -77,7 +72,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         node = wp.array(ptr=list_of_nodes(), shape=(slots,), dtype=wp.int32)
-        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4ui)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
         begin_turns(X, u, patches, block, stride, lane, wp.static(slots), ring, node, pool)
@@ -100,9 +95,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             corners = corners_of(patches, coming, lane)
             wait_for_copies()
             barrier()
-            if lane == wp.static(PATCH - 1):
-                copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring)
-            copy_list(patches, ring[(k + 2) % wp.static(HEADS)], lane, node)
+            copy_ahead(patches, block, stride, k, lane, ring, node)
             sum_patch(forces, places, head, lane, slot, force_out)
             head = coming
             k += 1

@@ -64,6 +64,7 @@ def edge_functions(precision: str) -> tuple[Any, Any]:
     return half_edges, to_gauss
 
 
+THIRD = 1.0 / 3.0  # a division of two constants in a kernel is one of float32
 LINE_RATIO = _FAR / _NEAR
 LINE_SCALE = 0.5 * _NEAR * _NEAR  # of half edges at the Gauss lines over what `line_functions` gives
 

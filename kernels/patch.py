@@ -17,7 +17,6 @@ from warp_mca.kernels.shared_memory import (
     HEADS,
     barrier,
     close_group,
-    copy_entry,
     copy_index,
     copy_vector,
     copy_words,
@@ -26,6 +25,7 @@ from warp_mca.kernels.shared_memory import (
 from warp_mca.patches import NOWHERE, PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
+RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need
 SLOTS_OF_THREAD = (max(SLOTS.values()) + PATCH - 1) // PATCH
 
 wp.set_module_options({"enable_backward": False})
@@ -45,7 +45,7 @@ class Patches:
         corner: slots of the corners of each element, counted from the first of its patch, two in a word, shape
             (4, element_count), uint32.
         places: where the first components of the forces of a slot lie in shared memory, two in a word and eight at
-            most, NOWHERE where there are fewer, shape (slot_count,), vec4ui.
+            most, NOWHERE where there are fewer, shape (slot_count,), vec4i.
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where elastic.
     """
 
@@ -53,7 +53,7 @@ class Patches:
     turn: wp.array(dtype=wp.vec4i)
     node: wp.array(dtype=wp.int32)
     corner: wp.array2d(dtype=wp.uint32)
-    places: wp.array(dtype=wp.vec4ui)
+    places: wp.array(dtype=wp.vec4i)
     flowing: wp.array(dtype=wp.int32)
 
 
@@ -114,7 +114,7 @@ def copy_head(patches: Patches, block: int, stride: int, k: int, ring_out: wp.ar
     if k > 0:
         turn = (k + 1) * stride - 1 - block
     if turn < patches.turn.shape[0]:
-        copy_entry(patches.turn, turn, k % wp.static(HEADS), ring_out)
+        copy_words(patches.turn, turn, k % wp.static(HEADS), ring_out)
     else:
         ring_out[k % wp.static(HEADS)] = wp.vec4i()
 
@@ -130,7 +130,7 @@ def copy_list(patches: Patches, head: wp.vec4i, lane: int, node_out: wp.array(dt
 
 
 @wp.func
-def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.array(dtype=wp.vec4ui)):
+def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.array(dtype=wp.vec4i)):
     """Begin to copy where the forces of slots lie into shared memory, where each thread reads its own."""
     for k in range(wp.static(SLOTS_OF_THREAD)):
         n = lane + k * wp.static(PATCH)
@@ -184,6 +184,22 @@ def begin_turns(
     wait_for_copies()
     copy_list(patches, ring_out[1], lane, node_out)
     barrier()
+
+
+@wp.func
+def copy_ahead(
+    patches: Patches,
+    block: int,
+    stride: int,
+    k: int,
+    lane: int,
+    ring_out: wp.array(dtype=wp.vec4i),
+    node_out: wp.array(dtype=wp.int32),
+):
+    """At the k-th patch of a block of threads: begin to copy the list of the second after it, the head of the third."""
+    if lane == wp.static(PATCH - 1):
+        copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring_out)
+    copy_list(patches, ring_out[(k + 2) % wp.static(HEADS)], lane, node_out)
 
 
 @wp.func
@@ -258,17 +274,17 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any]:
             pool_out[wp.static(NOWHERE) + lane * wp.static(PATCH)] = R(0.0)
 
     @wp.func
-    def add(pool: wp.array(dtype=R), places: wp.uint32, total: vec3):
+    def add(pool: wp.array(dtype=R), places: int, total: vec3):
         """Adds the forces at two places, the low and the high half of a word."""
-        low = int(places & wp.uint32(0xFFFF))
-        high = int(places >> wp.uint32(16))
+        low = places & 0xFFFF
+        high = places >> 16
         total += vec3(pool[low], pool[low + wp.static(PATCH)], pool[low + wp.static(2 * PATCH)])
         return total + vec3(pool[high], pool[high + wp.static(PATCH)], pool[high + wp.static(2 * PATCH)])
 
     @wp.func
     def sum_patch(
         pool: wp.array(dtype=R),
-        places: wp.array(dtype=wp.vec4ui),
+        places: wp.array(dtype=wp.vec4i),
         head: wp.vec4i,
         lane: int,
         slot: int,

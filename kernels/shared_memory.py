@@ -55,7 +55,7 @@ def slot_pools(precision: str) -> tuple[Any, Any, Any]:
     @wp.func_native(f"__shared__ int pool[{slots}]; return (unsigned long long)pool;")
     def list_of_nodes() -> wp.uint64: ...
 
-    @wp.func_native(f"__shared__ uint4 pool[{slots}]; return (unsigned long long)pool;")
+    @wp.func_native(f"__shared__ int4 pool[{slots}]; return (unsigned long long)pool;")
     def places_pool() -> wp.uint64: ...
 
     return node_pool, list_of_nodes, places_pool
@@ -94,13 +94,7 @@ def copy_index(value: wp.array(dtype=wp.int32), k: int, slot: int, pool_out: wp.
 
 
 @wp.func_native(_begin_copy(16, "&pool_out.data[slot]", "&value.data[k]"))
-def copy_words(value: wp.array(dtype=wp.vec4ui), k: int, slot: int, pool_out: wp.array(dtype=wp.vec4ui)):
-    """Begin to copy an entry into shared memory, past the registers."""
-    ...
-
-
-@wp.func_native(_begin_copy(16, "&pool_out.data[slot]", "&value.data[k]"))
-def copy_entry(value: wp.array(dtype=wp.vec4i), k: int, slot: int, pool_out: wp.array(dtype=wp.vec4i)):
+def copy_words(value: wp.array(dtype=wp.vec4i), k: int, slot: int, pool_out: wp.array(dtype=wp.vec4i)):
     """Begin to copy an entry into shared memory, past the registers."""
     ...
 

@@ -96,8 +96,9 @@ class Solver:
         self.force = wp.zeros(len(slot), dtype=t.vec3)
         scenes, passes = self.layout.count, len(model.passes) // self.layout.count
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
-        for stage in self.elements if self.contacts else ():
-            stage.make_room()
+        if self.contacts:
+            for stage in self.elements:
+                stage.make_room()
         # contact and sums have few threads and wait long for memory, so that they go first where there is room
         self.side = wp.Stream(priority=-1) if wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)

@@ -30,17 +30,17 @@ class PatchStage(ElementStage):
         host = make_patches(block.conn, block.ends, SLOTS[precision])
         self.slot_node = host.node
         heads = host.heads()
-        resident = wp.get_device().sm_count * patch_kernels.resident(precision, block.plastic)
+        resident = wp.get_device().sm_count * patch.RESIDENT[precision]
         self.blocks = min(len(heads), resident)  # each computes one patch after another
         self.patches = patch.Patches()
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
-        self.patches.turn = wp.array(heads, dtype=wp.vec4i)
         self.patches.node = wp.array(host.node, dtype=wp.int32)
         self.patches.corner = wp.array(host.corner, dtype=wp.uint32)
-        self.patches.places = wp.array(np.ascontiguousarray(host.places.T), dtype=wp.vec4ui)
+        self.patches.places = wp.array(np.ascontiguousarray(host.places.T).view(np.int32), dtype=wp.vec4i)
         if points > 1:  # lanes read the points of one element together
             self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
         self.scheduled = block.plastic and points > 1
+        self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.patches.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
 
