@@ -34,11 +34,12 @@ def return_map(precision: str) -> Any:
         radius = sigma_y + beta * H * p
         if xi_eq2 > radius * radius:
             xi_eq = wp.sqrt(xi_eq2)
-            dp = (xi_eq - radius) / (R(3.0) * G + H)
+            p_new = p + (xi_eq - radius) / (R(3.0) * G + H)
+            dp = p_new - p  # what p takes of it: the next step then finds what rounding left, and nothing adds up
             d_eps = (R(1.5) * dp / xi_eq) * xi
             S = S - R(2.0) * G * d_eps
             eps_p = eps_p + d_eps
-            p = p + dp
+            p = p_new
         return S, eps_p, p
 
     return j2_return

@@ -134,9 +134,8 @@ def plastic_dissipation(setup: Setup) -> list[Row]:
                 exact=exact,
                 measured=tuple(measured),
                 unit="J",
-                tolerance=1e-5 if setup.precision == "float64" else 2e-5,
-                why="what the vibration of the free sides adds; in mixed, round-off of 60,000 steps in float32, "
-                "4e-6 rms and 8e-6 at most among strokes that differ by a few per mille",
+                tolerance=1e-5,
+                why="what the vibration of the free sides adds",
             )
         )
     return rows
