@@ -22,6 +22,7 @@ from warp_mca.kernels.patch import (
     copy_places,
     corners_of,
     element_count,
+    from_start,
     load_functions,
     sum_functions,
 )
@@ -196,7 +197,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         for k in range(9):
             W[k // 3, k % 3] = force_out[k * wp.static(PATCH) + thread]
         warp_barrier()
-        xi = wp.where(q % 2 != 0, R(1.0), R(-1.0))
+        xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
         eta = wp.where(q > 1, R(1.0), R(-1.0))
         gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
         T = wp.transpose(W)
@@ -243,7 +244,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
-        lane = wp.tid() % wp.static(PATCH)
+        lane = wp.tid() & wp.static(PATCH - 1)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
@@ -261,7 +262,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         k = int(0)
         while element_count(head) > 0:
             copy_places(patches, head, lane, places)
-            e = head[0] + lane
+            e = from_start(head[0] + lane)
             Xl = load_element(pool, 0, corners)
             ul = load_element(pool, wp.static(slots), corners)
             coming = ring[(k + 1) % wp.static(HEADS)]
@@ -270,7 +271,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                 barrier()
                 copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
             if lane < element_count(head):
-                m = material[e]
+                m = from_start(material[e])
                 W = element_rotation(Xl, ul)
                 flows = bool(False)
                 if wp.static(plastic):
@@ -295,11 +296,12 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                 if lane == 0:
                     patches.flowing[head[3]] = listed
                 for turn in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
-                    item = (turn * wp.static(PATCH) + lane) // 4
-                    thread = todo[1 + wp.min(item, listed - 1)]
-                    mine = head[0] + thread
+                    item = (turn * wp.static(PATCH) + lane) >> 2
+                    thread = todo[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
+                    mine = from_start(head[0] + thread)
                     valid = item < listed
-                    flow(pool, patches, mine, law, material[mine], thread, lane % 4, valid, history_out, forces)
+                    m = from_start(material[mine])
+                    flow(pool, patches, mine, law, m, thread, lane & 3, valid, history_out, forces)
                 if listed > 0:
                     barrier()
                 # only now does no lane need the nodes of this patch any more

@@ -15,6 +15,7 @@ from warp_mca.kernels.patch import (
     copy_places,
     corners_of,
     element_count,
+    from_start,
     load_functions,
     sum_functions,
 )
@@ -67,7 +68,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
-        lane = wp.tid() % wp.static(PATCH)
+        lane = wp.tid() & wp.static(PATCH - 1)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
@@ -81,7 +82,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         k = int(0)
         while element_count(head) > 0:
             copy_places(patches, head, lane, places)
-            e = head[0] + lane
+            e = from_start(head[0] + lane)
             x = to_patterns(load_element(pool, 0, corners))
             du = to_patterns(load_element(pool, wp.static(slots), corners))
             coming = ring[(k + 1) % wp.static(HEADS)]
@@ -90,7 +91,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
             if lane < element_count(head):
                 b, volume, W, H, q = shape_and_strain(x, du)
-                P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+                P, Q = stress_and_flow(x, volume, H, q, e, from_start(material[e]), law, yielded_out, history_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
             corners = corners_of(patches, coming, lane)
             wait_for_copies()

@@ -93,6 +93,12 @@ def schedule(
 
 
 @wp.func
+def from_start(i: int):
+    """The same index, plainly not negative: Warp asks of each that may be whether it counts from the end."""
+    return i & 0x7FFFFFFF
+
+
+@wp.func
 def element_count(head: wp.vec4i):
     """Elements of a patch."""
     return head[2] & 0xFFFF
@@ -101,7 +107,7 @@ def element_count(head: wp.vec4i):
 @wp.func
 def slot_count(head: wp.vec4i):
     """Slots of a patch."""
-    return head[2] >> 16
+    return (head[2] >> 16) & 0xFFFF
 
 
 @wp.func
@@ -156,8 +162,9 @@ def copy_nodes(
     for k in range(wp.static(SLOTS_OF_THREAD)):
         n = lane + k * wp.static(PATCH)
         if n < slot_count(head):
-            copy_vector(X, node[n], n, pool_out)
-            copy_vector(u, node[n], n + slots, pool_out)
+            i = node[n]
+            copy_vector(X, i, n, pool_out)
+            copy_vector(u, i, n + slots, pool_out)
 
 
 @wp.func
@@ -205,7 +212,7 @@ def copy_ahead(
 @wp.func
 def corners_of(patches: Patches, head: wp.vec4i, lane: int):
     """Slots of the corners of a thread's element within its patch, two in a word; of any where it has none."""
-    e = head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0))
+    e = from_start(head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0)))
     return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
 
 
@@ -239,9 +246,9 @@ def load_functions(precision: str) -> tuple[Any, Any]:
     def load_corners(pool: wp.array(dtype=wp.vec3d), patches: Patches, e: int, a: int):
         """Position and displacement of corner a, then of a + 4."""
         origin = int(patches.corner[0, e] & wp.uint32(0xFFFF))
-        shift = wp.uint32(16 * (a % 2))
-        lower = int((patches.corner[a // 2, e] >> shift) & wp.uint32(0xFFFF))
-        upper = int((patches.corner[a // 2 + 2, e] >> shift) & wp.uint32(0xFFFF))
+        shift = wp.uint32(16 * (a & 1))
+        lower = int((patches.corner[a >> 1, e] >> shift) & wp.uint32(0xFFFF))
+        upper = int((patches.corner[(a >> 1) + 2, e] >> shift) & wp.uint32(0xFFFF))
         X = pool[origin]
         u = pool[origin + wp.static(slots)]
         return (
@@ -274,12 +281,10 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any]:
             pool_out[wp.static(NOWHERE) + lane * wp.static(PATCH)] = R(0.0)
 
     @wp.func
-    def add(pool: wp.array(dtype=R), places: int, total: vec3):
-        """Adds the forces at two places, the low and the high half of a word."""
-        low = places & 0xFFFF
-        high = places >> 16
-        total += vec3(pool[low], pool[low + wp.static(PATCH)], pool[low + wp.static(2 * PATCH)])
-        return total + vec3(pool[high], pool[high + wp.static(PATCH)], pool[high + wp.static(2 * PATCH)])
+    def kept(pool: wp.array(dtype=R), place: int):
+        """The force at a place, the low half of a word."""
+        first = place & 0xFFFF
+        return vec3(pool[first], pool[first + wp.static(PATCH)], pool[first + wp.static(2 * PATCH)])
 
     @wp.func
     def sum_patch(
@@ -295,9 +300,9 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any]:
             n = lane + k * wp.static(PATCH)
             if n < slot_count(head):
                 w = places[n]
-                total = add(pool, w[0], vec3())
+                total = kept(pool, w[0]) + kept(pool, w[0] >> 16)
                 for i in range(1, 4):
-                    total = add(pool, w[i], total)
-                force_out[slot + head[1] + n] = total
+                    total = total + kept(pool, w[i]) + kept(pool, w[i] >> 16)
+                force_out[from_start(slot + head[1] + n)] = total
 
     return clear_nowhere, keep_forces, sum_patch

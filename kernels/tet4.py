@@ -67,7 +67,7 @@ def dilation_kernel(precision: str, finite: bool) -> Any:
     tet_gradient = gradient_function(precision, finite)
     dilation_of = kinematics(precision, finite).dilation
 
-    @wp.kernel(enable_backward=False, module="unique")
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def tet4_dilation(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
@@ -86,7 +86,7 @@ def average_kernel(precision: str) -> Any:
     """Kernel: mean dilatation J - 1 [-] of the elements around each pressure node."""
     R = scalars(precision).real
 
-    @wp.kernel(enable_backward=False, module="unique")
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def tet4_average(
         offset: wp.array(dtype=wp.int32),
         element: wp.array(dtype=wp.int32),
