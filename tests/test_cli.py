@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -251,6 +252,33 @@ def test_as_a_program_it_writes_one_line_on_stderr_and_no_progress_bar(here: Pat
     good = subprocess.run(command, capture_output=True, text=True)
     assert (good.returncode, good.stderr) == (0, "")
     json.loads((here / "landing-tiny" / "summary.json").read_text())
+
+
+@pytest.mark.parametrize(("arguments", "frozen"), [("", "True"), ("['--version']", "False")], ids=["program", "call"])
+def test_only_a_program_ends_without_looking_for_garbage(arguments: str, frozen: str):
+    """What is registered first runs last."""
+    code = "import atexit, gc, sys; from warp_mca import cli; sys.argv[1:] = ['--version'];"
+    code += f"atexit.register(lambda: print(gc.get_freeze_count() > 0)); cli.main({arguments})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == frozen
+
+
+def test_modules_are_imported_while_warp_starts(here: Path, monkeypatch: pytest.MonkeyPatch):
+    import warp
+
+    (here / "needed_next.py").touch()
+    monkeypatch.syspath_prepend(here)
+    found = []
+
+    def driver() -> None:
+        end = time.monotonic() + 10.0
+        while "needed_next" not in sys.modules and time.monotonic() < end:
+            time.sleep(0.01)
+        found.append("needed_next" in sys.modules)
+
+    monkeypatch.setattr(warp, "init", driver)
+    cli._start_warp("needed_next", "no_such_module")
+    assert found == [True]
 
 
 def test_every_recorder_has_its_option(here: Path, capsys: pytest.CaptureFixture[str]):

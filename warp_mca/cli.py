@@ -6,12 +6,16 @@ Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried 
 from __future__ import annotations
 
 import argparse
+import atexit
 import dataclasses
 import gc
 import os
 import sys
+import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -76,6 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit status.
     """
+    if argv is None:  # the process ends with this command: going through all that it made, to free it, takes 0.5 s
+        atexit.register(gc.freeze)
     collect = gc.get_threshold()
     gc.set_threshold(COLLECT)
     try:
@@ -231,7 +237,9 @@ def _run(args: argparse.Namespace) -> None:
     request = _request(args)
     out = args.out or Path(request.label)
     recorders = _recorders(args, out)
-    _start_warp()
+    _start_warp(
+        *(["scipy.integrate"] if request.scene.rigid else []), "scipy.signal", "matplotlib.backends.backend_agg"
+    )
     with progress_bar() as progress:
         result = mca.run(
             request.scene,
@@ -283,10 +291,21 @@ def _sweep(args: argparse.Namespace) -> None:
         raise GuardError(f"guards stopped {stopped} of {len(results)} scenes")
 
 
-def _start_warp() -> None:
-    """Initialise Warp; its native code warns on stderr when there is no GPU, which is no news to who asks for cpu."""
+def _import(*names: str) -> None:
+    with suppress(Exception):  # whoever uses the module meets what is wrong with it
+        for name in names:
+            import_module(name)
+
+
+def _start_warp(*needed: str) -> None:
+    """Initialise Warp, and meanwhile begin to import modules that are `needed` later: a GPU's driver takes its time.
+
+    Warp's native code warns on stderr when there is no GPU, which is no news to who asks for cpu.
+    """
     import warp
 
+    if needed:
+        threading.Thread(target=_import, args=needed, daemon=True).start()
     sys.stderr.flush()
     stderr, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

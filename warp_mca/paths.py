@@ -63,6 +63,10 @@ class PathHistory:
         direct = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
         return np.sqrt(direct + 3.0 * (xy**2 + yz**2 + xz**2))
 
+    def at(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> PathHistory:
+        """The same in some output intervals: their numbers, shape (count,), or whether each is, shape (row_count,)."""
+        return PathHistory(self.name, self.position, self.stress[rows])
+
 
 Place = tuple[NDArray[np.int32], Array]  # corners of the cells around the probes of a line, and their weights
 Boxes = tuple[Array, Array]  # as from `cell_boxes`

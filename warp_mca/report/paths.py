@@ -43,22 +43,21 @@ def plot_paths(time: Array, paths: Sequence[PathHistory], instants: Sequence[flo
 
     if instants is None:
         instants = tuple(np.linspace(0.0, FIRST * time[-1], INSTANTS + 1)[1:])
-    rows = [int(np.argmin(np.abs(time - instant))) for instant in instants]
+    rows = np.array([np.argmin(np.abs(time - instant)) for instant in instants])
+    paths = [path.at(rows) for path in paths]
     figure = new_figure(7.0, 1.0 + 1.9 * len(paths))
     panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True, sharey=True))
     # Right at the contact stress is many times that of the waves; curves may leave the panel there.
-    beyond = [
-        path.von_mises[rows][:, path.position >= path.position[0] + NEAR * np.ptp(path.position)] for path in paths
-    ]
+    beyond = [path.von_mises[:, path.position >= path.position[0] + NEAR * np.ptp(path.position)] for path in paths]
     greatest = max(float(np.nanmax(stress, initial=0.0)) for stress in beyond)
     scale, unit = engineering(greatest, "Pa")
     for axes, path in zip(panels, paths, strict=True):
+        position, stress = _with_gaps(path)
         for k, row in enumerate(rows):
             colour = colormaps["viridis"](0.9 * k / max(1, len(rows) - 1))
             label = f"{1e6 * time[row]:.0f} µs"
             style = STYLES[k % len(STYLES)]
-            position, stress = _with_gaps(path)
-            axes.plot(1e3 * position, scale * stress[row], color=colour, linestyle=style, label=label)
+            axes.plot(1e3 * position, scale * stress[k], color=colour, linestyle=style, label=label)
         axes.set_title(path.name, loc="left", fontsize=10)
         axes.set_ylabel(f"von Mises [{unit}]")
         axes.set_xlim(1e3 * path.position[0], 1e3 * path.position[-1])
@@ -83,18 +82,19 @@ def plot_waves(time: Array, paths: Sequence[PathHistory], speeds: Mapping[str, f
     panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True, sharey=True))
     far = max(float(path.position[-1]) for path in paths)
     shown = time <= PASSAGES * far / min(speeds.values()) if speeds else np.ones(len(time), dtype=bool)
-    stress = np.concatenate([np.asarray(path.von_mises[shown]).ravel() for path in paths])
+    time, paths = time[shown], [path.at(shown) for path in paths]
+    drawn = [_with_gaps(path) for path in paths]
+    stress = np.concatenate([stress.ravel() for _, stress in drawn])
     # A few probes near the contact are far above the waves: the top hundredth may share one colour.
     limit = float(np.nanpercentile(stress, 99.0)) if stress.size else 0.0
     scale, unit = engineering(limit, "Pa")
     image, top = None, scale * limit or 1.0
-    for axes, path in zip(panels, paths, strict=True):
-        position, stress = _with_gaps(path)
-        value = scale * stress[shown].T
+    for axes, path, (position, stress) in zip(panels, paths, drawn, strict=True):
+        value = scale * stress.T
         norm = LogNorm(top / 10.0**DECADES, top, clip=True)
-        image = axes.pcolormesh(1e6 * time[shown], 1e3 * position, value, norm=norm, cmap="viridis", rasterized=True)
+        image = axes.pcolormesh(1e6 * time, 1e3 * position, value, norm=norm, cmap="viridis", rasterized=True)
         _draw_speeds(axes, path, speeds)
-        axes.set_xlim(0.0, 1e6 * float(time[shown][-1]))
+        axes.set_xlim(0.0, 1e6 * float(time[-1]))
         axes.set_ylim(1e3 * float(path.position[0]), 1e3 * float(path.position[-1]))
         axes.set_title(path.name, loc="left", fontsize=10)
         axes.set_ylabel("position [mm]")
