@@ -18,7 +18,7 @@ from warp_mca.layout import offsets
 from warp_mca.paths import Found
 from warp_mca.results import Result, check_output, save
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.simulation import Clock, Progress, advance, divide_alike, mesh, prepare
+from warp_mca.simulation import Clock, Progress, advance, divide_alike, prepare
 
 Meshes = Mapping[str, Mesh]
 
@@ -161,8 +161,8 @@ def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Cl
     ready = []
     for k, scene in enumerate(scenes):
         try:
-            own = mesh(scene, made) if meshes is None else meshes[k]
-            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places))
+            own = None if meshes is None else meshes[k]
+            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made))
         except RequestError as error:
             raise RequestError(f"scenes[{k}]: {error}") from error
     return ready

@@ -68,22 +68,28 @@ class Steps:
         return self.per_interval * self.intervals
 
 
-def mesh(scene: Scene, made: dict[object, Mesh] | None = None) -> dict[str, Mesh]:
+def mesh(
+    scene: Scene, made: dict[object, Mesh] | None = None, given: Mapping[str, Mesh] | None = None
+) -> dict[str, Mesh]:
     """The mesh of every body, checked.
 
     Args:
         scene: whose bodies to mesh.
         made: meshes by recipe, for scenes that share some; those made here are added.
+        given: finished meshes by body, in place of the bodies' own geometry.
 
     Raises:
-        RequestError: an element is inverted, or a recipe or file cannot be turned into a mesh.
+        RequestError: an element is inverted, a mesh is not whole or not given, or a recipe or file cannot be turned
+            into a mesh.
     """
     from warp_mca.geometry.quality import check
 
     meshes = {}
     made = {} if made is None else made
     for body in scene.bodies:
-        geometry = body.geometry
+        if given is not None and body.name not in given:
+            raise bad_value("meshes", sorted(given), f"give a mesh of body {body.name} too")
+        geometry = body.geometry if given is None else given[body.name]
         key = _key(geometry)
         if key not in made:
             made[key] = geometry if isinstance(geometry, Mesh) else geometry.build()
@@ -251,15 +257,22 @@ def run(
 
 
 def prepare(
-    scene: Scene, meshes: Mapping[str, Mesh] | None, clock: Clock, tell: Progress, found: Found | None = None
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    clock: Clock,
+    tell: Progress,
+    found: Found | None = None,
+    made: dict[object, Mesh] | None = None,
 ) -> Prepared:
-    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model; `found` as in `locate`.
+    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model.
+
+    `found` as in `locate`, `made` as in `mesh`.
 
     Raises:
         RequestError: the scene cannot be built as written.
     """
     tell("mesh", 0.0)
-    meshes = mesh(scene) if meshes is None else _cut(scene, meshes)
+    meshes = mesh(scene, made, meshes)
     clock.lap("mesh")
     tell("rigid", 0.0)
     start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})
