@@ -64,6 +64,9 @@ def test_meshes_beside_a_scene_are_checked():
     with pytest.raises(RequestError, match=r"meshes = \['leg'\]: give a mesh of body arm too"):
         mca.run(scene, meshes={"leg": broken("none")})
     inverted = dataclasses.replace(broken("none"), hexahedra=np.roll(broken("none").hexahedra, 4, axis=1))
-    for act in (lambda: mca.run(scene, meshes={"arm": inverted}), lambda: mca.run_batch([scene], meshes=[{"arm": inverted}])):
+    for act in (
+        lambda: mca.run(scene, meshes={"arm": inverted}),
+        lambda: mca.run_batch([scene], meshes=[{"arm": inverted}]),
+    ):
         with pytest.raises(RequestError, match="body arm: 2 of 2 elements are inverted"):
             act()
