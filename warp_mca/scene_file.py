@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 import warp_mca.geometry
 import warp_mca.scene
-from warp_mca.errors import bad_value
+from warp_mca.errors import McaError, bad_value
 from warp_mca.geometry import Mesh
 from warp_mca.registry import load_source
 from warp_mca.scene import Scene
@@ -82,6 +82,7 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
 
     Raises:
         RequestError: as in `check_path`.
+        McaError: the disk is full or fails.
     """
     target = check_path(path)
     arrays: list[NDArray] = []
@@ -98,7 +99,10 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
     }
     entries: dict[str, Any] = {f"array{i}": array for i, array in enumerate(arrays)}
     entries["header"] = np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
-    _write_atomically(target, lambda file: np.savez_compressed(file, **entries))
+    try:
+        _write_atomically(target, lambda file: np.savez_compressed(file, **entries))
+    except OSError as error:
+        raise McaError(f"the model could not be written to {target}: {error.strerror or error}") from error
 
 
 def load(path: str | os.PathLike[str]) -> StoredModel:

@@ -128,7 +128,7 @@ def check_whole(mesh: Mesh, name: str) -> None:
 
 
 def _check_indices(owner: str, indices: NDArray, count: int, what: str) -> None:
-    if indices.size and not (0 <= indices.min() and indices.max() < count):
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
         wrong = int(indices.min() if indices.min() < 0 else indices.max())
         raise bad_value(owner, wrong, f"the mesh has {count} {what}, counted from 0")
 
