@@ -43,7 +43,7 @@ def model(folder: Path) -> None:
 def test_what_cannot_be_written_is_said_in_one_sentence_and_leaves_nothing(
     tmp_path: Path, write: Callable[[Path], None]
 ):
-    with files_up_to(2000), pytest.raises(McaError, match="could not be written to .*: File too large") as caught:
+    with files_up_to(2000), pytest.raises(McaError, match=r"could not be written to .*: File too large") as caught:
         write(tmp_path)
     assert caught.value.exit_status == 1
     assert list(tmp_path.iterdir()) == []
@@ -52,6 +52,6 @@ def test_what_cannot_be_written_is_said_in_one_sentence_and_leaves_nothing(
 
 def test_a_disk_that_is_full_at_the_start_is_refused(bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(usd_file.shutil, "disk_usage", lambda path: SimpleNamespace(free=1 << 20))
-    with pytest.raises(RequestError, match="usd = .*less than 64 MiB are free on its disk"):
+    with pytest.raises(RequestError, match=r"usd = .*less than 64 MiB are free on its disk"):
         UsdFile(tmp_path / "a.usdc").start(bars.info)
     assert list(tmp_path.iterdir()) == []

@@ -34,6 +34,7 @@ Read = Callable[[int, Mapping[str, NDArray]], None]
 
 # Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
+MOST_ROWS = 10_000_000  # of a history: some 5 GB
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,8 @@ def divide(scene: Scene, model: Model, duration: float) -> Steps:
     """Choose the time step so that whole steps fill each output interval, and how often to search for contact.
 
     Raises:
-        RequestError: motion in one step would be lost in the rounding of positions.
+        RequestError: motion in one step would be lost in the rounding of positions, or the history would have too many
+            rows.
     """
     return divide_alike([(scene, model)], duration)
 
@@ -132,7 +134,11 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps
     Raises:
         RequestError: as in `divide`.
     """
-    intervals = max(1, round(duration / parts[0][0].impact.output_interval))
+    wanted = duration / parts[0][0].impact.output_interval
+    if not wanted < MOST_ROWS:
+        remedy = f"in {duration:g} s that gives {wanted:.3g} rows, a history holds {MOST_ROWS:,}; give a larger one"
+        raise bad_value("ImpactPhase.output_interval", parts[0][0].impact.output_interval, remedy)
+    intervals = max(1, round(wanted))
     interval = duration / intervals
     limits = [_limits(scene, model, interval) for scene, model in parts]
     stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
