@@ -31,7 +31,18 @@ SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
 
 # What reading a file that is no model file can raise, from the archive down to the classes' own checks.
-_DAMAGE = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile, zlib.error)
+# `zipfile` raises RuntimeError where a damaged byte says encrypted, or packed in a way that it does not know.
+_DAMAGE = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True)
@@ -124,6 +135,8 @@ def load(path: str | os.PathLike[str]) -> StoredModel:
         origin = Origin(**content["origin"]) if content["origin"] else None
         if not isinstance(scene, Scene) or set(meshes) != {body.name for body in scene.bodies}:
             raise ValueError("scene")
+        if not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
+            raise ValueError("meshes")
     except _DAMAGE as error:
         remedy = "it is damaged or of another version; make it again with warp-mca build"
         raise bad_value("model file", str(path), remedy) from error
