@@ -7,7 +7,6 @@ the value and the remedy. Nothing here meshes, allocates or imports Warp.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from numbers import Real
@@ -25,7 +24,10 @@ Vec3 = tuple[float, float, float]
 
 def _is_number(value: object) -> bool:
     """Whether it is a finite real number; text, None, sequences and truth values are none."""
-    return isinstance(value, Real) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number that no float holds
+        return False
 
 
 def _positive(owner: str, **values: float) -> None:
