@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.assembly import body_materials
 from warp_mca.errors import RequestError
 from warp_mca.geometry import Box, Mesh
 from warp_mca.geometry.quality import check
@@ -70,3 +71,33 @@ def test_meshes_beside_a_scene_are_checked():
     ):
         with pytest.raises(RequestError, match="body arm: 2 of 2 elements are inverted"):
             act()
+
+
+def test_an_empty_set_holds_nothing():
+    """A body that was fixed at an empty set flew on, without a word."""
+    mesh = dataclasses.replace(broken("none"), node_sets={"root": np.zeros(0, dtype=np.int32)})
+    body = mca.Body(name="arm", geometry=mesh, material=mca.Elastic(E=1e9, nu=0.3, rho=1e3))
+    fixed = (mca.Fixed(body="arm", nodes="root"),)
+    with pytest.raises(RequestError, match="node set = 'root': it is empty"):
+        mca.run(mca.Scene(name="s", bodies=(body,), fixed=fixed, impact=mca.ImpactPhase(duration=1e-6)))
+
+
+def test_a_cell_has_one_material():
+    """Of two cell sets that overlap, the one that was named later won."""
+    sets = {"first": np.array([0], dtype=np.int32), "both": np.array([0, 1], dtype=np.int32)}
+    mesh = dataclasses.replace(broken("none"), cell_sets=sets)
+    soft, hard = (mca.Elastic(E=E, nu=0.3, rho=1e3) for E in (1e6, 1e9))
+
+    def body(**materials: mca.Elastic) -> mca.Body:
+        return mca.Body(
+            name="arm", geometry=mesh, material={name.replace("rest", "*"): m for name, m in materials.items()}
+        )
+
+    with pytest.raises(RequestError, match="material = 'both': some of its cells are in first too"):
+        body_materials(body(first=soft, both=hard), mesh)
+    for material in (
+        {"first": soft, "rest": hard},
+        {"rest": hard, "first": soft},
+    ):  # "*" is the rest wherever it stands
+        found = {m.E: cells.tolist() for m, cells in body_materials(body(**material), mesh)}
+        assert found == {1e6: [0], 1e9: [1]}
