@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.batch import check_alike
 from warp_mca.kernels.lanes import LANES
 from warp_mca.patches import PATCH, make_patches
 from warp_mca.results import FILES, PATH_FILES
@@ -242,6 +243,13 @@ def test_what_scenes_must_share_is_named(scenes, message, tmp_path):
         mca.run_batch(scenes, out=tmp_path / "out")
     assert refused.value.exit_status == 2
     assert not (tmp_path / "out").exists()
+
+
+def test_durations_that_differ_by_rounding_are_one():
+    """Many scenes compute theirs from what a sweep changes: 1.2 v / (mu g) is 0.012 s or 0.011999999999999999 s."""
+    scenes = [mca.make_scene("sliding_block", mu=mu, v=3.0 * mu) for mu in (0.1, 0.3)]
+    assert len({scene.impact.duration for scene in scenes}) == 2
+    assert check_alike(scenes) == scenes[0].impact.duration
 
 
 def test_one_duration_for_all():

@@ -226,7 +226,7 @@ def finished(**figures: object) -> mca.Result:
     ("error", "status", "words"),
     [
         (mca.GuardError("the energy balance\nis off by 3 %"), 1, "balance is off by 3 %"),
-        (KeyboardInterrupt(), 130, "interrupted"),
+        (KeyboardInterrupt(), 130, "interrupted before it was done; recordings hold the frames until then"),
     ],
 )
 def test_exit_status_of_a_run_that_stops(
@@ -237,6 +237,26 @@ def test_exit_status_of_a_run_that_stops(
 
     monkeypatch.setattr(mca, "run", stop)
     assert words in refused(capsys, "run", "landing.py", status=status)
+
+
+def test_a_run_that_is_terminated_clears_away_what_is_half_written(here: Path):
+    """Batch systems send SIGTERM; it left folders that a final state and results are written in at first."""
+    command = """
+import os, signal, sys
+import meshio, warp_mca.recorders.mesh_file as mesh_file
+from warp_mca import cli
+whole = mesh_file._write
+def write(path, mesh):
+    whole(path, mesh)
+    if path.parent.parent.name == "there":
+        os.kill(os.getpid(), signal.SIGTERM)
+mesh_file._write = write
+sys.exit(cli.main(["run", "landing.py", "--duration", "1e-5", "--out", "there/out", "--final", "there/a.vtu"]))
+"""
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (143, 1), done.stderr
+    assert "terminated before it was done" in done.stderr
+    assert list((here / "there").iterdir()) == []
 
 
 def test_warnings_are_shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):

@@ -11,7 +11,7 @@ from warp_mca.errors import GuardError, RequestError
 from warp_mca.model import build_model
 from warp_mca.output import Output
 from warp_mca.paths import locate
-from warp_mca.recorders import Cadence, RerunStream, SnapshotFile
+from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile
 from warp_mca.recorders.frames import skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
 from warp_mca.solver import Solver
@@ -195,6 +195,24 @@ def test_a_recorder_that_cannot_start_stops_the_run_before_it_begins(tmp_path):
         mca.run(bar(), recorders=[first, Unwilling(SURFACE)], out=tmp_path / "out")
     assert first.ended is False
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", [UsdFile, RerunStream, FinalState])
+def test_two_recorders_of_one_file_are_refused(tmp_path, kind):
+    """The second file of USD replaced the stage of the first, which broke off with a warning."""
+    suffix = {UsdFile: "usdc", RerunStream: "rrd", FinalState: "vtu"}[kind]
+    recorders = [kind(tmp_path / f"a.{suffix}"), kind(tmp_path / "." / f"a.{suffix}")]
+    with pytest.raises(RequestError, match="two of them write this file"):
+        mca.run(bar(), recorders=recorders)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_snapshot_after_the_end_is_refused(tmp_path):
+    """It showed the last state, in a file that is named after the time that was asked for."""
+    with pytest.raises(RequestError, match=r"snapshot = 0\.0001: the run ends at 4e-05 s"):
+        mca.run(bar(), recorders=[SnapshotFile(tmp_path / "a.png", time=1e-4)])
+    mca.run(bar(), recorders=[SnapshotFile(tmp_path / "a.png", time=4e-5)])
+    assert (tmp_path / "a.png").is_file()
 
 
 def test_a_run_that_breaks_a_guard_closes_its_recorders():

@@ -199,3 +199,12 @@ def test_error_in_a_users_build_is_one_sentence_with_its_line(tmp_path):
     source = load_source(str(path))
     with pytest.raises(RequestError, match=r"broken.*ZeroDivisionError.*broken\.py, line 2"):
         source.build({})
+
+
+@pytest.mark.parametrize("text", ["import sys\nsys.exit()\n", "import sys\ndef build():\n    sys.exit(0)\n"])
+def test_a_file_that_exits_is_no_run_that_succeeded(tmp_path: Path, text: str):
+    """Its status was that of the command line: 0, without a word, and nothing was run."""
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    with pytest.raises(RequestError, match=r"failed.*SystemExit"):
+        make_scene(str(path))

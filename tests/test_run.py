@@ -181,3 +181,26 @@ def test_elastic_scene_keeps_no_history(monkeypatch):
     for material in (mca.Elastic(**ALUMINIUM), mca.J2Bilinear(**ALUMINIUM, sigma_y=1e8, E_t=1e9)):
         mca.run(bar(material), duration=1e-6)
     assert sizes == [0, 48 * 100]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"material": mca.Elastic(E=1e10, nu=0.3, rho=1e-300)},
+            r"largest eigenvalue of element 0 .* check their units",
+        ),
+        ({"penalty": 1e300}, r"largest eigenvalue of element \d+ .* check their units"),
+        ({"output_interval": 1e-30}, r"output_interval = 1e-30: .* rows, a history holds"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_what_no_number_or_history_holds_is_refused(changes, words):
+    """They ended in LinAlgError and OverflowError, or never."""
+    with pytest.raises(mca.RequestError, match=words):
+        mca.run(bar(**changes))
+
+
+def test_a_duration_that_never_ends_is_refused():
+    with pytest.raises(mca.RequestError, match=r"rows, a history holds"):
+        mca.run(bar(), duration=1e30)

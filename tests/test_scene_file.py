@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -153,7 +154,7 @@ def test_a_failed_write_keeps_the_older_file_and_nothing_else(tmp_path: Path):
     assert [path.name for path in tmp_path.iterdir()] == ["m.mca"]
 
 
-@pytest.mark.parametrize("damage", ["text", "cut", "foreign", "class", "missing"])
+@pytest.mark.parametrize("damage", ["text", "cut", "foreign", "class", "mesh", "locked", "missing"])
 def test_a_file_that_is_no_model_is_refused(tmp_path: Path, damage: str):
     path = tmp_path / "m.mca"
     if damage == "text":
@@ -163,6 +164,20 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path, damage: str):
     elif damage == "class":
         header = b'{"format": "warp_mca model 1", "scene": {"$type": "Popen"}, "meshes": {}, "origin": null}'
         np.savez(path.open("wb"), header=np.frombuffer(header, dtype=np.uint8))
+    elif damage == "mesh":
+        stored(path)
+        with np.load(path) as archive:
+            content = json.loads(archive["header"].tobytes())
+        content["meshes"] = dict.fromkeys(content["meshes"])
+        np.savez(path.open("wb"), header=np.frombuffer(json.dumps(content).encode(), dtype=np.uint8))
+    elif damage == "locked":
+        stored(path)
+        damaged = bytearray(path.read_bytes())
+        for mark, flag in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+            start = -1
+            while (start := damaged.find(mark, start + 1)) >= 0:
+                damaged[start + flag] |= 1  # encrypted, it says
+        path.write_bytes(damaged)
     elif damage == "cut":
         stored(path)
         path.write_bytes(path.read_bytes()[:-100])

@@ -50,7 +50,7 @@ def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
     """Materials of a body with the cells that each fills; together they fill the body.
 
     Raises:
-        RequestError: a named cell set is unknown, or cells are left without material.
+        RequestError: a named cell set is unknown, or cells are left without material or have two.
     """
     if isinstance(body.material, Elastic):
         return [(body.material, np.arange(mesh.cell_count, dtype=np.int32))]
@@ -58,12 +58,17 @@ def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
     listed = list(body.material.items())
     for k, (name, _) in enumerate(listed):
         if name == "*":
-            owner[owner < 0] = k
-        elif name in mesh.cell_sets:
-            owner[mesh.cell_sets[name]] = k
-        else:
+            continue
+        if name not in mesh.cell_sets:
             known = ", ".join(sorted(mesh.cell_sets)) or "none"
             raise bad_value(f"Body {body.name}.material", name, f"the mesh's cell sets are {known}; or use '*'")
+        others = owner[mesh.cell_sets[name]]
+        if (others >= 0).any():
+            remedy = f"some of its cells are in {listed[others.max()][0]} too; give each cell one material"
+            raise bad_value(f"Body {body.name}.material", name, remedy)
+        owner[mesh.cell_sets[name]] = k
+    if "*" in body.material:
+        owner[owner < 0] = [name for name, _ in listed].index("*")
     if (owner < 0).any():
         raise bad_value(f"Body {body.name}.material", [n for n, _ in listed], "some cells have none; add a '*' entry")
     return [(m, np.flatnonzero(owner == k).astype(np.int32)) for k, (_, m) in enumerate(listed)]

@@ -18,7 +18,7 @@ from warp_mca.layout import offsets
 from warp_mca.paths import Found
 from warp_mca.results import Result, check_output, save
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.simulation import Clock, Progress, advance, divide_alike, mesh, prepare
+from warp_mca.simulation import Clock, Progress, advance, divide_alike, prepare
 
 Meshes = Mapping[str, Mesh]
 
@@ -125,7 +125,8 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
     for k, scene in enumerate(scenes[1:], 1):
         for name in ("duration", "output_interval"):
             value, wanted = getattr(scene.impact, name), getattr(first.impact, name)
-            if value != wanted and not (name == "duration" and duration is not None):
+            alike = math.isclose(value, wanted, rel_tol=1e-9)  # computed from other parameters, they differ by rounding
+            if not alike and not (name == "duration" and duration is not None):
                 remedy = f"the batch takes its steps together and scenes[0] has {wanted:g}; give all scenes the same"
                 raise bad_value(f"scenes[{k}].impact.{name}", value, remedy)
         if len(scene.contacts) != len(first.contacts):
@@ -161,8 +162,8 @@ def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Cl
     ready = []
     for k, scene in enumerate(scenes):
         try:
-            own = mesh(scene, made) if meshes is None else meshes[k]
-            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places))
+            own = None if meshes is None else meshes[k]
+            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made))
         except RequestError as error:
             raise RequestError(f"scenes[{k}]: {error}") from error
     return ready

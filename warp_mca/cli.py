@@ -1,6 +1,6 @@
 """Owns the command line: warp-mca run | build | scenes | view | verify.
 
-Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 130 interrupted.
+Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 130 interrupted, 143 terminated.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import atexit
 import dataclasses
 import gc
 import os
+import signal
 import sys
 import threading
 from collections.abc import Mapping, Sequence
@@ -71,6 +72,10 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, as batch systems send it: what a key stops is closed and cleared away in the same way."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out one command.
 
@@ -84,20 +89,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         atexit.register(gc.freeze)
     collect = gc.get_threshold()
     gc.set_threshold(COLLECT)
+    main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
+    terminate = signal.signal(signal.SIGTERM, _terminate) if main_thread else None
     try:
         args = _parser().parse_args(argv)
         args.command(args)
     except McaError as error:
         print("warp-mca: error:", " ".join(str(error).split()), file=sys.stderr)
         return error.exit_status
-    except KeyboardInterrupt:
-        print("warp-mca: interrupted, nothing was written", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as stop:
+        what, status = ("terminated", 143) if isinstance(stop, _Terminated) else ("interrupted", 130)
+        print(f"warp-mca: {what} before it was done; recordings hold the frames until then", file=sys.stderr)
+        return status
     except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands
         return stop.code if isinstance(stop.code, int) else 2
     finally:
         gc.set_threshold(*collect)
+        if main_thread:
+            signal.signal(signal.SIGTERM, terminate or signal.SIG_DFL)
     return 0
+
+
+def _terminate(number: int, frame: object) -> NoReturn:
+    raise _Terminated
 
 
 def _parser() -> argparse.ArgumentParser:

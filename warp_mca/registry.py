@@ -180,7 +180,7 @@ class SceneSource:
             scene = self.builder(**values)
         except McaError:
             raise
-        except Exception as error:  # whatever a user's own code may raise
+        except (Exception, SystemExit) as error:  # whatever a user's code raises; not status 0
             line = traceback.extract_tb(error.__traceback__)[-1]
             where = f"{Path(line.filename).name}, line {line.lineno}"
             raise bad_value(
@@ -248,7 +248,7 @@ def _imported(path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except McaError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         words = " ".join(str(error).split())
         raise bad_value("scene", str(path), f"reading the file failed: {type(error).__name__}: {words}") from error
     return module

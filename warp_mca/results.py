@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from warp_mca.errors import RequestError, bad_value
+from warp_mca.errors import McaError, RequestError, bad_value
 from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
 from warp_mca.paths import PathHistory, load_paths, save_paths
 
@@ -191,6 +191,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
 
     Raises:
         RequestError: as in `check_output`.
+        McaError: the disk is full or fails.
     """
     from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
@@ -198,8 +199,9 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
 
     path = check_output(directory, force=force)
     # Written beside the folder first: a run that fails half-way leaves nothing behind.
-    staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=_nearest(path)))
+    staging = None
     try:
+        staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=_nearest(path)))
         begun = time.perf_counter()
         _write_history(staging / "history.csv", result.history)
         save_forces(staging / "forces.png", result)
@@ -216,8 +218,11 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
                 (staging / name).replace(path / name)
             else:  # left by a run of another scene
                 (path / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise McaError(f"the results could not be written to {path}: {error.strerror or error}") from error
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        if staging:
+            shutil.rmtree(staging, ignore_errors=True)
     return result
 
 

@@ -7,8 +7,9 @@ the value and the remedy. Nothing here meshes, allocates or imports Warp.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import TYPE_CHECKING, Literal
 
 from warp_mca.elements import ELEMENTS
@@ -21,16 +22,29 @@ if TYPE_CHECKING:
 Vec3 = tuple[float, float, float]
 
 
+def _is_number(value: object) -> bool:
+    """Whether it is a finite real number; text, None, sequences and truth values are none."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number that no float holds
+        return False
+
+
 def _positive(owner: str, **values: float) -> None:
     for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
+        if not (_is_number(value) and value > 0.0):
             raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
 
 
 def _finite(owner: str, **values: Vec3) -> None:
     for name, value in values.items():
-        if len(value) != 3 or not all(math.isfinite(component) for component in value):
+        if not (_is_list(value) and len(value) == 3):
             raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
+
+
+def _is_list(value: object) -> bool:
+    """Whether it is a sequence of finite numbers."""
+    return isinstance(value, Iterable) and not isinstance(value, str) and all(map(_is_number, value))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +63,7 @@ class Elastic:
 
     def __post_init__(self) -> None:
         _positive(type(self).__name__, E=self.E, rho=self.rho)
-        if not -1.0 < self.nu < 0.5:
+        if not (_is_number(self.nu) and -1.0 < self.nu < 0.5):
             raise bad_value(f"{type(self).__name__}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")
 
     @property
@@ -87,9 +101,9 @@ class J2Bilinear(Elastic):
     def __post_init__(self) -> None:
         super().__post_init__()
         _positive("J2Bilinear", sigma_y=self.sigma_y)
-        if not 0.0 <= self.E_t < self.E:
+        if not (_is_number(self.E_t) and 0.0 <= self.E_t < self.E):
             raise bad_value("J2Bilinear.E_t", self.E_t, f"the tangent modulus must lie in [0, E = {self.E:g})")
-        if not 0.0 <= self.beta <= 1.0:
+        if not (_is_number(self.beta) and 0.0 <= self.beta <= 1.0):
             raise bad_value("J2Bilinear.beta", self.beta, "must lie between 0 (kinematic) and 1 (isotropic)")
 
     @property
@@ -130,7 +144,13 @@ class Body:
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if self.element not in ELEMENTS:
+        if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
+            raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
+        materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
+        if not all(isinstance(material, Elastic) for material in materials):
+            remedy = "give an Elastic or a J2Bilinear, or one for each cell set"
+            raise bad_value(f"Body {self.name}.material", self.material, remedy)
+        if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         if self.kinematics not in ("corotational", "finite"):
             raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
@@ -150,6 +170,9 @@ class Point:
     body: str
     at: Vec3
 
+    def __post_init__(self) -> None:
+        _finite(f"Point of {self.body}", at=self.at)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
@@ -168,7 +191,9 @@ class Line:
 
     def __post_init__(self) -> None:
         _finite(f"Line in {self.body}", start=self.start, end=self.end)
-        if self.start == self.end:
+        if not _is_number(self.position):
+            raise bad_value(f"Line in {self.body}.position", self.position, "give a finite number")
+        if tuple(self.start) == tuple(self.end):
             raise bad_value(f"Line in {self.body}.end", self.end, "give a point other than the start")
 
     @property
@@ -249,8 +274,12 @@ class Contact:
     two_way: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.slave, Surface):
+            raise bad_value("Contact.slave", self.slave, "give a Surface")
+        if not isinstance(self.master, Surface | RigidPlane):
+            raise bad_value("Contact.master", self.master, "give a Surface or a RigidPlane")
         _positive("Contact", penalty=self.penalty)
-        if not (math.isfinite(self.mu) and self.mu >= 0.0):
+        if not (_is_number(self.mu) and self.mu >= 0.0):
             raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
@@ -301,7 +330,7 @@ class Fixed:
     axes: str = "xyz"
 
     def __post_init__(self) -> None:
-        if not self.axes or set(self.axes) - set("xyz"):
+        if not isinstance(self.axes, str) or not self.axes or set(self.axes) - set("xyz"):
             raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
 
 
@@ -326,7 +355,10 @@ class Prescribed:
     def __post_init__(self) -> None:
         if self.axis not in ("x", "y", "z"):
             raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
-        if len(self.times) != len(self.velocities) or not self.times:
+        for name, values in (("times", self.times), ("velocities", self.velocities)):
+            if not _is_list(values):
+                raise bad_value(f"Prescribed.{name}", values, "give finite numbers")
+        if len(self.times) != len(self.velocities) or not len(self.times):
             raise bad_value("Prescribed.velocities", self.velocities, "give one velocity for each time")
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
             raise bad_value("Prescribed.times", self.times, "list them in increasing order")
@@ -379,7 +411,10 @@ class RigidPhase:
     t_max: float = 5.0
 
     def __post_init__(self) -> None:
-        if len(self.theta) != len(self.theta_dot) or not self.theta:
+        for name, values in (("theta", self.theta), ("theta_dot", self.theta_dot)):
+            if not _is_list(values):
+                raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, one for each link")
+        if len(self.theta) != len(self.theta_dot) or not len(self.theta):
             raise bad_value("RigidPhase.theta_dot", self.theta_dot, "give one angle and one rate for each link")
         if self.inertia not in ("mesh", "slender"):
             raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
@@ -409,7 +444,7 @@ class ImpactPhase:
             raise bad_value(
                 "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
             )
-        if not 0.0 < self.time_step_scale <= 1.0:
+        if not (_is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
 
 

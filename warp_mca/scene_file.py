@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 import warp_mca.geometry
 import warp_mca.scene
-from warp_mca.errors import bad_value
+from warp_mca.errors import McaError, bad_value
 from warp_mca.geometry import Mesh
 from warp_mca.registry import load_source
 from warp_mca.scene import Scene
@@ -31,7 +31,18 @@ SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
 
 # What reading a file that is no model file can raise, from the archive down to the classes' own checks.
-_DAMAGE = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile, zlib.error)
+# `zipfile` raises RuntimeError where a damaged byte says encrypted, or packed in a way that it does not know.
+_DAMAGE = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True)
@@ -82,6 +93,7 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
 
     Raises:
         RequestError: as in `check_path`.
+        McaError: the disk is full or fails.
     """
     target = check_path(path)
     arrays: list[NDArray] = []
@@ -98,7 +110,10 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
     }
     entries: dict[str, Any] = {f"array{i}": array for i, array in enumerate(arrays)}
     entries["header"] = np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
-    _write_atomically(target, lambda file: np.savez_compressed(file, **entries))
+    try:
+        _write_atomically(target, lambda file: np.savez_compressed(file, **entries))
+    except OSError as error:
+        raise McaError(f"the model could not be written to {target}: {error.strerror or error}") from error
 
 
 def load(path: str | os.PathLike[str]) -> StoredModel:
@@ -120,6 +135,8 @@ def load(path: str | os.PathLike[str]) -> StoredModel:
         origin = Origin(**content["origin"]) if content["origin"] else None
         if not isinstance(scene, Scene) or set(meshes) != {body.name for body in scene.bodies}:
             raise ValueError("scene")
+        if not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
+            raise ValueError("meshes")
     except _DAMAGE as error:
         remedy = "it is damaged or of another version; make it again with warp-mca build"
         raise bad_value("model file", str(path), remedy) from error

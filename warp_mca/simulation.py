@@ -34,6 +34,7 @@ Read = Callable[[int, Mapping[str, NDArray]], None]
 
 # Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
+MOST_ROWS = 10_000_000  # of a history: some 5 GB
 
 
 @dataclass(frozen=True)
@@ -68,22 +69,28 @@ class Steps:
         return self.per_interval * self.intervals
 
 
-def mesh(scene: Scene, made: dict[object, Mesh] | None = None) -> dict[str, Mesh]:
+def mesh(
+    scene: Scene, made: dict[object, Mesh] | None = None, given: Mapping[str, Mesh] | None = None
+) -> dict[str, Mesh]:
     """The mesh of every body, checked.
 
     Args:
         scene: whose bodies to mesh.
         made: meshes by recipe, for scenes that share some; those made here are added.
+        given: finished meshes by body, in place of the bodies' own geometry.
 
     Raises:
-        RequestError: an element is inverted, or a recipe or file cannot be turned into a mesh.
+        RequestError: an element is inverted, a mesh is not whole or not given, or a recipe or file cannot be turned
+            into a mesh.
     """
     from warp_mca.geometry.quality import check
 
     meshes = {}
     made = {} if made is None else made
     for body in scene.bodies:
-        geometry = body.geometry
+        if given is not None and body.name not in given:
+            raise bad_value("meshes", sorted(given), f"give a mesh of body {body.name} too")
+        geometry = body.geometry if given is None else given[body.name]
         key = _key(geometry)
         if key not in made:
             made[key] = geometry if isinstance(geometry, Mesh) else geometry.build()
@@ -115,7 +122,8 @@ def divide(scene: Scene, model: Model, duration: float) -> Steps:
     """Choose the time step so that whole steps fill each output interval, and how often to search for contact.
 
     Raises:
-        RequestError: motion in one step would be lost in the rounding of positions.
+        RequestError: motion in one step would be lost in the rounding of positions, or the history would have too many
+            rows.
     """
     return divide_alike([(scene, model)], duration)
 
@@ -126,7 +134,11 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps
     Raises:
         RequestError: as in `divide`.
     """
-    intervals = max(1, round(duration / parts[0][0].impact.output_interval))
+    wanted = duration / parts[0][0].impact.output_interval
+    if not wanted < MOST_ROWS:
+        remedy = f"in {duration:g} s that gives {wanted:.3g} rows, a history holds {MOST_ROWS:,}; give a larger one"
+        raise bad_value("ImpactPhase.output_interval", parts[0][0].impact.output_interval, remedy)
+    intervals = max(1, round(wanted))
     interval = duration / intervals
     limits = [_limits(scene, model, interval) for scene, model in parts]
     stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
@@ -251,15 +263,22 @@ def run(
 
 
 def prepare(
-    scene: Scene, meshes: Mapping[str, Mesh] | None, clock: Clock, tell: Progress, found: Found | None = None
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    clock: Clock,
+    tell: Progress,
+    found: Found | None = None,
+    made: dict[object, Mesh] | None = None,
 ) -> Prepared:
-    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model; `found` as in `locate`.
+    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model.
+
+    `found` as in `locate`, `made` as in `mesh`.
 
     Raises:
         RequestError: the scene cannot be built as written.
     """
     tell("mesh", 0.0)
-    meshes = mesh(scene) if meshes is None else _cut(scene, meshes)
+    meshes = mesh(scene, made, meshes)
     clock.lap("mesh")
     tell("rigid", 0.0)
     start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})

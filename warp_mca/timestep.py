@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warp_mca.elements import Element
 from warp_mca.elements.hexahedron import CHUNK, chunks
+from warp_mca.errors import bad_value
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -51,6 +52,9 @@ def stable_step(
         mass: lumped masses [kg], shape (element_count, corners).
         contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,).
         index: number that each element goes by, shape (element_count,).
+
+    Raises:
+        RequestError: a bound is not finite.
     """
 
     def exact(part: NDArray[np.intp]) -> Array:
@@ -62,6 +66,10 @@ def stable_step(
     bound = np.empty(len(conn))
     for part in chunks(len(conn), CHUNK):
         bound[part] = bounds(part, True)
+    if not np.isfinite(bound).all():
+        element = int(index[np.argmin(np.isfinite(bound))])
+        remedy = "moduli and penalty over density exceed the range of numbers there; check their units"
+        raise bad_value(f"largest eigenvalue of element {element} [1/s^2]", float(bound.max()), remedy)
     usual = float(np.median(bound))
     first = _greatest(bound, BATCH)
     value = exact(first)

@@ -72,8 +72,10 @@ class Mesh:
         """Node indices of the set `name`, shape (count,), int32.
 
         Raises:
-            RequestError: there is no such set.
+            RequestError: there is no such set, or no node in it.
         """
         if name not in self.node_sets:
             raise bad_value("node set", name, f"the mesh has {', '.join(sorted(self.node_sets)) or 'no sets'}")
+        if not len(self.node_sets[name]):
+            raise bad_value("node set", name, "it is empty; name one that holds nodes")
         return self.node_sets[name]

@@ -1,4 +1,4 @@
-"""Owns measures of mesh quality, and the check that no element is inverted."""
+"""Owns measures of mesh quality, and the checks that a mesh is whole and no element is inverted."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.elements import hexahedron, tet4
-from warp_mca.errors import RequestError
+from warp_mca.errors import RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 
 # The three neighbours of each corner, ordered so that the edges towards them are right-handed.
@@ -68,7 +68,7 @@ def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
 
 
 def check(mesh: Mesh, name: str) -> None:
-    """Refuses a mesh with an inverted cell.
+    """Refuses a mesh that is not whole, or that has an inverted cell.
 
     Hexahedra are judged where they are integrated: a corner may be folded over a little, as in patch tests.
 
@@ -77,9 +77,10 @@ def check(mesh: Mesh, name: str) -> None:
         name: the body, for the message.
 
     Raises:
-        RequestError: the Jacobian determinant of a hexahedron is not positive at some Gauss point, or the volume of
-            a tetrahedron is not.
+        RequestError: as in `check_whole`; or the Jacobian determinant of a hexahedron is not positive at some Gauss
+            point, or the volume of a tetrahedron is not.
     """
+    check_whole(mesh, name)
     hexahedra = gauss_jacobians(mesh).min(axis=1) > 0.0
     good = np.append(hexahedra, tet4.volumes(mesh.points[mesh.tetrahedra]) > 0.0)
     bad = np.flatnonzero(~good)
@@ -88,3 +89,62 @@ def check(mesh: Mesh, name: str) -> None:
             f"body {name}: {len(bad)} of {len(good)} elements are inverted, first element {bad[0]}: "
             "repair the mesh or change the recipe's values"
         )
+
+
+def check_whole(mesh: Mesh, name: str) -> None:
+    """Refuses arrays that make no mesh: they fail deep inside a run, or count mass and stiffness twice.
+
+    Args:
+        mesh: the mesh of one body.
+        name: the body, for the message.
+
+    Raises:
+        RequestError: an array has another shape or type than `Mesh` says, there is no cell, a cell or a set counts
+            beyond the end, a node is in no cell, or two cells have the same corners.
+    """
+    points, cells = np.asarray(mesh.points), {"hexahedra": (mesh.hexahedra, 8), "tetrahedra": (mesh.tetrahedra, 4)}
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or not np.isfinite(points).all():
+        what = f"{points.dtype}, shape {points.shape}"
+        raise bad_value(f"body {name}: Mesh.points", what, "give three finite coordinates for each node, as float64")
+    used = np.zeros(len(points), dtype=bool)
+    for field, (nodes, corners) in cells.items():
+        owner, nodes = f"body {name}: Mesh.{field}", np.asarray(nodes)
+        if nodes.ndim != 2 or nodes.shape[1] != corners or nodes.dtype.kind not in "iu":
+            what = f"{nodes.dtype}, shape {nodes.shape}"
+            raise bad_value(owner, what, f"give the {corners} nodes of each cell, as int32")
+        _check_indices(owner, nodes, len(points), "nodes")
+        used[nodes] = True
+        twice = _repeated(nodes)
+        if twice:
+            raise bad_value(owner, list(twice), "these two cells have the same corners; keep one of them")
+    if not mesh.cell_count:
+        raise bad_value(f"body {name}: Mesh.hexahedra", 0, "give at least one cell")
+    if not used.all():
+        idle = int(np.argmin(used))
+        raise bad_value(f"body {name}: Mesh.points", idle, "this node is in no cell; leave it out of the mesh")
+    for kind, sets, count in (("node", mesh.node_sets, len(points)), ("cell", mesh.cell_sets, mesh.cell_count)):
+        for key, members in sets.items():
+            _check_indices(f"body {name}: Mesh.{kind}_sets[{key!r}]", np.asarray(members), count, f"{kind}s")
+
+
+def _check_indices(owner: str, indices: NDArray, count: int, what: str) -> None:
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        wrong = int(indices.min() if indices.min() < 0 else indices.max())
+        raise bad_value(owner, wrong, f"the mesh has {count} {what}, counted from 0")
+
+
+def _repeated(nodes: NDArray) -> tuple[int, int] | None:
+    """The first two cells with the same corners, in whichever order."""
+    if not len(nodes):
+        return None
+    # Sums of random words know no order of corners, and are as good as distinct without sorting every row.
+    word = np.random.default_rng(1).integers(0, 2**64, int(nodes.max()) + 1, dtype=np.uint64)
+    key = np.zeros(len(nodes), dtype=np.uint64)
+    for corner in nodes.T:
+        key += word[corner]
+    order = np.argsort(key, kind="stable")
+    for i in np.flatnonzero(key[order[1:]] == key[order[:-1]]):
+        one, other = int(order[i]), int(order[i + 1])
+        if sorted(nodes[one]) == sorted(nodes[other]):
+            return one, other
+    return None

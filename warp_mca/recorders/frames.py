@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.errors import bad_value
 from warp_mca.kernels.output import OPEN, STICK
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame, Recorder, RunInfo, SurfaceMesh, Volume
 from warp_mca.transfer import Transfer
@@ -30,6 +32,16 @@ def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
     return found
 
 
+def _check_files(recorders: Sequence[Recorder]) -> None:
+    """Refuse two recorders of one file: each would write over what the other does."""
+    known = set()
+    for path in (getattr(recorder, "path", None) for recorder in recorders):
+        if path is not None and Path(path).resolve() in known:
+            raise bad_value("recorders", str(path), "two of them write this file; give each a file of its own")
+        if path is not None:
+            known.add(Path(path).resolve())
+
+
 class Recording:
     """The recorders of one run."""
 
@@ -39,8 +51,9 @@ class Recording:
         """Start the recorders of a run of `intervals` output intervals of `steps` steps each.
 
         Raises:
-            RequestError: one cannot be opened; those before it are closed again.
+            RequestError: two write the same file, or one cannot be opened; those before it are closed again.
         """
+        _check_files(recorders)
         self.info, self.steps, self.output = info, steps, output
         self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = []
         self.taken: dict[int, int] = {}

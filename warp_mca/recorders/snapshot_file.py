@@ -27,10 +27,16 @@ class SnapshotFile:
         self.path = check_file("snapshot", file, ".png")
         self.name = str(self.path)
         self.needs = frozenset((SURFACE,))
-        self.cadence = Cadence(times=(time,))
+        self.time, self.cadence = time, Cadence(times=(time,))
 
     def start(self, info: RunInfo) -> None:
-        """Keep the faces."""
+        """Keep the faces.
+
+        Raises:
+            RequestError: the run ends before that time.
+        """
+        if self.time > info.duration + 0.5 * info.output_interval:
+            raise bad_value("snapshot", self.time, f"the run ends at {info.duration:g} s; give a time until then")
         self.info = info
 
     def frame(self, frame: Frame) -> None:

@@ -85,7 +85,12 @@ class UsdFile:
             name += "_"
         size = float(np.ptp(np.concatenate([info.model.X[s.nodes] for s in info.surfaces.values()]), axis=0).max())
         self.contact = _Contact(UsdGeom.Points.Define(self.stage, f"/World/{name}"), POINT_SIZE * size)
-        self._save()
+        try:
+            self._save()
+        except OSError as error:
+            self.stage = None
+            self.path.unlink(missing_ok=True)
+            raise bad_value("usd", str(self.path), f"it cannot be written ({error}); name another file") from error
 
     def frame(self, frame: Frame) -> None:
         """Write one frame.

@@ -1,0 +1,57 @@
+"""Tests what is said, and left, where a disk takes no more."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from flying_bars import FlyingBars
+from test_results import facts, history
+
+import warp_mca as mca
+from warp_mca import scene_file
+from warp_mca.errors import McaError, RequestError
+from warp_mca.recorders import UsdFile, usd_file
+from warp_mca.results import Result, save, summarise
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """The system refuses to let a file grow beyond `size` [byte], as a full disk does."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def results(folder: Path) -> None:
+    save(Result(summarise(history(), facts()), history()), folder / "out")
+
+
+def model(folder: Path) -> None:
+    scene = mca.make_scene("rod_on_wall")
+    scene_file.save(folder / "rod.mca", scene, mca.mesh(scene))
+
+
+@pytest.mark.parametrize("write", [results, model])
+def test_what_cannot_be_written_is_said_in_one_sentence_and_leaves_nothing(
+    tmp_path: Path, write: Callable[[Path], None]
+):
+    with files_up_to(2000), pytest.raises(McaError, match=r"could not be written to .*: File too large") as caught:
+        write(tmp_path)
+    assert caught.value.exit_status == 1
+    assert list(tmp_path.iterdir()) == []
+    write(tmp_path)
+
+
+def test_a_disk_that_is_full_at_the_start_is_refused(bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(usd_file.shutil, "disk_usage", lambda path: SimpleNamespace(free=1 << 20))
+    with pytest.raises(RequestError, match=r"usd = .*less than 64 MiB are free on its disk"):
+        UsdFile(tmp_path / "a.usdc").start(bars.info)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,64 @@
+"""Tests that the classes of a scene refuse values of another kind in one sentence, wherever they are given."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import warp_mca as mca
+from warp_mca.errors import RequestError
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+BOX = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
+SIDE = mca.Surface(body="a", nodes="xmax")
+TIP = mca.Tip(body="a", centre=(0.0, 0.0, 0.0), radius=0.1)
+SOUND = {
+    mca.Elastic: {"E": 210e9, "nu": 0.3, "rho": 7850.0},
+    mca.J2Bilinear: {"E": 210e9, "nu": 0.3, "rho": 7850.0, "sigma_y": 4e8, "E_t": 1e9, "beta": 0.5},
+    mca.Body: {"name": "a", "geometry": BOX, "material": STEEL, "position": (0.0, 0.0, 0.0)},
+    mca.Point: {"body": "a", "at": (0.0, 0.0, 0.0)},
+    mca.Line: {"body": "a", "start": (0.0, 0.0, 0.0), "end": (1.0, 0.0, 0.0), "position": 0.0},
+    mca.RigidPlane: {"point": (0.0, 0.0, 0.0)},
+    mca.Contact: {"slave": SIDE, "master": mca.RigidPlane(), "mu": 0.3, "penalty": 1.0},
+    mca.Fixed: {"body": "a", "nodes": "xmin", "axes": "xy"},
+    mca.Prescribed: {"body": "a", "nodes": "xmin", "axis": "x", "times": (0.0, 1.0), "velocities": (0.0, 1.0)},
+    mca.RigidPhase: {"theta": (1.0,), "theta_dot": (0.0,), "tip": TIP, "target": mca.RigidPlane()},
+    mca.ImpactPhase: {"duration": 1e-3, "time_step_scale": 0.9},
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "value"),
+    [
+        (mca.Elastic, "E", "210e9"),
+        (mca.Elastic, "E", None),
+        (mca.Elastic, "E", 10**400),
+        (mca.Elastic, "nu", "0.3"),
+        (mca.J2Bilinear, "E_t", None),
+        (mca.J2Bilinear, "beta", "isotropic"),
+        (mca.Body, "geometry", "part.msh"),
+        (mca.Body, "geometry", mca.Box),
+        (mca.Body, "material", "steel"),
+        (mca.Body, "material", {"core": "steel"}),
+        (mca.Body, "position", 0.0),
+        (mca.Body, "position", ("0", "0", "0")),
+        (mca.Point, "at", (0.0, math.nan, 0.0)),
+        (mca.Line, "position", math.nan),
+        (mca.RigidPlane, "point", None),
+        (mca.Contact, "slave", "a"),
+        (mca.Contact, "master", "b"),
+        (mca.Contact, "mu", "rough"),
+        (mca.Fixed, "axes", 1),
+        (mca.Prescribed, "times", (0.0, math.nan)),
+        (mca.Prescribed, "velocities", (0.0, math.inf)),
+        (mca.RigidPhase, "theta", (math.nan,)),
+        (mca.RigidPhase, "theta_dot", 0.0),
+        (mca.ImpactPhase, "duration", "1e-3"),
+        (mca.ImpactPhase, "time_step_scale", None),
+    ],
+)
+def test_another_kind_of_value_is_refused_by_name(kind, field, value):
+    kind(**SOUND[kind])
+    with pytest.raises(RequestError, match=rf"\b{field} = .+: (give|must|use|the tangent|Poisson)"):
+        kind(**{**SOUND[kind], field: value})
