@@ -100,6 +100,7 @@ class Account:
             },
             "max_penetration": solver.max_penetration(self.index),
             "max_strain": ledger.max_strain,
+            "energy_error_exchanged": ledger.exchange_error,
             "stable_dt": model.stable.dt,
             "joint_impulse": solver.joint_impulses(self.index),
             "threads": solver.threads,
@@ -140,6 +141,13 @@ class Account:
             found.append(
                 f"strain reached {ledger.max_strain:.2f}; the co-rotational element takes strains as small, "
                 f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose kinematics='finite'"
+            )
+        tolerance = scene.impact.energy_tolerance
+        if ledger.exchange_error > tolerance >= ledger.energy_error:
+            found.append(
+                f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.exchanged:.3g} J that the bodies "
+                f"exchanged, though only {ledger.energy_error:.2g} of all they have: lower time_step_scale or a "
+                f"contact's penalty if that is above what energy_tolerance = {tolerance:g} should allow"
             )
         stable = self.ready.model.stable
         if stable.shortened > SHORTENED:

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 # Columns of a record, then eight for each contact pass (`kernels.contact.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
 PASS_COLUMNS = 8
+LEAST = 1e-7
 
 _FLAGS = (
     "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike, "
@@ -32,6 +33,8 @@ class Ledger:
 
     Attributes:
         energy_error: largest imbalance so far, as a share of initial energy and external work [-].
+        exchanged: largest energy so far that was in elements, contact springs and friction, or that motion had gained
+            or lost [J].
         max_strain: largest deviatoric strain so far [-].
     """
 
@@ -45,6 +48,7 @@ class Ledger:
         self.initial_energy: float | None = None
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
+        self.initial_kinetic = self.exchanged = self.imbalance = 0.0
 
     @property
     def _width(self) -> int:
@@ -113,13 +117,27 @@ class Ledger:
         stored = sum(energy.values(), np.zeros(len(sums)))
         if self.initial_energy is None and len(sums):
             self.initial_energy, self.initial_work = float(stored[0]), float(work[0])
+            self.initial_kinetic = float(energy["kinetic"][0])
             work = work - self.initial_work
         initial = self.initial_energy or 0.0
         scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.energy_scale))
         self.energy_scale = float(scale.max(initial=self.energy_scale))
+        imbalance, moved = np.abs(stored - work - initial), np.abs(energy["kinetic"] - self.initial_kinetic)
+        self.imbalance = float(imbalance.max(initial=self.imbalance))
+        self.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.exchanged))
         share: Array = np.zeros(len(sums))
-        np.divide(np.abs(stored - work - initial), scale, out=share, where=scale > 0.0)
+        np.divide(imbalance, scale, out=share, where=scale > 0.0)
         return share
+
+    @property
+    def exchange_error(self) -> float:
+        """Largest imbalance as a share of `exchanged` [-]: the same for all who watch, however fast bodies move along.
+
+        What is exchanged counts as LEAST of the initial energy and external work at least, so that the rounding of
+        motion alone counts for little.
+        """
+        scale = max(self.exchanged, LEAST * self.energy_scale)
+        return self.imbalance / scale if scale > 0.0 else 0.0
 
     def energy(self) -> dict[str, float]:
         """The ledger at the end [J]; not numbers where no record was taken in."""
