@@ -312,14 +312,14 @@ def _import(*names: str) -> None:
 
 
 def _start_warp(*needed: str) -> None:
-    """Initialise Warp, and meanwhile begin to import modules that are `needed` later: a GPU's driver takes its time.
+    """Initialise Warp, and meanwhile import modules that are `needed` later: a GPU's driver takes its time.
 
     Warp's native code warns on stderr when there is no GPU, which is no news to who asks for cpu.
     """
     import warp
 
-    if needed:
-        threading.Thread(target=_import, args=needed, daemon=True).start()
+    meanwhile = threading.Thread(target=_import, args=needed, daemon=True)
+    meanwhile.start()
     sys.stderr.flush()
     stderr, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -330,6 +330,7 @@ def _start_warp(*needed: str) -> None:
         os.dup2(stderr, 2)
         os.close(stderr)
         os.close(null)
+    meanwhile.join()  # imports and the arrays of a mesh, at the same time, would wait for each other
 
 
 def _build(args: argparse.Namespace) -> None:

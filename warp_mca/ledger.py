@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # Columns of a record, then eight for each contact pass (`kernels.contact.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
 PASS_COLUMNS = 8
-LEAST = 1e-7
+LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
     "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike, "
