@@ -49,6 +49,8 @@ def _approach_angle(length: float, radius: float, H: float, gravity: float, thet
     from warp_mca.chain import Chain, slender_link
     from warp_mca.rigid import swing
 
+    if 2.0 * length <= H:
+        raise bad_value("H", H, f"the tip reaches {2.0 * length:g} m below O and never touches the plate; lower H")
     links = (
         slender_link("OA", (length, 0.0), mass=1.0, hinge_out=(length, 0.0)),
         slender_link("AB", (length, 0.0), mass=1.0),

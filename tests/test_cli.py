@@ -88,6 +88,8 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 2) -> 
         (["two_link", "--set", "E_t_plate=7e10"], ["E_t = 7", "tangent modulus"]),
         (["two_link", "--set", "nu=0.5"], ["nu = 0.5", "-1 and 0.5"]),
         (["two_link", "--set", "H=5"], ["5", "reach"]),
+        (["two_link", "--set", "length=1e-9"], ["H = 0.37", "2e-09 m below O"]),  # swings a million times otherwise
+        (["two_link", "--out", ""], ["--out", "name a folder"]),
         (["two_link", "--device", "cuda:99"], ["device = 'cuda:99'", "cpu"]),
         (["two_link", "--precision", "float32"], ["float32", "mixed"]),
         (["two_link", "--duration", "soon"], ["'soon'"]),

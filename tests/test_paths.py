@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.errors import RequestError
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.model import build_model
 from warp_mca.paths import Probes, locate
@@ -16,13 +17,13 @@ from warp_mca.verify.elements import mixed_cube
 STEEL = mca.Elastic(E=2e11, nu=0.3, rho=7850.0)
 
 
-def probes(mesh: mca.Mesh, start: tuple, end: tuple) -> Probes:
+def probes(mesh: mca.Mesh, start: tuple, end: tuple, spacing: float = 0.03) -> Probes:
     """Those of a line through one body."""
     line = mca.Line(body="it", start=start, end=end)
     scene = mca.Scene(
         name="one",
         bodies=(mca.Body(name="it", geometry=mesh, material=STEEL),),
-        paths=(mca.Path(name="path", lines=(line,), spacing=0.03),),
+        paths=(mca.Path(name="path", lines=(line,), spacing=spacing),),
         impact=mca.ImpactPhase(duration=1e-6),
     )
     meshes = {"it": mesh}
@@ -77,3 +78,9 @@ def test_a_line_just_outside_takes_the_nearest_cell():
     place = np.einsum("pa,pai->pi", found.weight, MESHES["cells"].points[found.corner])
     np.testing.assert_allclose(place[:, 1], 1.0, atol=1e-12)
     np.testing.assert_allclose(place[:, 0], 0.1 + found.position["path"], atol=2e-4)
+
+
+def test_more_probes_than_a_line_can_have_are_refused():
+    cube = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
+    with pytest.raises(RequestError, match=r"Path path\.spacing = 1e-14: a line of 1 m would have 1e"):
+        probes(cube, (0.0, 0.5, 0.5), (1.0, 0.5, 0.5), spacing=1e-14)

@@ -197,6 +197,18 @@ def test_a_recorder_that_cannot_start_stops_the_run_before_it_begins(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_file_stays_where_another_recorder_is_refused(tmp_path):
+    kept, folder = tmp_path / "kept.usdc", tmp_path / "a.vtu"
+    kept.write_bytes(b"of an earlier run")
+    folder.mkdir()
+    with pytest.raises(RequestError, match=r"a\.vtu"):
+        mca.run(bar(), recorders=[UsdFile(kept), FinalState(folder)])
+    assert kept.read_bytes() == b"of an earlier run"
+    with pytest.raises(RequestError, match=r"a\.vtu"):
+        mca.run(bar(), recorders=[UsdFile(tmp_path / "new.usdc"), FinalState(folder)])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.vtu", "kept.usdc"]
+
+
 @pytest.mark.parametrize("kind", [UsdFile, RerunStream, FinalState])
 def test_two_recorders_of_one_file_are_refused(tmp_path, kind):
     """The second file of USD replaced the stage of the first, which broke off with a warning."""

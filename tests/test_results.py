@@ -17,6 +17,7 @@ from warp_mca.history import (
     reverses,
     stick_intervals,
 )
+from warp_mca.report.forces import compression_phases
 from warp_mca.results import FILES, HISTORY_COLUMNS, Result, RunFacts, check_output, load, save, summarise
 
 TIME = np.arange(1, 601) * 1e-6
@@ -206,3 +207,18 @@ def test_reversal_needs_both_signs_beyond_the_last_springs():
     assert not reverses(np.append(-1000.0 * wave, 0.04))
     assert reverses(np.append(-1000.0 * wave, 100.0 * wave))
     assert not reverses(np.zeros(4))
+
+
+def test_records_far_closer_than_the_filter_is_wide_have_peaks_too():
+    """A run of 1e-30 s: the filter's width is that of all records then, not of memory."""
+    peaks = force_peaks(1e-30 * np.arange(5.0), np.array([0.0, 1.0, 3.0, 2.0, 0.0]))
+    assert [force for _, force in peaks] == [3.0]
+    close = history(time_s=1e-24 * TIME, F_n_N=two_bumps())
+    assert len(compression_phases(Result(summarise(close, facts()), close, None))) == 2
+
+
+def test_a_folder_that_takes_no_file_is_refused_before_a_run():
+    if not Path("/proc").is_dir():
+        pytest.skip("no folder here that takes no file even of root")
+    with pytest.raises(RequestError, match="out = '/proc/x': /proc cannot be written to"):
+        check_output("/proc/x")

@@ -21,6 +21,7 @@ SOUND = {
     mca.Line: {"body": "a", "start": (0.0, 0.0, 0.0), "end": (1.0, 0.0, 0.0), "position": 0.0},
     mca.RigidPlane: {"point": (0.0, 0.0, 0.0)},
     mca.Contact: {"slave": SIDE, "master": mca.RigidPlane(), "mu": 0.3, "penalty": 1.0},
+    mca.Revolute: {"name": "O", "body": "a", "at": (0.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0)},
     mca.Fixed: {"body": "a", "nodes": "xmin", "axes": "xy"},
     mca.Prescribed: {"body": "a", "nodes": "xmin", "axis": "x", "times": (0.0, 1.0), "velocities": (0.0, 1.0)},
     mca.RigidPhase: {"theta": (1.0,), "theta_dot": (0.0,), "tip": TIP, "target": mca.RigidPlane()},
@@ -49,6 +50,7 @@ SOUND = {
         (mca.Contact, "slave", "a"),
         (mca.Contact, "master", "b"),
         (mca.Contact, "mu", "rough"),
+        (mca.Revolute, "axis", (0.0, 0.0, 0.0)),
         (mca.Fixed, "axes", 1),
         (mca.Prescribed, "times", (0.0, math.nan)),
         (mca.Prescribed, "velocities", (0.0, math.inf)),
@@ -62,3 +64,13 @@ def test_another_kind_of_value_is_refused_by_name(kind, field, value):
     kind(**SOUND[kind])
     with pytest.raises(RequestError, match=rf"\b{field} = .+: (give|must|use|the tangent|Poisson)"):
         kind(**{**SOUND[kind], field: value})
+
+
+def test_a_pair_of_surfaces_meets_once():
+    bodies = (mca.Body(name="a", geometry=BOX, material=STEEL),)
+    pair = mca.Contact(slave=SIDE, master=mca.RigidPlane())
+    again = mca.Contact(slave=SIDE, master=mca.RigidPlane(), mu=0.1)
+    impact = mca.ImpactPhase(duration=1e-6)
+    mca.Scene(name="s", bodies=bodies, contacts=(pair,), impact=impact)
+    with pytest.raises(RequestError, match=r"Scene\.contacts = 'xmax of a': it meets the same master twice"):
+        mca.Scene(name="s", bodies=bodies, contacts=(pair, again), impact=impact)

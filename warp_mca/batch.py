@@ -64,7 +64,7 @@ def run_batch(
     span = check_alike(scenes, duration)
     check_device(device)
     threads = thread_count(threads)
-    folders = _folders(out, len(scenes), force)
+    folders = scene_folders(out, len(scenes), force)
     clock = Clock()
     ready = _prepare(scenes, meshes, clock, tell)
     steps = divide_alike([(item.scene, item.model) for item in ready], span)
@@ -145,8 +145,12 @@ def _kind(master: object) -> str:
     return "RigidPlane" if isinstance(master, RigidPlane) else "Surface"
 
 
-def _folders(out: str | os.PathLike[str] | None, count: int, force: bool) -> list[Path | None]:
-    """A folder for each scene, numbered so that names sort."""
+def scene_folders(out: str | os.PathLike[str] | None, count: int, force: bool) -> list[Path | None]:
+    """A folder for each scene, numbered so that names sort.
+
+    Raises:
+        RequestError: as in `check_output`.
+    """
     if out is None:
         return [None] * count
     digits = len(str(count - 1))

@@ -29,6 +29,7 @@ from warp_mca.scene_file import SUFFIX, Origin
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
+    from warp_mca.results import Result
 
 WELCOME = """\
 warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
@@ -133,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="KEY=VALUE,…",
         help="run a scene for each value, all at once, to folders 0, 1, … in DIR; several times: all combinations",
     )
-    run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
+    run.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     run.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(run)
     run.set_defaults(command=_run)
@@ -156,9 +157,15 @@ def _parser() -> argparse.ArgumentParser:
     _add_device(verify)
     _add_element(verify)
     verify.add_argument("--level", default="quick", choices=("quick", "full"), help="meshes (default: %(default)s)")
-    verify.add_argument("--out", type=Path, metavar="DIR", help="write verification.md and its figure there")
+    verify.add_argument("--out", type=_folder, metavar="DIR", help="write verification.md and its figure there")
     verify.set_defaults(command=_verify)
     return parser
+
+
+def _folder(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("'': name a folder, or . for this one")
+    return Path(text)
 
 
 def _add_element(parser: argparse.ArgumentParser) -> None:
@@ -277,29 +284,38 @@ def _run(args: argparse.Namespace) -> None:
 
 
 def _sweep(args: argparse.Namespace) -> None:
+    from warp_mca.batch import scene_folders
     from warp_mca.report.console import progress_bar
-    from warp_mca.sweep import parse_sweep, print_sweep
+    from warp_mca.results import save
+    from warp_mca.sweep import batches, parse_sweep, print_sweep
 
     settings = parse_sweep(args.sweeps)
     requests = [_request(args, more) for more in settings]
     out = args.out or Path(f"{requests[0].label}-sweep")
     if _recorders(args, out):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
-    meshes = requests[0].meshes
+    meshes, scenes = requests[0].meshes, [request.scene for request in requests]
+    folders, groups = scene_folders(out, len(scenes), args.force), batches(scenes, args.duration)
     _start_warp()
+    found: dict[int, Result] = {}
     with progress_bar() as progress:
-        results = mca.run_batch(
-            [request.scene for request in requests],
-            device=args.device,
-            precision=args.precision,
-            threads=args.threads,
-            duration=args.duration,
-            out=out,
-            force=args.force,
-            meshes=[meshes] * len(requests) if meshes else None,
-            progress=progress,
-        )
-    print_sweep(settings, results)
+        for group in groups:
+            done = mca.run_batch(
+                [scenes[k] for k in group],
+                device=args.device,
+                precision=args.precision,
+                threads=args.threads,
+                duration=args.duration,
+                meshes=[meshes] * len(group) if meshes else None,
+                progress=progress,
+            )
+            found |= zip(group, done, strict=True)
+    # only now is it sure that no scene is refused
+    results = [
+        found[k] if folder is None or found[k].stopped else save(found[k], folder, force=args.force)
+        for k, folder in enumerate(folders)
+    ]
+    print_sweep(settings, results, groups)
     stopped = sum(result.stopped is not None for result in results)
     if stopped:
         raise GuardError(f"guards stopped {stopped} of {len(results)} scenes")

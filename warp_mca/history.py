@@ -104,7 +104,7 @@ def force_peaks(time: Array, F_n: Array) -> list[Interval]:
 
     if np.max(F_n, initial=0.0) <= 0.0:
         return []
-    sigma = SMOOTHING / float(np.median(np.diff(interval_edges(time))))
+    sigma = min(SMOOTHING / float(np.median(np.diff(interval_edges(time)))), float(len(time)))
     smooth = gaussian_filter1d(F_n, sigma, mode="nearest")
     # A zero on either side lets a force that begins or ends high count as a peak.
     found, _ = find_peaks(np.pad(smooth, 1), prominence=PROMINENCE * float(smooth.max()))

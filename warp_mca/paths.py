@@ -18,6 +18,8 @@ from warp_mca.geometry.boxes import cell_boxes
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene import Line, Path, Scene
 
+MOST_PROBES = 100_000  # of a line
+
 if TYPE_CHECKING:
     from warp_mca.model import Model
 
@@ -91,6 +93,10 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
         along = []
         for line in path.lines:
             mesh = meshes[line.body]
+            if not line.length < MOST_PROBES * path.spacing:
+                count = line.length / path.spacing
+                remedy = f"a line of {line.length:g} m would have {count:.3g} probes; give a larger one"
+                raise bad_value(f"Path {path.name}.spacing", path.spacing, remedy)
             share = np.linspace(0.0, 1.0, int(np.ceil(line.length / path.spacing - 1e-9)) + 1)
             key = (id(mesh), line, path.spacing)
             if key not in found:

@@ -168,11 +168,14 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
         RequestError: it is a file, cannot be written to, or holds results and `force` is off.
     """
     path = Path(directory)
-    existing = _nearest(path)
+    existing = nearest(path)
     if not existing.is_dir():
         raise bad_value("out", str(path), f"{existing} is not a folder; name another")
-    if not os.access(existing, os.W_OK):
-        raise bad_value("out", str(path), f"{existing} cannot be written to; name another folder")
+    try:
+        tempfile.TemporaryDirectory(prefix=".warp_mca-", dir=existing).cleanup()
+    except OSError as error:
+        what = f"{existing} cannot be written to ({error.strerror or error}); name another folder"
+        raise bad_value("out", str(path), what) from error
     if not force and any((path / name).exists() for name in FILES + PATH_FILES):
         raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
     return path
@@ -201,7 +204,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     # Written beside the folder first: a run that fails half-way leaves nothing behind.
     staging = None
     try:
-        staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=_nearest(path)))
+        staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=nearest(path)))
         begun = time.perf_counter()
         _write_history(staging / "history.csv", result.history)
         save_forces(staging / "forces.png", result)
@@ -256,7 +259,7 @@ def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
     return dataclasses.replace(result, summary=summary, path=path)
 
 
-def _nearest(path: Path) -> Path:
+def nearest(path: Path) -> Path:
     """The path itself, or the closest of its parents that exists."""
     return next(p for p in (path, *path.absolute().parents) if p.exists())
 

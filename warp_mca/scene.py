@@ -311,6 +311,8 @@ class Revolute:
 
     def __post_init__(self) -> None:
         _finite(f"Revolute {self.name}", at=self.at, other_at=self.other_at, axis=self.axis)
+        if not any(self.axis):
+            raise bad_value(f"Revolute {self.name}.axis", self.axis, "give a direction other than zero")
         if self.nodes not in ("axis", "ends"):
             raise bad_value(f"Revolute {self.name}.nodes", self.nodes, "choose axis or ends")
 
@@ -488,6 +490,11 @@ class Scene:
         paths = [path.name for path in self.paths]
         if len(set(paths)) != len(paths):
             raise bad_value("Scene.paths", paths, "give each path a name of its own")
+        pairs = [(item.slave, item.master) for item in self.contacts]
+        for pair in pairs:
+            if pairs.count(pair) > 1:
+                what = f"{pair[0].nodes} of {pair[0].body}"
+                raise bad_value("Scene.contacts", what, "it meets the same master twice; list each pair once")
         _finite("Scene", gravity=self.gravity)
         for field_name, body in self._named_bodies():
             if body not in names:

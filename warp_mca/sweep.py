@@ -10,6 +10,7 @@ from warp_mca.errors import bad_value
 
 if TYPE_CHECKING:
     from warp_mca.results import Result
+    from warp_mca.scene import Scene
 
 
 def parse_sweep(texts: Iterable[str]) -> list[dict[str, str]]:
@@ -30,10 +31,32 @@ def parse_sweep(texts: Iterable[str]) -> list[dict[str, str]]:
     return [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
 
 
-def print_sweep(settings: Sequence[Mapping[str, str]], results: Sequence[Result]) -> None:
+def batches(scenes: Sequence[Scene], duration: float | None) -> list[list[int]]:
+    """Numbers of scenes that can take their steps together: those of one duration and output interval [s].
+
+    Args:
+        scenes: of the sweep.
+        duration: that all of them run, or None for their own.
+    """
+    found: dict[tuple[str, str], list[int]] = {}
+    for k, scene in enumerate(scenes):
+        span = scene.impact.duration if duration is None else duration
+        # computed from other parameters, equal ones differ by rounding
+        found.setdefault((f"{span:.9e}", f"{scene.impact.output_interval:.9e}"), []).append(k)
+    return list(found.values())
+
+
+def print_sweep(
+    settings: Sequence[Mapping[str, str]], results: Sequence[Result], groups: Sequence[Sequence[int]]
+) -> None:
     """A line for each scene: what was set, the figures that one looks at first, and its folder or why it stopped.
 
-    Below them, each warning once.
+    Below them, each warning once, and the time of all.
+
+    Args:
+        settings: of each scene.
+        results: of each scene.
+        groups: numbers of the scenes that ran at once.
     """
     from rich.table import Table
 
@@ -57,6 +80,7 @@ def print_sweep(settings: Sequence[Mapping[str, str]], results: Sequence[Result]
     out.print(table)
     for warning in dict.fromkeys(warning for result in results for warning in result.warnings):
         out.print(f"warning: {warning}", soft_wrap=True)
-    shared = results[0].summary
-    walls = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in shared["wall"].items() if stage != "output")
+    shared, first = results[0].summary, [results[group[0]].summary["wall"] for group in groups]
+    total = {stage: sum(wall[stage] for wall in first) for stage in shared["wall"] if stage != "output"}
+    walls = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in total.items())
     out.print(f"wall time of all: {walls}, on {shared['device']}, {shared['precision']}")

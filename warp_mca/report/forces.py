@@ -40,7 +40,7 @@ def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
     touching = np.zeros(len(time), dtype=bool)
     for start, end in contact_intervals(time, result.F_n):
         touching |= (time > start) & (time <= end)
-    sigma = SMOOTHING / float(np.median(np.diff(interval_edges(time))))
+    sigma = min(SMOOTHING / float(np.median(np.diff(interval_edges(time)))), float(len(time)))
     closing = gaussian_filter1d(velocity, sigma, mode="nearest") < 0.0
     return intervals(time, touching & closing, 0.0), intervals(time, touching & ~closing, 0.0)
 
