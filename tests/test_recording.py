@@ -11,7 +11,7 @@ from warp_mca.errors import GuardError, RequestError
 from warp_mca.model import build_model
 from warp_mca.output import Output
 from warp_mca.paths import locate
-from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
+from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile
 from warp_mca.recorders.frames import skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
 from warp_mca.solver import Solver
@@ -198,15 +198,20 @@ def test_a_recorder_that_cannot_start_stops_the_run_before_it_begins(tmp_path):
 
 
 def test_a_file_stays_where_another_recorder_is_refused(tmp_path):
-    kept, folder = tmp_path / "kept.usdc", tmp_path / "a.vtkhdf"
+    class Unwilling(Memory):
+        path = tmp_path / "folder"
+
+        def start(self, info) -> None:
+            self.path.open("wb").close()
+
+    kept = tmp_path / "kept.usdc"
     kept.write_bytes(b"of an earlier run")
-    folder.mkdir()
-    with pytest.raises(RequestError, match=r"a\.vtkhdf"):
-        mca.run(bar(), recorders=[UsdFile(kept), VtkHdfFile(folder)])
+    Unwilling.path.mkdir()
+    for file in (kept, tmp_path / "new.usdc"):
+        with pytest.raises(IsADirectoryError):
+            mca.run(bar(), recorders=[UsdFile(file), Unwilling(SURFACE)])
     assert kept.read_bytes() == b"of an earlier run"
-    with pytest.raises(RequestError, match=r"a\.vtkhdf"):
-        mca.run(bar(), recorders=[UsdFile(tmp_path / "new.usdc"), VtkHdfFile(folder)])
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.vtkhdf", "kept.usdc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "kept.usdc"]
 
 
 @pytest.mark.parametrize("kind", [UsdFile, RerunStream, FinalState])
