@@ -74,3 +74,11 @@ def test_a_pair_of_surfaces_meets_once():
     mca.Scene(name="s", bodies=bodies, contacts=(pair,), impact=impact)
     with pytest.raises(RequestError, match=r"Scene\.contacts = 'xmax of a': it meets the same master twice"):
         mca.Scene(name="s", bodies=bodies, contacts=(pair, again), impact=impact)
+
+
+def test_a_point_off_its_body_is_refused():
+    body = mca.Body(name="a", geometry=BOX, material=STEEL)
+    near, far = (mca.Point(body="a", at=(x, 0.5, 0.5)) for x in (1.05, 2.0))
+    mca.run(mca.Scene(name="s", bodies=(body,), tip=near, impact=mca.ImpactPhase(duration=1e-6)))
+    with pytest.raises(RequestError, match=r"Point of a\.at = \(2.0, 0.5, 0.5\): that is 1 m off the body"):
+        mca.run(mca.Scene(name="s", bodies=(body,), tip=far, impact=mca.ImpactPhase(duration=1e-6)))

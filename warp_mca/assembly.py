@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 GROUND = -1  # in place of a node where there is none
+NEAR = 0.05  # share of a body's extent that a point of it may lie off it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,8 +255,18 @@ class Assembly:
         return make_faces(self.X, node, element, self.K, self.volume)
 
     def nearest(self, point: Point | None) -> int:
-        """Node nearest to a point, or GROUND."""
+        """Node nearest to a point, or GROUND.
+
+        Raises:
+            RequestError: the point lies off the box around its body, by more than NEAR of its extent.
+        """
         if point is None:
             return GROUND
-        offsets = self.meshes[point.body].points - np.asarray(point.at)
+        nodes, at = self.meshes[point.body].points, np.asarray(point.at)
+        lower, upper = nodes.min(axis=0), nodes.max(axis=0)
+        apart = float(np.linalg.norm(at - np.clip(at, lower, upper)))
+        if apart > NEAR * float(np.linalg.norm(upper - lower)):
+            remedy = f"that is {apart:.3g} m off the body; give a point of it in its own frame"
+            raise bad_value(f"Point of {point.body}.at", point.at, remedy)
+        offsets = nodes - at
         return int(np.argmin((offsets**2).sum(axis=1))) + self.node_start[point.body]
