@@ -177,7 +177,7 @@ def build(
         name="two_link",
         bodies=(
             mca.Body(name="OA", geometry=upper, material=rod),
-            mca.Body(name="AB", geometry=lower, material={"tip": tip, "body": rod}),
+            mca.Body(name="AB", geometry=lower, material={"body": rod, "tip": tip}),
             mca.Body(
                 name="plate",
                 geometry=plate,

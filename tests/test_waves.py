@@ -68,3 +68,9 @@ def test_bending_loads_the_upper_surface_most_and_the_axis_least(runs):
         row = np.searchsorted(impact.time, time)
         assert upper[row] > 1.05 * lower[row]
         assert axis[row] < 0.6 * lower[row]
+
+
+def test_wave_speeds_are_those_of_the_rods_whatever_the_tip_is_made_of():
+    scene = mca.make_scene("two_link", E_tip=35e9, duration=2e-6)
+    speeds = mca.run(scene).summary["wave_speeds"]
+    assert speeds["bar"] == pytest.approx((70e9 / 2700.0) ** 0.5, rel=1e-12)
