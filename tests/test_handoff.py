@@ -12,8 +12,9 @@ from warp_mca.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.handback import hand_back
 from warp_mca.handoff import HandOff, hand_off, link_placements
+from warp_mca.materials import Elastic
 from warp_mca.rigid import chain_from_scene
-from warp_mca.scene import Body, Elastic, ImpactPhase, Revolute, RigidPhase, RigidPlane, Scene, Surface, Tip
+from warp_mca.scene import Body, ImpactPhase, Revolute, RigidPhase, RigidPlane, Scene, Surface, Tip
 from warp_mca.target import target_plane
 
 LENGTH, RADIUS, HEIGHT = 0.21, 0.013, 0.37  # Table 1 [m]

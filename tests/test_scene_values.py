@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import warp_mca as mca
@@ -71,6 +72,9 @@ def test_a_pair_of_surfaces_meets_once():
     pair = mca.Contact(slave=SIDE, master=mca.RigidPlane())
     again = mca.Contact(slave=SIDE, master=mca.RigidPlane(), mu=0.1)
     impact = mca.ImpactPhase(duration=1e-6)
+    corner = [mca.RigidPlane(normal=np.eye(3)[k]) for k in range(2)]  # one surface may meet two planes, given as arrays
+    walls = tuple(mca.Contact(slave=SIDE, master=plane) for plane in corner)
+    mca.Scene(name="s", bodies=bodies, contacts=walls, impact=impact)
     mca.Scene(name="s", bodies=bodies, contacts=(pair,), impact=impact)
     with pytest.raises(RequestError, match=r"Scene\.contacts = 'xmax of a': it meets the same master twice"):
         mca.Scene(name="s", bodies=bodies, contacts=(pair, again), impact=impact)

@@ -9,13 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from warp_mca.errors import GuardError, McaError, RequestError
+from warp_mca.materials import Elastic, J2Bilinear
 from warp_mca.scene import (
     Body,
     Contact,
-    Elastic,
     Fixed,
     ImpactPhase,
-    J2Bilinear,
     Line,
     Path,
     Point,

@@ -12,8 +12,9 @@ from warp_mca.elements import ELEMENTS, Element
 from warp_mca.elements.hexahedron import CHUNK, chunks
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.materials import Elastic, J2Bilinear
 from warp_mca.patches import PATCH, compact_order
-from warp_mca.scene import Body, Elastic, J2Bilinear, Point, Scene, Surface
+from warp_mca.scene import Body, Point, Scene, Surface
 from warp_mca.surfaces import Faces, make_faces
 from warp_mca.timestep import StableStep, stable_step
 

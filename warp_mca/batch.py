@@ -85,6 +85,11 @@ def run_batch(
     clock.lap("fe")
     tell("impact", 1.0)
     results = [account.result(solver, clock.wall, stopped=stopped[k]) for k, account in enumerate(accounts)]
+    return save_scenes(results, folders, force)
+
+
+def save_scenes(results: Sequence[Result], folders: Sequence[Path | None], force: bool) -> list[Result]:
+    """Results, those that no guard stopped written to the folders of `scene_folders`."""
     return [
         result if folder is None or result.stopped else save(result, folder, force=force)
         for result, folder in zip(results, folders, strict=True)

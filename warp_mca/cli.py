@@ -284,9 +284,8 @@ def _run(args: argparse.Namespace) -> None:
 
 
 def _sweep(args: argparse.Namespace) -> None:
-    from warp_mca.batch import scene_folders
+    from warp_mca.batch import save_scenes, scene_folders
     from warp_mca.report.console import progress_bar
-    from warp_mca.results import save
     from warp_mca.sweep import batches, parse_sweep, print_sweep
 
     settings = parse_sweep(args.sweeps)
@@ -311,10 +310,7 @@ def _sweep(args: argparse.Namespace) -> None:
             )
             found |= zip(group, done, strict=True)
     # only now is it sure that no scene is refused
-    results = [
-        found[k] if folder is None or found[k].stopped else save(found[k], folder, force=args.force)
-        for k, folder in enumerate(folders)
-    ]
+    results = save_scenes([found[k] for k in range(len(scenes))], folders, args.force)
     print_sweep(settings, results, groups)
     stopped = sum(result.stopped is not None for result in results)
     if stopped:

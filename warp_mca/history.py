@@ -18,7 +18,7 @@ CONTACT_THRESHOLD = 1e-3  # share of the greatest F_n above which the bodies cou
 REVERSAL_THRESHOLD = 1e-2  # share of the greatest |F_t| that both signs must reach
 MERGED_GAP = 5e-6  # separations shorter than this [s] are nodes changing over, not a second contact
 STICK_THRESHOLD = 0.5  # share of the contact that must stick
-SMOOTHING = 2e-6  # standard deviation of the Gaussian through which peaks are looked for [s]
+SMOOTHING = 2e-6  # standard deviation of the Gaussian that takes the ringing out of forces and velocities [s]
 PROMINENCE = 0.05  # share of the greatest F_n by which a peak must stand out of its valleys
 
 
@@ -87,6 +87,14 @@ def reverses(F_t: Array) -> bool:
     return bool(size > 0.0 and F_t.max() > size and F_t.min() < -size)
 
 
+def smoothed(time: Array, values: Array) -> Array:
+    """The values through a Gaussian of SMOOTHING, which is no wider than all rows, shape (row_count,), float64."""
+    from scipy.ndimage import gaussian_filter1d
+
+    sigma = min(SMOOTHING / float(np.median(np.diff(interval_edges(time)))), float(len(time)))
+    return gaussian_filter1d(values, sigma, mode="nearest")
+
+
 def force_peaks(time: Array, F_n: Array) -> list[Interval]:
     """Time [s] and value [N] of each peak of F_n, in order: one for each turn from compression to restitution.
 
@@ -99,13 +107,11 @@ def force_peaks(time: Array, F_n: Array) -> list[Interval]:
         time: ends of the output intervals [s], shape (row_count,).
         F_n: normal force [N], shape (row_count,).
     """
-    from scipy.ndimage import gaussian_filter1d
     from scipy.signal import find_peaks
 
     if np.max(F_n, initial=0.0) <= 0.0:
         return []
-    sigma = min(SMOOTHING / float(np.median(np.diff(interval_edges(time)))), float(len(time)))
-    smooth = gaussian_filter1d(F_n, sigma, mode="nearest")
+    smooth = smoothed(time, F_n)
     # A zero on either side lets a force that begins or ends high count as a peak.
     found, _ = find_peaks(np.pad(smooth, 1), prominence=PROMINENCE * float(smooth.max()))
     valleys = [a + int(np.argmin(smooth[a:b])) for a, b in zip(found[:-1] - 1, found[1:] - 1, strict=True)]

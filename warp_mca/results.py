@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from warp_mca.errors import McaError, RequestError, bad_value
+from warp_mca.files import check_folder, nearest
 from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
 from warp_mca.paths import PathHistory, load_paths, save_paths
 
@@ -168,14 +169,7 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
         RequestError: it is a file, cannot be written to, or holds results and `force` is off.
     """
     path = Path(directory)
-    existing = nearest(path)
-    if not existing.is_dir():
-        raise bad_value("out", str(path), f"{existing} is not a folder; name another")
-    try:
-        tempfile.TemporaryDirectory(prefix=".warp_mca-", dir=existing).cleanup()
-    except OSError as error:
-        what = f"{existing} cannot be written to ({error.strerror or error}); name another folder"
-        raise bad_value("out", str(path), what) from error
+    check_folder("out", path)
     if not force and any((path / name).exists() for name in FILES + PATH_FILES):
         raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
     return path
@@ -257,11 +251,6 @@ def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
     if isinstance(wall, Mapping):
         summary["wall"] = {**wall, "output": wall.get("output", 0.0) + seconds}
     return dataclasses.replace(result, summary=summary, path=path)
-
-
-def nearest(path: Path) -> Path:
-    """The path itself, or the closest of its parents that exists."""
-    return next(p for p in (path, *path.absolute().parents) if p.exists())
 
 
 def _write_history(path: Path, history: Mapping[str, Array]) -> None:

@@ -1,4 +1,4 @@
-"""Owns the public vocabulary of a scene: materials, bodies, joints, contacts, constraints, phases.
+"""Owns the public vocabulary of a scene: bodies, joints, contacts, constraints, phases.
 
 A scene is plain, immutable data. Every class checks its own values and raises `RequestError` with the field,
 the value and the remedy. Nothing here meshes, allocates or imports Warp.
@@ -7,112 +7,20 @@ the value and the remedy. Nothing here meshes, allocates or imports Warp.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Real
 from typing import TYPE_CHECKING, Literal
 
+from warp_mca import validate
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
+from warp_mca.materials import Elastic, Material
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.geometry.recipe import Recipe
 
 Vec3 = tuple[float, float, float]
-
-
-def _is_number(value: object) -> bool:
-    """Whether it is a finite real number; text, None, sequences and truth values are none."""
-    try:
-        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    except OverflowError:  # a whole number that no float holds
-        return False
-
-
-def _positive(owner: str, **values: float) -> None:
-    for name, value in values.items():
-        if not (_is_number(value) and value > 0.0):
-            raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
-
-
-def _finite(owner: str, **values: Vec3) -> None:
-    for name, value in values.items():
-        if not (_is_list(value) and len(value) == 3):
-            raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
-
-
-def _is_list(value: object) -> bool:
-    """Whether it is a sequence of finite numbers."""
-    return isinstance(value, Iterable) and not isinstance(value, str) and all(map(_is_number, value))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Elastic:
-    """Isotropic linear elasticity.
-
-    Attributes:
-        E: Young's modulus [Pa].
-        nu: Poisson's ratio [-], in (-1, 0.5).
-        rho: density [kg/m^3].
-    """
-
-    E: float
-    nu: float
-    rho: float
-
-    def __post_init__(self) -> None:
-        _positive(type(self).__name__, E=self.E, rho=self.rho)
-        if not (_is_number(self.nu) and -1.0 < self.nu < 0.5):
-            raise bad_value(f"{type(self).__name__}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")
-
-    @property
-    def bulk_modulus(self) -> float:
-        """K = E / (3 (1 - 2 nu)) [Pa]."""
-        return self.E / (3.0 * (1.0 - 2.0 * self.nu))
-
-    @property
-    def shear_modulus(self) -> float:
-        """G = E / (2 (1 + nu)) [Pa]."""
-        return self.E / (2.0 * (1.0 + self.nu))
-
-    @property
-    def wave_speeds(self) -> dict[str, float]:
-        """Speeds of elastic waves [m/s]: bar sqrt(E / rho), dilatational c_d, shear c_s."""
-        K, G = self.bulk_modulus, self.shear_modulus
-        moduli = {"bar": self.E, "dilatational": K + 4.0 * G / 3.0, "shear": G}
-        return {name: math.sqrt(modulus / self.rho) for name, modulus in moduli.items()}
-
-
-@dataclass(frozen=True, kw_only=True)
-class J2Bilinear(Elastic):
-    """Von Mises plasticity with bilinear uniaxial response.
-
-    Attributes:
-        sigma_y: initial yield stress [Pa].
-        E_t: tangent modulus of the uniaxial response beyond yield [Pa], in [0, E).
-        beta: share of isotropic hardening [-]: 0 kinematic, 1 isotropic.
-    """
-
-    sigma_y: float
-    E_t: float
-    beta: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _positive("J2Bilinear", sigma_y=self.sigma_y)
-        if not (_is_number(self.E_t) and 0.0 <= self.E_t < self.E):
-            raise bad_value("J2Bilinear.E_t", self.E_t, f"the tangent modulus must lie in [0, E = {self.E:g})")
-        if not (_is_number(self.beta) and 0.0 <= self.beta <= 1.0):
-            raise bad_value("J2Bilinear.beta", self.beta, "must lie between 0 (kinematic) and 1 (isotropic)")
-
-    @property
-    def hardening_modulus(self) -> float:
-        """H = E E_t / (E - E_t) [Pa], the slope of yield stress over equivalent plastic strain."""
-        return self.E * self.E_t / (self.E - self.E_t)
-
-
-Material = Elastic | J2Bilinear
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +62,7 @@ class Body:
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         if self.kinematics not in ("corotational", "finite"):
             raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
-        _finite(
+        validate.vectors(
             f"Body {self.name}",
             position=self.position,
             rotation=self.rotation,
@@ -171,7 +79,7 @@ class Point:
     at: Vec3
 
     def __post_init__(self) -> None:
-        _finite(f"Point of {self.body}", at=self.at)
+        validate.vectors(f"Point of {self.body}", at=self.at)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,8 +98,8 @@ class Line:
     position: float = 0.0
 
     def __post_init__(self) -> None:
-        _finite(f"Line in {self.body}", start=self.start, end=self.end)
-        if not _is_number(self.position):
+        validate.vectors(f"Line in {self.body}", start=self.start, end=self.end)
+        if not validate.is_number(self.position):
             raise bad_value(f"Line in {self.body}.position", self.position, "give a finite number")
         if tuple(self.start) == tuple(self.end):
             raise bad_value(f"Line in {self.body}.end", self.end, "give a point other than the start")
@@ -217,7 +125,7 @@ class Path:
     spacing: float
 
     def __post_init__(self) -> None:
-        _positive(f"Path {self.name}", spacing=self.spacing)
+        validate.positive(f"Path {self.name}", spacing=self.spacing)
         if not self.lines:
             raise bad_value(f"Path {self.name}.lines", self.lines, "give at least one line")
 
@@ -245,13 +153,18 @@ class RigidPlane:
     velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        _finite("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
+        validate.vectors("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
         if math.hypot(*self.normal) == 0.0:
             raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
         if abs(sum(v * n for v, n in zip(self.velocity, self.normal, strict=True))) > 1e-12 * math.hypot(
             *self.velocity
         ):
             raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
+
+
+def _plain(master: Surface | RigidPlane) -> tuple[tuple[object, ...], ...]:
+    """Its values as tuples, which can be compared; vectors may be arrays."""
+    return tuple(tuple(value) for value in vars(master).values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,8 +191,8 @@ class Contact:
             raise bad_value("Contact.slave", self.slave, "give a Surface")
         if not isinstance(self.master, Surface | RigidPlane):
             raise bad_value("Contact.master", self.master, "give a Surface or a RigidPlane")
-        _positive("Contact", penalty=self.penalty)
-        if not (_is_number(self.mu) and self.mu >= 0.0):
+        validate.positive("Contact", penalty=self.penalty)
+        if not (validate.is_number(self.mu) and self.mu >= 0.0):
             raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
@@ -310,7 +223,7 @@ class Revolute:
     nodes: Literal["axis", "ends"] = "axis"
 
     def __post_init__(self) -> None:
-        _finite(f"Revolute {self.name}", at=self.at, other_at=self.other_at, axis=self.axis)
+        validate.vectors(f"Revolute {self.name}", at=self.at, other_at=self.other_at, axis=self.axis)
         if not any(self.axis):
             raise bad_value(f"Revolute {self.name}.axis", self.axis, "give a direction other than zero")
         if self.nodes not in ("axis", "ends"):
@@ -358,7 +271,7 @@ class Prescribed:
         if self.axis not in ("x", "y", "z"):
             raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
         for name, values in (("times", self.times), ("velocities", self.velocities)):
-            if not _is_list(values):
+            if not validate.is_list(values):
                 raise bad_value(f"Prescribed.{name}", values, "give finite numbers")
         if len(self.times) != len(self.velocities) or not len(self.times):
             raise bad_value("Prescribed.velocities", self.velocities, "give one velocity for each time")
@@ -381,8 +294,8 @@ class Tip:
     radius: float
 
     def __post_init__(self) -> None:
-        _finite("Tip", centre=self.centre)
-        _positive("Tip", radius=self.radius)
+        validate.vectors("Tip", centre=self.centre)
+        validate.positive("Tip", radius=self.radius)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -414,13 +327,13 @@ class RigidPhase:
 
     def __post_init__(self) -> None:
         for name, values in (("theta", self.theta), ("theta_dot", self.theta_dot)):
-            if not _is_list(values):
+            if not validate.is_list(values):
                 raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, one for each link")
         if len(self.theta) != len(self.theta_dot) or not len(self.theta):
             raise bad_value("RigidPhase.theta_dot", self.theta_dot, "give one angle and one rate for each link")
         if self.inertia not in ("mesh", "slender"):
             raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
-        _positive("RigidPhase", t_max=self.t_max)
+        validate.positive("RigidPhase", t_max=self.t_max)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -440,13 +353,13 @@ class ImpactPhase:
     energy_tolerance: float = 0.01
 
     def __post_init__(self) -> None:
-        _positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
-        _positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
+        validate.positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
+        validate.positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
         if self.output_interval > self.duration:
             raise bad_value(
                 "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
             )
-        if not (_is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
+        if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
 
 
@@ -490,12 +403,12 @@ class Scene:
         paths = [path.name for path in self.paths]
         if len(set(paths)) != len(paths):
             raise bad_value("Scene.paths", paths, "give each path a name of its own")
-        pairs = [(item.slave, item.master) for item in self.contacts]
-        for pair in pairs:
-            if pairs.count(pair) > 1:
-                what = f"{pair[0].nodes} of {pair[0].body}"
+        pairs = [(item.slave, _plain(item.master)) for item in self.contacts]
+        for slave, master in pairs:
+            if pairs.count((slave, master)) > 1:
+                what = f"{slave.nodes} of {slave.body}"
                 raise bad_value("Scene.contacts", what, "it meets the same master twice; list each pair once")
-        _finite("Scene", gravity=self.gravity)
+        validate.vectors("Scene", gravity=self.gravity)
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")

@@ -21,8 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca.geometry
+import warp_mca.materials
 import warp_mca.scene
 from warp_mca.errors import McaError, bad_value
+from warp_mca.files import check_folder
 from warp_mca.geometry import Mesh
 from warp_mca.registry import load_source
 from warp_mca.scene import Scene
@@ -77,8 +79,9 @@ def check_path(path: str | os.PathLike[str]) -> Path:
     checked = Path(path)
     if checked.suffix != SUFFIX:
         raise bad_value("output", str(path), f"give the model file the suffix {SUFFIX}")
-    if checked.is_dir() or not (checked.parent.is_dir() and os.access(checked.parent, os.W_OK)):
+    if checked.is_dir() or not checked.parent.is_dir():
         raise bad_value("output", str(path), "name a file in a folder that exists and can be written to")
+    check_folder("output", checked.parent)
     return checked
 
 
@@ -171,8 +174,8 @@ def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel
 
 
 def _vocabulary() -> dict[str, type]:
-    """The classes that a file may name: the dataclasses of the scene and of the geometry recipes."""
-    members = {**vars(warp_mca.geometry), **vars(warp_mca.scene)}
+    """The classes that a file may name: the dataclasses of scenes, materials and geometry recipes."""
+    members = {**vars(warp_mca.geometry), **vars(warp_mca.materials), **vars(warp_mca.scene)}
     return {name: item for name, item in members.items() if isinstance(item, type) and dataclasses.is_dataclass(item)}
 
 

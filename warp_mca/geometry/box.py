@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_mca.geometry import _validate
+from warp_mca import validate
 from warp_mca.geometry.mesh import Mesh
 
 
@@ -25,13 +25,13 @@ class Box:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        _validate.entries("Box", 3, size=self.size, divisions=self.divisions, origin=self.origin)
+        validate.entries("Box", 3, size=self.size, divisions=self.divisions, origin=self.origin)
         for value in self.size:
-            _validate.lengths("Box", size=value)
+            validate.positive("Box", size=value)
         for value in self.divisions:
-            _validate.counts("Box", divisions=value)
+            validate.counts("Box", divisions=value)
         for value in self.origin:
-            _validate.finite("Box", origin=value)
+            validate.finite("Box", origin=value)
 
     def build(self) -> Mesh:
         """The mesh, numbered with x running fastest, then y, then z."""

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from warp_mca import validate
 from warp_mca.errors import bad_value
-from warp_mca.geometry import _validate
 from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.edit import mirror, snapped
 from warp_mca.geometry.mesh import Mesh
@@ -54,15 +54,15 @@ class Plate:
     part: Literal["whole", "quarter"] = "whole"
 
     def __post_init__(self) -> None:
-        _validate.lengths("Plate", length=self.length, width=self.width, height=self.height, core_size=self.core_size)
-        _validate.entries("Plate", 2, core=self.core)
+        validate.positive("Plate", length=self.length, width=self.width, height=self.height, core_size=self.core_size)
+        validate.entries("Plate", 2, core=self.core)
         for value in self.core:
-            _validate.even_counts("Plate", core=value)
-        _validate.counts("Plate", core_depth=self.core_depth, layers=self.layers)
-        _validate.counts("Plate", extension=self.extension, extension_z=self.extension_z)
+            validate.even_counts("Plate", core=value)
+        validate.counts("Plate", core_depth=self.core_depth, layers=self.layers)
+        validate.counts("Plate", extension=self.extension, extension_z=self.extension_z)
         for name in ("box", "contact"):
             if getattr(self, name) is not None:
-                _validate.lengths("Plate", **{name: getattr(self, name)})
+                validate.positive("Plate", **{name: getattr(self, name)})
         if self.part not in ("whole", "quarter"):
             raise bad_value("Plate.part", self.part, "choose whole or quarter")
         half = self._half_box

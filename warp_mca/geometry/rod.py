@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca import validate
 from warp_mca.errors import bad_value
-from warp_mca.geometry import _validate
 from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import mirror, pinned, snapped
 from warp_mca.geometry.hemisphere import DEPTH_LIMIT, FOCUS_LIMIT, PATCH_LIMIT, Hemisphere
@@ -58,14 +58,14 @@ class Rod:
     focus_layers: int = 4
 
     def __post_init__(self) -> None:
-        _validate.lengths("Rod", radius=self.radius, length=self.length, axial_ratio=self.axial_ratio)
-        _validate.even_counts("Rod", section=self.section)
-        _validate.counts("Rod", ring=self.ring, axial=self.axial, focus_layers=self.focus_layers)
-        _validate.finite("Rod", focus_angle=self.focus_angle)
+        validate.positive("Rod", radius=self.radius, length=self.length, axial_ratio=self.axial_ratio)
+        validate.even_counts("Rod", section=self.section)
+        validate.counts("Rod", ring=self.ring, axial=self.axial, focus_layers=self.focus_layers)
+        validate.finite("Rod", focus_angle=self.focus_angle)
         if self.tip not in ("flat", "hemisphere"):
             raise bad_value("Rod.tip", self.tip, "choose flat or hemisphere")
         if self.tip_layers is not None:
-            _validate.counts("Rod", tip_layers=self.tip_layers)
+            validate.counts("Rod", tip_layers=self.tip_layers)
         if self.tip == "hemisphere":
             self._check_hemisphere()
 
@@ -74,7 +74,7 @@ class Rod:
             raise bad_value("Rod.length", self.length, f"a hemispherical tip needs more than radius = {self.radius:g}")
         if abs(self.focus_angle) > FOCUS_LIMIT * (1.0 + 1e-12):
             raise bad_value("Rod.focus_angle", self.focus_angle, f"must lie within {FOCUS_LIMIT:.4f} rad either way")
-        _validate.lengths("Rod", focus_size=self._focus_size)
+        validate.positive("Rod", focus_size=self._focus_size)
         if self._focus_size > self._largest_focus_size:
             remedy = f"the fine patch is too large; give at most {self._largest_focus_size:.3g}"
             raise bad_value("Rod.focus_size", self._focus_size, remedy)

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from warp_mca import validate
 from warp_mca.errors import bad_value
-from warp_mca.geometry import _validate
 from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import halved, mirror, pinned, snapped
 from warp_mca.geometry.hemisphere import DEPTH_LIMIT, PATCH_LIMIT, Hemisphere
@@ -49,13 +49,13 @@ class Sphere:
     pole_layers: int = 6
 
     def __post_init__(self) -> None:
-        _validate.lengths("Sphere", radius=self.radius)
-        _validate.even_counts("Sphere", section=self.section)
-        _validate.counts("Sphere", ring=self.ring, pole_layers=self.pole_layers)
+        validate.positive("Sphere", radius=self.radius)
+        validate.even_counts("Sphere", section=self.section)
+        validate.counts("Sphere", ring=self.ring, pole_layers=self.pole_layers)
         if self.part not in ("whole", "half", "quarter"):
             raise bad_value("Sphere.part", self.part, "choose whole, half or quarter")
         if self.pole_size is not None:
-            _validate.lengths("Sphere", pole_size=self.pole_size)
+            validate.positive("Sphere", pole_size=self.pole_size)
             if self.pole_size > self._largest_size:
                 remedy = f"the fine patch is too large; give at most {self._largest_size:.3g}"
                 raise bad_value("Sphere.pole_size", self.pole_size, remedy)

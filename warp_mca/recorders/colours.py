@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
-from warp_mca.scene import J2Bilinear, Scene
+from warp_mca.materials import J2Bilinear
+from warp_mca.scene import Scene
 
 STICK, SLIP = 0xF0E442FF, 0xD55E00FF  # contact points, as 0xRRGGBBAA: Okabe and Ito's yellow and vermilion
 _NODES = """

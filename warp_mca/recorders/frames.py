@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from warp_mca.errors import bad_value
 from warp_mca.kernels.output import OPEN, STICK
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame, Recorder, RunInfo, SurfaceMesh, Volume
-from warp_mca.results import nearest
 from warp_mca.transfer import Transfer
 
 if TYPE_CHECKING:
@@ -44,19 +42,6 @@ def _check_files(recorders: Sequence[Recorder]) -> None:
             known.add(Path(path).resolve())
 
 
-def _can_write(recorder: Recorder) -> bool:
-    """Whether the recorder's file can be opened, which is left as it is; True where it has none."""
-    path = getattr(recorder, "path", None)
-    try:
-        if path is not None and Path(path).exists():
-            Path(path).open("r+b").close()
-        elif path is not None:
-            tempfile.TemporaryFile(dir=nearest(Path(path))).close()
-    except OSError:
-        return False
-    return True
-
-
 class Recording:
     """The recorders of one run."""
 
@@ -74,8 +59,7 @@ class Recording:
         self.taken: dict[int, int] = {}
         self.transfer: Transfer[tuple[str, str]] | None = None
         try:
-            # those that will be refused first: none has begun its file then, and files that were there stay
-            for recorder in sorted(recorders, key=_can_write):
+            for recorder in recorders:
                 recorder.start(info)
                 self.rows.append((recorder, recorder.cadence.rows(intervals, info.output_interval)))
         except BaseException:

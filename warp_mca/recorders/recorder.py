@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
+from warp_mca.files import check_folder
 from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
@@ -223,9 +224,15 @@ def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path
     path = Path(file)
     if path.suffix not in suffixes:
         raise bad_value(field, str(path), f"give the file the suffix {' or '.join(suffixes)}")
-    existing = next(p for p in (path, *path.absolute().parents) if p.exists())
-    if existing.is_dir() == (existing == path):
-        raise bad_value(field, str(path), f"{existing} is {'' if existing.is_dir() else 'not '}a folder; name another")
-    if not os.access(existing, os.W_OK):
-        raise bad_value(field, str(path), f"{existing} cannot be written to; name another file")
+    if path.is_dir():
+        raise bad_value(field, str(path), f"{path} is a folder; name another")
+    if not path.exists():
+        check_folder(field, path)
+        return path
+    try:  # it stays as it is until the run starts
+        path.open("r+b").close()
+    except OSError as error:
+        raise bad_value(
+            field, str(path), f"it cannot be written to ({error.strerror or error}); name another"
+        ) from error
     return path

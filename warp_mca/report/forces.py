@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.history import Interval, contact_intervals, interval_edges, intervals, stick_intervals
+from warp_mca.history import Interval, contact_intervals, intervals, smoothed, stick_intervals
 from warp_mca.report.style import BLACK, BLUE, STICK, VERMILION, legend_beside, new_figure, save_png, tidy
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 COMPRESSION, RESTITUTION = "#5A5A5A", "#BDBDBD"
 STRIP = 0.035  # height of the strip of phases, as a share of the axes
-SMOOTHING = 2e-6  # standard deviation of the Gaussian that takes the tip node's ringing out of its velocity [s]
 
 
 def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
@@ -32,16 +31,13 @@ def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
     In contact, the bodies are compressed while the tip moves towards the plate, tip_vy < 0; otherwise they restitute.
     Both lists are empty when the scene has no tip.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     time, velocity = result.time, result["tip_vy"]
     if len(time) < 2 or not np.isfinite(velocity).all():
         return [], []
     touching = np.zeros(len(time), dtype=bool)
     for start, end in contact_intervals(time, result.F_n):
         touching |= (time > start) & (time <= end)
-    sigma = min(SMOOTHING / float(np.median(np.diff(interval_edges(time)))), float(len(time)))
-    closing = gaussian_filter1d(velocity, sigma, mode="nearest") < 0.0
+    closing = smoothed(time, velocity) < 0.0
     return intervals(time, touching & closing, 0.0), intervals(time, touching & ~closing, 0.0)
 
 

@@ -143,8 +143,8 @@ def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
         axes.set_xlabel("element size over the coarsest [-]", fontsize=8)
         axes.set_ylabel("relative error [-]", fontsize=8)
         tidy(axes)
-        for name in dict.fromkeys(outcome.setup.element for outcome, _ in curves):
-            color, marker, line = looks.get(name, ("0.5", "x", "-"))
-            axes.plot([], [], color=color, marker=marker, linestyle=line, markersize=3, label=name)
-        axes.legend(fontsize=7, frameon=False)
+    for name in dict.fromkeys(outcome.setup.element for outcome, _ in curves):
+        color, marker, line = looks.get(name, ("0.5", "x", "-"))
+        all_axes[0].plot([], [], color=color, marker=marker, linestyle=line, markersize=3, label=name)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return save_png(figure, path)

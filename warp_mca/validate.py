@@ -1,8 +1,9 @@
-"""Owns the checks that the recipes make on their values."""
+"""Owns the checks that scenes and recipes make on their values."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from numbers import Real
 
 import numpy as np
@@ -10,17 +11,17 @@ import numpy as np
 from warp_mca.errors import bad_value
 
 
-def lengths(owner: str, /, **values: float) -> None:
+def positive(owner: str, /, **values: float) -> None:
     """Each value must be a finite number above 0."""
     for name, value in values.items():
-        if not (_is_number(value) and value > 0.0):
+        if not (is_number(value) and value > 0.0):
             raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
 
 
 def finite(owner: str, /, **values: float) -> None:
     """Each value must be a finite number."""
     for name, value in values.items():
-        if not _is_number(value):
+        if not is_number(value):
             raise bad_value(f"{owner}.{name}", value, "give a finite number")
 
 
@@ -45,8 +46,24 @@ def entries(owner: str, count: int, /, **values: tuple) -> None:
             raise bad_value(f"{owner}.{name}", value, f"give {count} numbers")
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+def vectors(owner: str, /, **values: Sequence[float]) -> None:
+    """Each value must be three finite numbers."""
+    for name, value in values.items():
+        if not (is_list(value) and len(value) == 3):
+            raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a finite real number; text, None, sequences and truth values are none."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number that no float holds
+        return False
+
+
+def is_list(value: object) -> bool:
+    """Whether it is a sequence of finite numbers."""
+    return isinstance(value, Iterable) and not isinstance(value, str) and all(map(is_number, value))
 
 
 def _is_count(value: object) -> bool:
