@@ -44,11 +44,11 @@ def step_bytes(held: Held) -> float:
     nodes = s.model.node_count
     for stage in s.elements:
         if isinstance(stage, PatchStage):
-            lists = stage.patches
-            total += size(lists.corner) + size(lists.node) + size(lists.places) + 2 * 24 * len(lists.node)
+            lists, vectors = stage.patches, 1 if s.precision == "mixed" else 2  # points stand for positions
+            total += size(lists.corner) + size(stage.place) + size(lists.places) + vectors * 24 * len(stage.place)
         else:
-            total += size(stage.conn) + 2 * 24 * nodes
-        total += size(stage.material) + size(s.force)
+            total += size(stage.conn) + size(stage.material) + 2 * 24 * nodes
+        total += size(s.force)
         if held.case.yielding is not None:
             total += size(stage.yielded) + 2.0 * held.case.yielding * size(stage.history)
         if hasattr(stage, "group"):  # two kernels more: dilatation, and its mean at nodes

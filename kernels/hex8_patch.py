@@ -14,22 +14,25 @@ from warp_mca.kernels import j2
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, THIRD, frame_functions
 from warp_mca.kernels.patch import (
+    AHEAD,
+    POINT,
     RESIDENT,
     Patches,
-    begin_turns,
-    copy_ahead,
-    copy_nodes,
+    copy_functions,
     copy_places,
     corners_of,
     element_count,
+    exponent_of,
     from_start,
     load_functions,
+    material_of,
     sum_functions,
 )
 from warp_mca.kernels.scalars import scalars
 from warp_mca.kernels.shared_memory import (
     FORCES,
     HEADS,
+    ROW,
     barrier,
     head_ring,
     list_pool,
@@ -37,7 +40,6 @@ from warp_mca.kernels.shared_memory import (
     shared_functions,
     slot_pools,
     wait_for_copies,
-    wait_for_older_copies,
     warp_barrier,
 )
 from warp_mca.patches import PATCH, SLOTS
@@ -167,9 +169,11 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     force_pool, _ = shared_functions(precision)
-    node_pool, list_of_nodes, places_pool = slot_pools(precision)
-    slots = SLOTS[precision]
-    load_element, load_corners = load_functions(precision)
+    point_pool, vector_pool, places_pool = slot_pools(precision)
+    point, slots = POINT[precision], SLOTS[precision]
+    early = AHEAD[precision] or not plastic  # otherwise lanes of elements that yield still need the nodes of this patch
+    begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
+    load_points, load_displacements, load_corners = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
     elastic_forces = elastic_function(precision)
@@ -179,11 +183,13 @@ def force_kernel(precision: str, plastic: bool) -> Any:
 
     @wp.func
     def flow(
+        points: wp.array(dtype=point),
         pool: wp.array(dtype=wp.vec3d),
+        first: int,
+        exponent: int,
         patches: Patches,
         e: int,
         law: wp.array2d(dtype=R),
-        m: int,
         thread: int,
         q: int,
         valid: bool,
@@ -192,10 +198,11 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     ):
         """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
         a = q ^ (q >> 1)  # corners run around the faces
-        x0, d0, x1, d1 = load_corners(pool, patches, e, a)
+        x0, d0, x1, d1 = load_corners(points, pool, patches, e, a, first, exponent)
+        m = material_of(patches.corner[0, e], patches.corner[1, e])
         W = mat33()
         for k in range(9):
-            W[k // 3, k % 3] = force_out[k * wp.static(PATCH) + thread]
+            W[k // 3, k % 3] = force_out[k * wp.static(ROW) + thread]
         warp_barrier()
         xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
         eta = wp.where(q > 1, R(1.0), R(-1.0))
@@ -221,8 +228,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         f1 = f1 + W * f1
         if valid:
             for i in range(3):
-                force_out[(3 * a + i) * wp.static(PATCH) + thread] = f0[i]
-                force_out[(3 * (a + 4) + i) * wp.static(PATCH) + thread] = f1[i]
+                force_out[(3 * a + i) * wp.static(ROW) + thread] = f0[i]
+                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = f1[i]
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(
@@ -234,8 +241,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     )
     def hex8_patch_force(
         X: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
         patches: Patches,
-        material: wp.array(dtype=wp.int32),
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
@@ -248,30 +255,31 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
-        pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
-        node = wp.array(ptr=list_of_nodes(), shape=(slots,), dtype=wp.int32)
-        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4i)
+        place = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
         if wp.static(plastic):
             if lane == 0:
                 todo[0] = 0
-        begin_turns(X, u, patches, block, stride, lane, wp.static(slots), ring, node, pool)
+        begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
         head = ring[0]
         corners = corners_of(patches, head, lane)
         k = int(0)
         while element_count(head) > 0:
-            copy_places(patches, head, lane, places)
             e = from_start(head[0] + lane)
-            Xl = load_element(pool, 0, corners)
-            ul = load_element(pool, wp.static(slots), corners)
+            m = material_of(corners[0], corners[1])
+            first = (k & 1) * wp.static(slots)
+            Xl = load_points(place, pool, corners, first, exponent_of(head))
+            ul = load_displacements(pool, corners, first)
             coming = ring[(k + 1) % wp.static(HEADS)]
-            if wp.static(not plastic):
-                wait_for_older_copies()
-                barrier()
-                copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
+            wait_for_copies()
+            copy_places(patches, head, lane, places)
+            barrier()
+            if wp.static(early):
+                copy_nodes(X, u, place, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                m = from_start(material[e])
                 W = element_rotation(Xl, ul)
                 flows = bool(False)
                 if wp.static(plastic):
@@ -288,7 +296,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                     if flows:
                         todo[1 + wp.atomic_add(todo, 0, 1)] = lane
                         for i in range(9):
-                            forces[i * wp.static(PATCH) + lane] = W[i // 3, i % 3]
+                            forces[i * wp.static(ROW) + lane] = W[i // 3, i % 3]
             wait_for_copies()
             barrier()
             if wp.static(plastic):
@@ -300,18 +308,19 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                     thread = todo[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
                     mine = from_start(head[0] + thread)
                     valid = item < listed
-                    m = from_start(material[mine])
-                    flow(pool, patches, mine, law, m, thread, lane & 3, valid, history_out, forces)
+                    exponent = exponent_of(head)
+                    q = lane & 3
+                    flow(place, pool, first, exponent, patches, mine, law, thread, q, valid, history_out, forces)
                 if listed > 0:
                     barrier()
-                # only now does no lane need the nodes of this patch any more
-                copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
+                    if lane == 0:
+                        todo[0] = 0
+            if wp.static(not early):
+                copy_nodes(X, u, place, coming, lane, wp.static(slots) - first, pool)
             corners = corners_of(patches, coming, lane)
-            copy_ahead(patches, block, stride, k, lane, ring, node)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, place)
             sum_patch(forces, places, head, lane, slot, force_out)
-            if wp.static(plastic):
-                if lane == 0:
-                    todo[0] = 0
+            if wp.static(not early):
                 wait_for_copies()
                 barrier()
             head = coming

@@ -7,16 +7,18 @@ import warp as wp
 
 from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.patch import (
+    POINT,
     RESIDENT,
     Patches,
-    begin_turns,
-    copy_ahead,
-    copy_nodes,
+    copy_functions,
     copy_places,
     corners_of,
     element_count,
+    exponent_of,
     from_start,
     load_functions,
+    material_of,
+    pattern_function,
     sum_functions,
 )
 from warp_mca.kernels.patterns import pattern_functions
@@ -29,7 +31,6 @@ from warp_mca.kernels.shared_memory import (
     shared_functions,
     slot_pools,
     wait_for_copies,
-    wait_for_older_copies,
 )
 from warp_mca.patches import PATCH, SLOTS
 
@@ -42,9 +43,11 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
-    node_pool, list_of_nodes, places_pool = slot_pools(precision)
-    slots = SLOTS[precision]
-    load_element, _ = load_functions(precision)
+    point_pool, vector_pool, places_pool = slot_pools(precision)
+    point, slots = POINT[precision], SLOTS[precision]
+    begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
+    load_patterns = pattern_function(precision)
+    _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, False)
@@ -58,8 +61,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     )
     def hex8r_patch_force(
         X: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
         patches: Patches,
-        material: wp.array(dtype=wp.int32),
         law: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         slot: int,
@@ -71,32 +74,34 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         lane = wp.tid() & wp.static(PATCH - 1)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
-        pool = wp.array(ptr=node_pool(), shape=(2 * slots,), dtype=wp.vec3d)
-        node = wp.array(ptr=list_of_nodes(), shape=(slots,), dtype=wp.int32)
-        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec4i)
+        place = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
-        begin_turns(X, u, patches, block, stride, lane, wp.static(slots), ring, node, pool)
+        begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
         head = ring[0]
         corners = corners_of(patches, head, lane)
         k = int(0)
         while element_count(head) > 0:
-            copy_places(patches, head, lane, places)
             e = from_start(head[0] + lane)
-            x = to_patterns(load_element(pool, 0, corners))
-            du = to_patterns(load_element(pool, wp.static(slots), corners))
+            m = material_of(corners[0], corners[1])
+            first = (k & 1) * wp.static(slots)
+            x = load_patterns(place, pool, corners, first, exponent_of(head))
+            du = to_patterns(load_displacements(pool, corners, first))
             coming = ring[(k + 1) % wp.static(HEADS)]
-            wait_for_older_copies()
+            wait_for_copies()
+            copy_places(patches, head, lane, places)
             barrier()
-            copy_nodes(X, u, coming, lane, node, wp.static(slots), pool)
+            copy_nodes(X, u, place, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 b, volume, W, H, q = shape_and_strain(x, du)
-                P, Q = stress_and_flow(x, volume, H, q, e, from_start(material[e]), law, yielded_out, history_out)
+                P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
             corners = corners_of(patches, coming, lane)
             wait_for_copies()
             barrier()
-            copy_ahead(patches, block, stride, k, lane, ring, node)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, place)
             sum_patch(forces, places, head, lane, slot, force_out)
             head = coming
             k += 1

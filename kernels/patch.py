@@ -2,9 +2,9 @@
 
 A patch is up to PATCH elements, one for each thread. Its nodes are read once, into shared memory; its forces are summed
 there in a fixed order, so that what leaves the multiprocessor is one force for each node of a patch in place of eight
-for each element, and runs repeat bit for bit. What the next patch needs is on its way while one is computed: its nodes,
-and before these the list of them, and before that its head. Of this module only the order of patches can be found on a
-CPU.
+for each element, and runs repeat bit for bit. What the next patch needs is on its way while one is computed:
+displacements of its nodes, and before these its points, which say what nodes they are, and before that its head. Of
+this module only the order of patches can be found on a CPU.
 """
 
 from functools import cache
@@ -12,20 +12,27 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.patterns import pattern_functions, sum_function
 from warp_mca.kernels.scalars import scalars
 from warp_mca.kernels.shared_memory import (
     HEADS,
+    ROW,
     barrier,
-    close_group,
     copy_index,
+    copy_pair,
     copy_vector,
     copy_words,
+    place_of,
+    power_of_two,
     wait_for_copies,
 )
-from warp_mca.patches import NOWHERE, PATCH, SLOTS
+from warp_mca.patches import MATERIAL_BITS, NOWHERE, PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
 RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need
+# Of a slot: where the node lies on its patch's grid, and its number; that alone where positions are not rounded.
+POINT = {"mixed": wp.vec4i, "float64": wp.int32}
+AHEAD = {"mixed": True, "float64": False}  # whether shared memory holds the displacements of two patches
 SLOTS_OF_THREAD = (max(SLOTS.values()) + PATCH - 1) // PATCH
 
 wp.set_module_options({"enable_backward": False})
@@ -35,25 +42,23 @@ wp.set_module_options({"enable_backward": False})
 class Patches:
     """Patches of a block of elements.
 
-    A head of a patch is its first element, its first slot, how many it has of both, (slots << 16) + elements, and its
-    number.
+    A head of a patch is its first element, its first slot, (slots << 16) + (exponent << 8) + elements, and its number;
+    see `warp_mca.patches`.
 
     Attributes:
         head: of each patch, shape (patch_count,), vec4i.
         turn: the same in the order in which they are computed, shape (patch_count,), vec4i.
-        node: of each slot, one for each node of a patch, shape (slot_count,), int32.
-        corner: slots of the corners of each element, counted from the first of its patch, two in a word, shape
+        corner: slots of the corners of each element, counted from the first of its patch, and its material, shape
             (4, element_count), uint32.
-        places: where the first components of the forces of a slot lie in shared memory, two in a word and eight at
-            most, NOWHERE where there are fewer, shape (slot_count,), vec4i.
+        places: element of the patch whose corner of each number lies in a slot, a byte each, NOWHERE where none does,
+            shape (slot_count,), vec2i.
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where elastic.
     """
 
     head: wp.array(dtype=wp.vec4i)
     turn: wp.array(dtype=wp.vec4i)
-    node: wp.array(dtype=wp.int32)
     corner: wp.array2d(dtype=wp.uint32)
-    places: wp.array(dtype=wp.vec4i)
+    places: wp.array(dtype=wp.vec2i)
     flowing: wp.array(dtype=wp.int32)
 
 
@@ -101,7 +106,7 @@ def from_start(i: int):
 @wp.func
 def element_count(head: wp.vec4i):
     """Elements of a patch."""
-    return head[2] & 0xFFFF
+    return head[2] & 0xFF
 
 
 @wp.func
@@ -126,101 +131,139 @@ def copy_head(patches: Patches, block: int, stride: int, k: int, ring_out: wp.ar
 
 
 @wp.func
-def copy_list(patches: Patches, head: wp.vec4i, lane: int, node_out: wp.array(dtype=wp.int32)):
-    """Begin to copy the nodes of a patch into shared memory, where each thread reads its own."""
-    for k in range(wp.static(SLOTS_OF_THREAD)):
-        n = lane + k * wp.static(PATCH)
-        if n < slot_count(head):
-            copy_index(patches.node, head[1] + n, n, node_out)
-    close_group()
+def exponent_of(head: wp.vec4i):
+    """Exponent of the grid that a patch's points lie on."""
+    return (head[2] >> 8) & 0xFF
 
 
 @wp.func
-def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.array(dtype=wp.vec4i)):
+def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.array(dtype=wp.vec2i)):
     """Begin to copy where the forces of slots lie into shared memory, where each thread reads its own."""
     for k in range(wp.static(SLOTS_OF_THREAD)):
         n = lane + k * wp.static(PATCH)
         if n < slot_count(head):
-            copy_words(patches.places, head[1] + n, n, places_out)
-    close_group()
+            copy_pair(patches.places, head[1] + n, n, places_out)
 
 
-@wp.func
-def copy_nodes(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    head: wp.vec4i,
-    lane: int,
-    node: wp.array(dtype=wp.int32),
-    slots: int,
-    pool_out: wp.array(dtype=wp.vec3d),
-):
-    """Begin to copy positions and displacements of a patch into shared memory; its own list of nodes has arrived.
+@cache
+def copy_functions(precision: str) -> tuple[Any, Any, Any]:
+    """Functions (begin a block of threads: heads, points, nodes; nodes of a patch; what comes after).
 
-    Displacements stand `slots` behind positions.
+    In shared memory, points of successive patches lie in turn from 0 and from SLOTS on. So do displacements of nodes in
+    `mixed`; otherwise positions lie from 0 on, displacements from SLOTS on.
     """
-    for k in range(wp.static(SLOTS_OF_THREAD)):
-        n = lane + k * wp.static(PATCH)
-        if n < slot_count(head):
-            i = node[n]
-            copy_vector(X, i, n, pool_out)
-            copy_vector(u, i, n + slots, pool_out)
+    point, slots = POINT[precision], SLOTS[precision]
 
+    @wp.func
+    def copy_points(
+        points: wp.array(dtype=point), head: wp.vec4i, lane: int, first: int, pool_out: wp.array(dtype=point)
+    ):
+        for k in range(wp.static(SLOTS_OF_THREAD)):
+            n = lane + k * wp.static(PATCH)
+            if n < slot_count(head):
+                if wp.static(precision == "mixed"):
+                    copy_words(points, head[1] + n, first + n, pool_out)
+                else:
+                    copy_index(points, head[1] + n, first + n, pool_out)
 
-@wp.func
-def begin_turns(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    patches: Patches,
-    block: int,
-    stride: int,
-    lane: int,
-    slots: int,
-    ring_out: wp.array(dtype=wp.vec4i),
-    node_out: wp.array(dtype=wp.int32),
-    pool_out: wp.array(dtype=wp.vec3d),
-):
-    """Heads of the first patches, nodes of the first of them, and the list of those of the second."""
-    if lane < wp.static(HEADS - 1):
-        copy_head(patches, block, stride, lane, ring_out)
-    wait_for_copies()
-    barrier()
-    copy_list(patches, ring_out[0], lane, node_out)
-    wait_for_copies()
-    copy_nodes(X, u, ring_out[0], lane, node_out, slots, pool_out)
-    wait_for_copies()
-    copy_list(patches, ring_out[1], lane, node_out)
-    barrier()
+    @wp.func
+    def copy_nodes(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
+        head: wp.vec4i,
+        lane: int,
+        first: int,
+        pool_out: wp.array(dtype=wp.vec3d),
+    ):
+        """Begin to copy those of a patch, of whose points those that this thread copied have arrived."""
+        for k in range(wp.static(SLOTS_OF_THREAD)):
+            n = lane + k * wp.static(PATCH)
+            if n < slot_count(head):
+                if wp.static(precision == "mixed"):
+                    copy_vector(u, points[first + n][3], first + n, pool_out)
+                else:
+                    copy_vector(X, points[first + n], n, pool_out)
+                    copy_vector(u, points[first + n], wp.static(slots) + n, pool_out)
 
+    @wp.func
+    def begin_turns(
+        points: wp.array(dtype=point),
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        patches: Patches,
+        block: int,
+        stride: int,
+        lane: int,
+        ring_out: wp.array(dtype=wp.vec4i),
+        point_out: wp.array(dtype=point),
+        vector_out: wp.array(dtype=wp.vec3d),
+    ):
+        """Heads of the first patches, all of the first of them, and the points of the second."""
+        if lane < wp.static(HEADS - 1):
+            copy_head(patches, block, stride, lane, ring_out)
+        wait_for_copies()
+        barrier()
+        copy_points(points, ring_out[0], lane, 0, point_out)
+        copy_points(points, ring_out[1], lane, wp.static(slots), point_out)
+        wait_for_copies()
+        copy_nodes(X, u, point_out, ring_out[0], lane, 0, vector_out)
+        wait_for_copies()
+        barrier()
 
-@wp.func
-def copy_ahead(
-    patches: Patches,
-    block: int,
-    stride: int,
-    k: int,
-    lane: int,
-    ring_out: wp.array(dtype=wp.vec4i),
-    node_out: wp.array(dtype=wp.int32),
-):
-    """At the k-th patch of a block of threads: begin to copy the list of the second after it, the head of the third."""
-    if lane == wp.static(PATCH - 1):
-        copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring_out)
-    copy_list(patches, ring_out[(k + 2) % wp.static(HEADS)], lane, node_out)
+    @wp.func
+    def copy_ahead(
+        points: wp.array(dtype=point),
+        patches: Patches,
+        block: int,
+        stride: int,
+        k: int,
+        lane: int,
+        first: int,
+        ring_out: wp.array(dtype=wp.vec4i),
+        point_out: wp.array(dtype=point),
+    ):
+        """At the k-th patch of a block of threads: begin to copy the points of the second after it, a later head."""
+        if lane == wp.static(PATCH - 1):
+            copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring_out)
+        copy_points(points, ring_out[(k + 2) % wp.static(HEADS)], lane, first, point_out)
+
+    return begin_turns, copy_nodes, copy_ahead
 
 
 @wp.func
 def corners_of(patches: Patches, head: wp.vec4i, lane: int):
-    """Slots of the corners of a thread's element within its patch, two in a word; of any where it has none."""
+    """Words of a thread's element within its patch; of any where it has none."""
     e = from_start(head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0)))
     return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
 
 
+@wp.func
+def lower(word: wp.uint32):
+    """Slot of the first corner of a word."""
+    return int(word & wp.uint32(0x1FF))
+
+
+@wp.func
+def upper(word: wp.uint32):
+    """Slot of the second corner of a word."""
+    return int(word >> wp.uint32(23))
+
+
+@wp.func
+def material_of(first: wp.uint32, second: wp.uint32):
+    """Material of an element, by its first words."""
+    mask = wp.uint32((1 << MATERIAL_BITS) - 1)
+    low = (first >> wp.uint32(9)) & mask
+    return int(low + (((second >> wp.uint32(9)) & mask) << wp.uint32(MATERIAL_BITS)))
+
+
 @cache
-def load_functions(precision: str) -> tuple[Any, Any]:
-    """Functions: an element's nodes relative to its first, as `hexahedron.load_function`; two of its corners so."""
+def load_functions(precision: str) -> tuple[Any, Any, Any]:
+    """Functions: points of an element relative to its first [m]; displacements so; both, of two of its corners."""
     t = scalars(precision)
     R, vec3, mat83, slots = t.real, t.vec3, t.mat83, SLOTS[precision]
+    point, ahead = POINT[precision], AHEAD[precision]
     # Fast math would also flush what is too small, in three instructions for each number.
     convert = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
 
@@ -233,63 +276,125 @@ def load_functions(precision: str) -> tuple[Any, Any]:
         return vec3(rounded(d[0]), rounded(d[1]), rounded(d[2]))
 
     @wp.func
-    def load_element(pool: wp.array(dtype=wp.vec3d), first: int, corners: wp.vec4ui):
+    def point_difference(
+        points: wp.array(dtype=point), pool: wp.array(dtype=wp.vec3d), slot: int, origin: int, first: int, exponent: int
+    ):
+        if wp.static(precision == "mixed"):
+            d = place_of(points, first + slot) - place_of(points, first + origin)  # only what comes next rounds
+            return power_of_two(exponent) * vec3(R(d[0]), R(d[1]), R(d[2]))
+        return difference(pool, slot, pool[origin])
+
+    @wp.func
+    def load_points(
+        points: wp.array(dtype=point), pool: wp.array(dtype=wp.vec3d), corners: wp.vec4ui, first: int, exponent: int
+    ):
         local = mat83()
-        origin = pool[first + int(corners[0] & wp.uint32(0xFFFF))]
+        origin = lower(corners[0])
         for k in range(4):
             if k > 0:
-                local[2 * k] = difference(pool, first + int(corners[k] & wp.uint32(0xFFFF)), origin)
-            local[2 * k + 1] = difference(pool, first + int(corners[k] >> wp.uint32(16)), origin)
+                local[2 * k] = point_difference(points, pool, lower(corners[k]), origin, first, exponent)
+            local[2 * k + 1] = point_difference(points, pool, upper(corners[k]), origin, first, exponent)
         return local
 
     @wp.func
-    def load_corners(pool: wp.array(dtype=wp.vec3d), patches: Patches, e: int, a: int):
-        """Position and displacement of corner a, then of a + 4."""
-        origin = int(patches.corner[0, e] & wp.uint32(0xFFFF))
-        shift = wp.uint32(16 * (a & 1))
-        lower = int((patches.corner[a >> 1, e] >> shift) & wp.uint32(0xFFFF))
-        upper = int((patches.corner[(a >> 1) + 2, e] >> shift) & wp.uint32(0xFFFF))
-        X = pool[origin]
-        u = pool[origin + wp.static(slots)]
+    def displacements_of(first: int):
+        """Where those of the patch begin whose points begin at `first`."""
+        if wp.static(ahead):
+            return first
+        return wp.static(slots)
+
+    @wp.func
+    def load_displacements(pool: wp.array(dtype=wp.vec3d), corners: wp.vec4ui, first: int):
+        local = mat83()
+        begin = displacements_of(first)
+        origin = pool[begin + lower(corners[0])]
+        for k in range(4):
+            if k > 0:
+                local[2 * k] = difference(pool, begin + lower(corners[k]), origin)
+            local[2 * k + 1] = difference(pool, begin + upper(corners[k]), origin)
+        return local
+
+    @wp.func
+    def load_corners(
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        patches: Patches,
+        e: int,
+        a: int,
+        first: int,
+        exponent: int,
+    ):
+        """Point and displacement of corner a, then of a + 4."""
+        begin = displacements_of(first)
+        origin = lower(patches.corner[0, e])
+        shift = wp.uint32(23 * (a & 1))
+        low = int((patches.corner[a >> 1, e] >> shift) & wp.uint32(0x1FF))
+        top = int((patches.corner[(a >> 1) + 2, e] >> shift) & wp.uint32(0x1FF))
+        u = pool[begin + origin]
         return (
-            difference(pool, lower, X),
-            difference(pool, lower + wp.static(slots), u),
-            difference(pool, upper, X),
-            difference(pool, upper + wp.static(slots), u),
+            point_difference(points, pool, low, origin, first, exponent),
+            difference(pool, begin + low, u),
+            point_difference(points, pool, top, origin, first, exponent),
+            difference(pool, begin + top, u),
         )
 
-    return load_element, load_corners
+    return load_points, load_displacements, load_corners
+
+
+@cache
+def pattern_function(precision: str) -> Any:
+    """The function that loads the points of an element as `patterns.pattern_functions` has them [m]."""
+    t = scalars(precision)
+    R, mat73, point = t.real, t.mat73, POINT[precision]
+    to_patterns, _ = pattern_functions(precision)
+    sums_of_places = sum_function(wp.int32)
+    places8 = wp.types.matrix((8, 3), wp.int32)
+    load_points, _, _ = load_functions(precision)
+
+    @wp.func
+    def load_patterns(
+        points: wp.array(dtype=point), pool: wp.array(dtype=wp.vec3d), corners: wp.vec4ui, first: int, exponent: int
+    ):
+        if wp.static(precision == "mixed"):
+            x = places8()
+            for k in range(4):
+                x[2 * k] = place_of(points, first + lower(corners[k]))
+                x[2 * k + 1] = place_of(points, first + upper(corners[k]))
+            sums = sums_of_places(x)  # exact, as sums of integers are
+            p = mat73()
+            for k in range(7):
+                for i in range(3):
+                    p[k, i] = power_of_two(exponent) * R(sums[k, i])
+            return p
+        return to_patterns(load_points(points, pool, corners, first, exponent))
+
+    return load_patterns
 
 
 @cache
 def sum_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions that prepare shared memory, store the forces of a thread's element there, and sum those of a patch."""
+    """Functions that prepare shared memory, store the forces of a thread's element there, and sum those of a patch.
+
+    Component i of the force on corner a of a thread's element lies in row 3 a + i, in the thread's column.
+    """
     t = scalars(precision)
     R, vec3, mat83 = t.real, t.vec3, t.mat83
 
     @wp.func
     def keep_forces(pool_out: wp.array(dtype=R), lane: int, f: mat83):
-        """Component i of the force on corner a lies at (3 a + i) PATCH + lane."""
         for a in range(8):
             for i in range(3):
-                pool_out[(3 * a + i) * wp.static(PATCH) + lane] = f[a, i]
+                pool_out[(3 * a + i) * wp.static(ROW) + lane] = f[a, i]
 
     @wp.func
     def clear_nowhere(pool_out: wp.array(dtype=R), lane: int):
-        """Zeros for the places of slots where fewer forces meet."""
-        if lane < 3:
-            pool_out[wp.static(NOWHERE) + lane * wp.static(PATCH)] = R(0.0)
-
-    @wp.func
-    def kept(pool: wp.array(dtype=R), place: int):
-        """The force at a place, the low half of a word."""
-        first = place & 0xFFFF
-        return vec3(pool[first], pool[first + wp.static(PATCH)], pool[first + wp.static(2 * PATCH)])
+        if lane < 24:
+            pool_out[lane * wp.static(ROW) + wp.static(NOWHERE)] = R(0.0)
 
     @wp.func
     def sum_patch(
         pool: wp.array(dtype=R),
-        places: wp.array(dtype=wp.vec4i),
+        places: wp.array(dtype=wp.vec2i),
         head: wp.vec4i,
         lane: int,
         slot: int,
@@ -300,9 +405,14 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any]:
             n = lane + k * wp.static(PATCH)
             if n < slot_count(head):
                 w = places[n]
-                total = kept(pool, w[0]) + kept(pool, w[0] >> 16)
-                for i in range(1, 4):
-                    total = total + kept(pool, w[i]) + kept(pool, w[i] >> 16)
+                total = vec3()
+                for a in range(8):
+                    first = 3 * a * wp.static(ROW) + ((w[a // 4] >> (8 * (a % 4))) & 0xFF)
+                    f = vec3(pool[first], pool[first + wp.static(ROW)], pool[first + wp.static(2 * ROW)])
+                    if a > 0:
+                        total = total + f
+                    else:
+                        total = f
                 force_out[from_start(slot + head[1] + n)] = total
 
     return clear_nowhere, keep_forces, sum_patch

@@ -18,10 +18,9 @@ VOLUME_SCALE = 1.0 / 64.0  # of a volume over what `mean_gradients` gives, and o
 
 
 @cache
-def pattern_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (corner values -> pattern sums; pattern forces -> corner forces, the transpose)."""
-    t = scalars(precision)
-    mat73, mat83 = t.mat73, t.mat83
+def sum_function(scalar: Any) -> Any:
+    """The function corner values -> pattern sums, of a scalar type, integers too."""
+    mat73, mat83 = wp.types.matrix((7, 3), scalar), wp.types.matrix((8, 3), scalar)
 
     @wp.func
     def to_patterns(x: mat83):
@@ -53,6 +52,15 @@ def pattern_functions(precision: str) -> tuple[Any, Any]:
         p[6] = dd_top - dd_low
         return p
 
+    return to_patterns
+
+
+@cache
+def pattern_functions(precision: str) -> tuple[Any, Any]:
+    """Functions (corner values -> pattern sums; pattern forces -> corner forces, the transpose)."""
+    t = scalars(precision)
+    mat73, mat83 = t.mat73, t.mat83
+
     @wp.func
     def to_corners(p: mat73):
         f = mat83()
@@ -80,7 +88,7 @@ def pattern_functions(precision: str) -> tuple[Any, Any]:
         f[7] = s3 - d3
         return f
 
-    return to_patterns, to_corners
+    return sum_function(t.real), to_corners
 
 
 @cache

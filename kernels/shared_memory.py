@@ -9,9 +9,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.scalars import scalars
-from warp_mca.patches import NOWHERE, PATCH, SLOTS
+from warp_mca.patches import PATCH, SLOTS
 
-FORCES = NOWHERE + 2 * PATCH + 1  # of a patch in shared memory, with zeros behind them
+ROW = PATCH + 1  # of the forces of a patch: those on the corners of one number, and a zero behind them
+FORCES = 24 * ROW
 HEADS = 4  # patches whose heads are in shared memory: this one, two to come, and one on its way
 
 wp.set_module_options({"enable_backward": False})
@@ -45,20 +46,22 @@ def head_ring() -> wp.uint64:
 def slot_pools(precision: str) -> tuple[Any, Any, Any]:
     """Functions: addresses of shared memory for what each slot of a patch has.
 
-    (Reference positions, then displacements; nodes; where the forces lie.)
+    (Points of two patches, or their nodes; displacements of two, or positions and displacements of one; where the
+    forces lie.)
     """
     slots = SLOTS[precision]
+    point = "int4" if precision == "mixed" else "int"
+
+    @wp.func_native(f"__shared__ {point} pool[{2 * slots}]; return (unsigned long long)pool;")
+    def point_pool() -> wp.uint64: ...
 
     @wp.func_native(f"__shared__ double pool[{6 * slots}]; return (unsigned long long)pool;")
-    def node_pool() -> wp.uint64: ...
+    def vector_pool() -> wp.uint64: ...
 
-    @wp.func_native(f"__shared__ int pool[{slots}]; return (unsigned long long)pool;")
-    def list_of_nodes() -> wp.uint64: ...
-
-    @wp.func_native(f"__shared__ int4 pool[{slots}]; return (unsigned long long)pool;")
+    @wp.func_native(f"__shared__ int2 pool[{slots}]; return (unsigned long long)pool;")
     def places_pool() -> wp.uint64: ...
 
-    return node_pool, list_of_nodes, places_pool
+    return point_pool, vector_pool, places_pool
 
 
 @cache
@@ -87,8 +90,8 @@ def copy_vector(value: wp.array(dtype=wp.vec3d), k: int, slot: int, pool_out: wp
     ...
 
 
-@wp.func_native(_begin_copy(4, "&pool_out.data[slot]", "&value.data[k]"))
-def copy_index(value: wp.array(dtype=wp.int32), k: int, slot: int, pool_out: wp.array(dtype=wp.int32)):
+@wp.func_native(_begin_copy(8, "&pool_out.data[slot]", "&value.data[k]"))
+def copy_pair(value: wp.array(dtype=wp.vec2i), k: int, slot: int, pool_out: wp.array(dtype=wp.vec2i)):
     """Begin to copy an entry into shared memory, past the registers."""
     ...
 
@@ -99,15 +102,21 @@ def copy_words(value: wp.array(dtype=wp.vec4i), k: int, slot: int, pool_out: wp.
     ...
 
 
-@wp.func_native('asm volatile("cp.async.commit_group;" ::: "memory");')
-def close_group():
-    """What this thread began to copy since the last group is one."""
+@wp.func_native(_begin_copy(4, "&pool_out.data[slot]", "&value.data[k]"))
+def copy_index(value: wp.array(dtype=wp.int32), k: int, slot: int, pool_out: wp.array(dtype=wp.int32)):
+    """Begin to copy an entry into shared memory, past the registers."""
     ...
 
 
-@wp.func_native('asm volatile("cp.async.wait_group 1;" ::: "memory");')
-def wait_for_older_copies():
-    """Wait until what this thread began to copy has arrived, but for its last group."""
+@wp.func_native("int4 a = ((const int4*)pool.data)[slot]; return wp::vec_t<3, int>(a.x, a.y, a.z);")
+def place_of(pool: wp.array(dtype=wp.vec4i), slot: int) -> wp.vec3i:
+    """Where a point lies on its grid; one instruction reads it whole."""
+    ...
+
+
+@wp.func_native("return __int_as_float(exponent << 23);")
+def power_of_two(exponent: int) -> wp.float32:
+    """2^(exponent - 127)."""
     ...
 
 

@@ -118,8 +118,8 @@ def test_patches_of_a_gpu_are_those_of_each_scene_alone():
     shifted = [conn + np.int32(first) for conn, first in zip(conns, nodes, strict=False)]
     joined = make_patches(np.concatenate(shifted, axis=1), ends.tolist())
     single = [make_patches(conn) for conn in conns]
-    for name in ("places", "corner"):
-        assert np.array_equal(getattr(joined, name), np.concatenate([getattr(p, name) for p in single], axis=1))
+    assert np.array_equal(joined.places, np.concatenate([patches.places for patches in single]))
+    assert np.array_equal(joined.corner, np.concatenate([patches.corner for patches in single], axis=1))
     own = [patches.node + first for patches, first in zip(single, nodes, strict=False)]
     assert np.array_equal(joined.node, np.concatenate(own))
     for name in ("start", "slot_start"):

@@ -6,27 +6,23 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.patches import LOT, NOWHERE, PATCH, SLOTS, SUMMED, Patches, compact_order, make_patches
-
-
-def halves(words: np.ndarray) -> np.ndarray:
-    """Two entries of each word, shape (columns, 2 rows)."""
-    return np.ascontiguousarray(words.T).view("<u2").astype(int)
+from warp_mca.patches import LOT, NOWHERE, PATCH, SLOTS, Patches, compact_order, grid_points, make_patches
 
 
 def patch_of_elements(patches: Patches) -> np.ndarray:
     return np.repeat(np.arange(len(patches.start) - 1), np.diff(patches.start))
 
 
+def patch_of_slots(patches: Patches) -> np.ndarray:
+    return np.repeat(np.arange(len(patches.start) - 1), np.diff(patches.slot_start))
+
+
 def nodal_sums(patches: Patches, force: np.ndarray, node_count: int) -> np.ndarray:
     """What a GPU makes of one number for each corner, shape (corners, element_count)."""
-    places = halves(patches.places)
-    owner = np.repeat(np.arange(len(patches.start) - 1), np.diff(patches.slot_start))
-    used = places != NOWHERE
-    corner = np.where(used, places // (3 * PATCH), 0)
-    element = np.where(used, patches.start[owner][:, None] + places % PATCH, 0)
+    used = patches.places != NOWHERE
+    element = np.where(used, patches.start[patch_of_slots(patches)][:, None] + patches.places, 0)
     total = np.zeros(node_count)
-    np.add.at(total, patches.node, np.where(used, force[corner, element], 0.0).sum(axis=1))
+    np.add.at(total, patches.node, np.where(used, force[np.arange(len(force)), element], 0.0).sum(axis=1))
     return total
 
 
@@ -39,19 +35,48 @@ def meshes() -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("name", meshes())
 def test_corners_and_sums_are_those_of_the_mesh(name: str):
-    """Also where more than eight elements meet, where corners coincide, and where no two elements share a node."""
+    """Also where many elements meet with like corners, where corners coincide, and where no elements share a node."""
     conn = np.ascontiguousarray(meshes()[name].astype(np.int32))
     patches = make_patches(conn)
     assert np.diff(patches.start).max() <= PATCH
     assert np.diff(patches.slot_start).max() <= SLOTS["mixed"]
     first = patches.slot_start[patch_of_elements(patches)]
-    np.testing.assert_array_equal(patches.node[halves(patches.corner) + first[:, None]], conn.T)
+    np.testing.assert_array_equal(patches.node[patches.corner + first], conn)
     force = np.random.default_rng(1).normal(size=conn.shape)
     expected = np.bincount(conn.ravel(), force.ravel(), minlength=conn.max() + 1)
     np.testing.assert_allclose(nodal_sums(patches, force, conn.max() + 1), expected, atol=1e-13)
     if name == "fan":
-        assert np.bincount(patches.node).max() > 1  # more than SUMMED corners take a second slot
-        assert SUMMED < 40
+        assert np.bincount(patches.node).max() == 40  # corners of one number take a slot each
+    elif name == "box":
+        node = patch_of_slots(patches) * 10**6 + patches.node
+        assert len(np.unique(node)) == len(node)
+
+
+def test_words_hold_corners_and_materials():
+    conn = np.ascontiguousarray(mca.Box(size=(1.0, 1.0, 1.0), divisions=(8, 8, 8)).build().hexahedra.T.astype(np.int32))
+    patches = make_patches(conn)
+    material = np.random.default_rng(2).integers(0, 1 << 28, conn.shape[1], dtype=np.int32)
+    words = patches.words(material)
+    np.testing.assert_array_equal(words & 0x1FF, patches.corner[0::2])
+    np.testing.assert_array_equal(words >> 23, patches.corner[1::2])
+    np.testing.assert_array_equal(((words[:2] >> 9) & 0x3FFF).T @ [1, 1 << 14], material)
+
+
+def test_points_lie_where_the_nodes_do():
+    """Far from the origin too, and whatever the size of a cell; float32 would not tell the difference."""
+    mesh = mca.Box(size=(1.0, 2.0, 1.0), divisions=(9, 17, 8)).build()
+    order = compact_order(mesh.points, mesh.hexahedra, PATCH)
+    conn = np.ascontiguousarray(mesh.hexahedra[order].T.astype(np.int32))
+    patches = make_patches(conn)
+    for cell, origin in ((1.0, 0.0), (1e-6, 0.0), (1e-3, 300.0)):
+        X = cell * mesh.points + origin
+        points, exponent = grid_points(X, patches)
+        np.testing.assert_array_equal(points[:, 3], patches.node)
+        assert np.abs(points[:, :3]).max() < 1 << 28
+        unit = (exponent << 23).astype(np.int32).view(np.float32).astype(float)[patch_of_elements(patches)]
+        corner = points[patches.corner + patches.slot_start[patch_of_elements(patches)], :3]
+        ways = (corner - corner[0]) * unit[:, None]
+        np.testing.assert_allclose(ways, X[conn] - X[conn[0]], rtol=0, atol=0.6 * 2.0**-24 * cell / 8)
 
 
 def test_compact_order_keeps_most_nodes_of_a_patch_inside_it():
@@ -88,7 +113,7 @@ def test_patches_are_those_of_each_scene_alone():
         np.testing.assert_array_equal(joined.slot_start[first : first + patches + 1], alone.slot_start + slots)
         np.testing.assert_array_equal(joined.node[slots : slots + nodes], alone.node)
         np.testing.assert_array_equal(joined.corner[:, begin:end], alone.corner)
-        np.testing.assert_array_equal(joined.places[:, slots : slots + nodes], alone.places)
+        np.testing.assert_array_equal(joined.places[slots : slots + nodes], alone.places)
         first, slots = first + patches, slots + nodes
 
 

@@ -16,6 +16,8 @@ from warp_mca.surfaces import LIST_LENGTH, ContactPass
 if TYPE_CHECKING:
     from warp_mca.model import Model
 
+BLOCK_DIM = 64  # threads of a block: so few that it finds the registers it needs where one block of elements would go
+
 
 def per_scene(first: NDArray[np.int32]) -> Any:
     """The scene of each entry, as kernels take it: 0 where there is one scene, else an array; see `kernels.each`."""
@@ -113,9 +115,18 @@ class ContactStage:
         """Whether the master is a rigid plane, in each scene."""
         return self.items[0].plane is not None
 
+    @property
+    def blocks(self) -> int:
+        """Blocks of threads of the kernel that needs most registers."""
+        return -(-len(self.slave) // BLOCK_DIM)
+
     def kernels(self) -> list[Any]:
-        """Those of a step and of a search."""
-        return [self.kernel] if self.on_plane else [self.kernel, self.react, self.bounds, self.find]
+        """Those of a step."""
+        return [self.kernel] if self.on_plane else [self.kernel, self.react]
+
+    def search_kernels(self) -> list[Any]:
+        """Those of a search."""
+        return [] if self.on_plane else [self.bounds, self.find]
 
     def search(self, X: wp.array, u: wp.array, flag: wp.array) -> None:
         """Broad phase: list what each slave may touch until the next search."""
@@ -141,14 +152,14 @@ class ContactStage:
         if self.on_plane:
             inputs = [X, u, v, self.slave, self.stiffness, self.slave_scene, *self.planes]
             inputs += [self.mu, self.deepest, dt, self.spring]
-            wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag])
+            wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=BLOCK_DIM)
             return
         inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
-        wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag])
+        wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=BLOCK_DIM)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
-        wp.launch(self.react, len(self.master), inputs=inputs, outputs=[force, flag])
+        wp.launch(self.react, len(self.master), inputs=inputs, outputs=[force, flag], block_dim=BLOCK_DIM)
 
     def max_depth(self, scene: int) -> float:
         """Largest penetration so far of a slave of a scene [m]."""

@@ -14,8 +14,9 @@ from warp_mca.geometry.boxes import cell_boxes
 
 PATCH = 128  # elements of a patch, and threads of its block
 SLOTS = {"mixed": 384, "float64": 304}  # that a patch may have, as far as shared memory holds them
-SUMMED = 8  # forces that a slot sums at most
-NOWHERE = 24 * PATCH  # behind the forces of all corners, where shared memory holds nothing but zeros
+NOWHERE = PATCH  # behind the forces of all elements on their corners of one number, where shared memory holds a zero
+MATERIAL_BITS = 14  # in each of the first two words of an element's corners
+GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners fit 32
 LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
 
 Array = NDArray[np.float64]
@@ -100,28 +101,72 @@ class Patches:
         start: first element of each patch, and the end of the last, shape (patch_count + 1,), int32.
         slot_start: the same of its slots, one for each of its nodes, shape (patch_count + 1,), int32.
         node: of each slot, shape (slot_count,), int32.
-        corner: slots of the corners of each element, counted from the first of its patch, two in a word, shape
-            (corners / 2, element_count), uint32.
-        places: where the first components of the forces of a slot lie in shared memory, two in a word and SUMMED at
-            most, NOWHERE where there are fewer, shape (SUMMED / 2, slot_count), uint32.
+        corner: slots of the corners of each element, counted from the first of its patch, shape (corners,
+            element_count), uint16.
+        places: element of the patch whose corner of each number lies in a slot, NOWHERE where none does, shape
+            (slot_count, corners), uint8.
     """
 
     start: Index
     slot_start: Index
     node: Index
-    corner: NDArray[np.uint32]
-    places: NDArray[np.uint32]
+    corner: NDArray[np.uint16]
+    places: NDArray[np.uint8]
 
-    def heads(self) -> Index:
-        """First element, first slot, counts of both, (slots << 16) + elements, and number: shape (patch_count, 4)."""
-        counts = (np.diff(self.slot_start) << 16) + np.diff(self.start)
+    def heads(self, exponent: Index | int) -> Index:
+        """What a block of threads must know of a patch, shape (patch_count, 4), int32.
+
+        First element, first slot, (slots << 16) + (exponent << 8) + elements, and number.
+
+        Args:
+            exponent: of each patch's grid, as `grid_points` has it.
+        """
+        counts = (np.diff(self.slot_start) << 16) + (exponent << 8) + np.diff(self.start)
         return np.column_stack([self.start[:-1], self.slot_start[:-1], counts, np.arange(len(counts))]).astype(np.int32)
+
+    def words(self, material: Index) -> NDArray[np.uint32]:
+        """Corners two in a word, the second 23 bits up, and between them, in the first words, the material's number.
+
+        Args:
+            material: of each element, shape (element_count,), int32.
+
+        Returns:
+            Words, shape (corners / 2, element_count), uint32.
+        """
+        words = self.corner[0::2].astype(np.uint32)
+        words |= self.corner[1::2].astype(np.uint32) << np.uint32(23)
+        for k in range(2):
+            part = (material >> k * MATERIAL_BITS) & ((1 << MATERIAL_BITS) - 1)
+            words[k] |= part.astype(np.uint32) << np.uint32(9)
+        return words
+
+
+def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
+    """Positions of nodes on a grid of each patch, so fine that float32 cannot tell it from the positions themselves.
+
+    Returns:
+        (Places from the middle of the patch and node of each slot, shape (slot_count, 4), int32; exponents of the
+        patches, shape (patch_count,), int32: a grid's spacing is 2^(exponent - 127) [m], whose float32 has these bits.)
+    """
+    first, count = patches.slot_start[:-1], np.diff(patches.slot_start)
+    points = np.empty((len(patches.node), 4), dtype=np.int32)
+    points[:, 3] = patches.node
+    lower, upper = np.empty((2, 3, len(first)))
+    for axis in range(3):
+        x = X[patches.node, axis]
+        lower[axis], upper[axis] = np.minimum.reduceat(x, first), np.maximum.reduceat(x, first)
+    half = np.maximum(0.5 * (1.0 + 1e-8) * (upper - lower).max(axis=0), 2.0**-60)  # the grid's last lines stay free
+    exponent = np.frexp(half)[1] - GRID
+    middle, unit = 0.5 * (lower + upper), np.repeat(np.ldexp(1.0, -exponent), count)
+    for axis in range(3):
+        points[:, axis] = np.rint((X[patches.node, axis] - np.repeat(middle[axis], count)) * unit)
+    return points, (exponent + 127).astype(np.int32)
 
 
 def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixed"]) -> Patches:
     """Patches of elements that stand in a compact order; those with too many nodes are halved.
 
-    A node has a slot in each patch around it, and one more for every SUMMED corners that meet there.
+    A node has a slot in each patch around it: as many as corners of one number meet there, one in regular meshes.
 
     Args:
         conn: nodes of each element, shape (corners, element_count), int32.
@@ -139,7 +184,7 @@ def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixe
         slot_start=np.cumsum(np.concatenate([[0], *slot_starts])).astype(np.int32),
         node=np.concatenate([part.node for part in made]),
         corner=np.concatenate([part.corner for part in made], axis=1),
-        places=np.concatenate([part.places for part in made], axis=1),
+        places=np.concatenate([part.places for part in made]),
     )
 
 
@@ -155,31 +200,35 @@ def _patches(conn: Index, start: NDArray[np.int64], slots: int) -> Patches:
         key.sort()
         corner = key & ((1 << bits) - 1)
         key >>= bits
-        rank, head, slot = _slots(key)
-        opened = key[head]
+        opened, slot = _slots(key, corner // count)
         slot_start = np.searchsorted(opened, np.arange(len(start)) << 32)
         large = np.flatnonzero(np.diff(slot_start) > slots)
         if not len(large):
             break
         start = np.sort(np.append(start, (start[large] + start[large + 1]) // 2))
-    place = (3 * np.arange(corners)[:, None] * PATCH + (np.arange(count) + start[0] - start[patch])).ravel()
-    places = np.full((len(opened), SUMMED), NOWHERE, dtype="<u2")
-    places[slot, rank] = place[corner]
-    local = np.empty(conn.size, dtype=np.int64)
-    local[corner] = slot
-    local = (local.reshape(conn.shape) - slot_start[patch]).astype("<u2")
+    number, element = np.divmod(corner, count)
+    places = np.full((len(opened), corners), NOWHERE, dtype=np.uint8)
+    places[slot, number] = element + start[0] - start[patch[element]]
+    local = np.empty(conn.shape, dtype=np.uint16)
+    local[number, element] = slot - slot_start[patch[element]]
     return Patches(
         start=start.astype(np.int32),
         slot_start=slot_start.astype(np.int32),
         node=(opened & 0xFFFFFFFF).astype(np.int32),
-        corner=np.ascontiguousarray(local.T).view("<u4").T.copy(),
-        places=places.view("<u4").T.copy(),
+        corner=local,
+        places=places,
     )
 
 
-def _slots(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]:
-    """Of sorted keys: the place of each among its equals, whether it opens a slot of SUMMED of them, and its slot."""
-    begin = np.flatnonzero(np.append(True, key[1:] != key[:-1]))
+def _slots(key: NDArray[np.int64], number: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Of sorted keys with the numbers of their corners, sorted too: key of each slot, and slot of each corner."""
+    new = np.append(True, key[1:] != key[:-1])
+    if not (again := np.append(False, ~new[1:] & (number[1:] == number[:-1]))).any():
+        return key[new], np.cumsum(new) - 1
+    begin = np.flatnonzero(~again)
     rank = np.arange(len(key)) - np.repeat(begin, np.diff(np.append(begin, len(key))))
-    head = rank % SUMMED == 0
-    return rank % SUMMED, head, np.cumsum(head) - 1
+    order = np.lexsort([rank, key])
+    new = np.append(True, (key[order][1:] != key[order][:-1]) | (rank[order][1:] != rank[order][:-1]))
+    slot = np.empty_like(order)
+    slot[order] = np.cumsum(new) - 1
+    return key[order][new], slot

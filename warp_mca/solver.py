@@ -24,9 +24,11 @@ import numpy as np
 import warp as wp
 
 from warp_mca.bonds import BondStage
+from warp_mca.contact_stage import BLOCK_DIM as CONTACT_BLOCK
 from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
-from warp_mca.elements.stage import BLOCK_DIM, gather_lists
+from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
+from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
 from warp_mca.kernels import constraint, contact, ledger, node, output
 from warp_mca.kernels.scalars import scalars
@@ -98,7 +100,7 @@ class Solver:
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         if self.contacts:
             for stage in self.elements:
-                stage.make_room()
+                stage.make_room(max(contact.blocks for contact in self.contacts))
         # contact and sums have few threads and wait long for memory, so that they go first where there is room
         self.side = wp.Stream(priority=-1) if wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
@@ -146,7 +148,7 @@ class Solver:
             inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part]]
             wp.launch(
-                self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM
+                self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK
             )
 
         split(self.model.node_count, launch, NODES)
@@ -155,7 +157,7 @@ class Solver:
         inputs = [self.mass, self.inverse_mass, self.offset, self.slot, self.bonds.role, self.force, self.node_scene]
         inputs += [self.node_gravity, self.bonds.bonds, self.dt]
         outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
-        wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK)
 
     def _advance(self, split: Split = whole) -> None:
         """Advance all nodes by a step, those that are bound beside the others."""
@@ -225,26 +227,27 @@ class Solver:
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            for kernels, size in ((self._kernels(), None), (self._block_kernels(), BLOCK_DIM)):
-                modules = list(dict.fromkeys(kernel.module for kernel in kernels))
-                wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
+            for kernels, size in self._kernels():
+                if modules := list(dict.fromkeys(kernel.module for kernel in kernels)):
+                    wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
         self.search()
 
     @property
     def _shows_stress(self) -> bool:
         return bool(self.output and self.output.arrays)
 
-    def _kernels(self) -> list[Any]:
-        """One of each module that is launched in blocks of Warp's own size."""
-        kernels = [ledger.record_motion, contact.sum_springs, self.sum_elements_kernel]
-        kernels += [output.nodal_stress] if self._shows_stress else []
-        return kernels + [kernel for stage in self.contacts for kernel in stage.kernels()]
-
-    def _block_kernels(self) -> list[Any]:
-        """Those that are launched in blocks of BLOCK_DIM: a module is compiled for one size."""
-        kernels = [kernel for stage in self.elements for kernel in stage.kernels()]
-        kernels += [stage.stress_kernel for stage in self.elements if self._shows_stress]
-        return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else []), *kernels]
+    def _kernels(self) -> list[tuple[list[Any], int | None]]:
+        """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
+        sums = [ledger.record_motion, contact.sum_springs, self.sum_elements_kernel]
+        sums += [output.nodal_stress] if self._shows_stress else []
+        elements = [kernel for stage in self.elements for kernel in stage.kernels()]
+        elements += [stage.stress_kernel for stage in self.elements if self._shows_stress]
+        nodes = [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
+        return [
+            (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
+            (nodes + elements, ELEMENT_BLOCK),
+            ([kernel for stage in self.contacts for kernel in stage.kernels()], CONTACT_BLOCK),
+        ]
 
     def search(self) -> None:
         """Broad phase of every contact."""

@@ -26,4 +26,4 @@ class Hex8:
         from warp_mca.elements.patch_stage import hexahedral_stage
         from warp_mca.kernels import hex8, hex8_patch, j2
 
-        return hexahedral_stage(block, precision, hex8, hex8_patch, points=8, rows=8 * j2.HISTORY_SIZE)
+        return hexahedral_stage(block, X, precision, hex8, hex8_patch, points=8, rows=8 * j2.HISTORY_SIZE)

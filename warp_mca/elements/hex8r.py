@@ -94,4 +94,4 @@ class Hex8r:
         from warp_mca.elements.patch_stage import hexahedral_stage
         from warp_mca.kernels import hex8r, hex8r_patch
 
-        return hexahedral_stage(block, precision, hex8r, hex8r_patch, points=1, rows=hex8r.HISTORY_ROWS)
+        return hexahedral_stage(block, X, precision, hex8r, hex8r_patch, points=1, rows=hex8r.HISTORY_ROWS)

@@ -9,11 +9,13 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import patch
-from warp_mca.patches import PATCH, SLOTS, make_patches
+from warp_mca.patches import PATCH, SLOTS, Array, grid_points, make_patches
 from warp_mca.threads import Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Block
+
+ROOM = 0.125  # of the places for blocks of threads that elements leave to contact
 
 
 class PatchStage(ElementStage):
@@ -21,22 +23,29 @@ class PatchStage(ElementStage):
 
     Attributes:
         patches: on the device.
+        blocks: of threads; each computes one patch after another.
     """
 
-    def __init__(self, block: Block, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int) -> None:
+    def __init__(
+        self, block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
+    ) -> None:
         """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
         host = make_patches(block.conn, block.ends, SLOTS[precision])
         self.slot_node = host.node
-        heads = host.heads()
-        resident = wp.get_device().sm_count * patch.RESIDENT[precision]
-        self.blocks = min(len(heads), resident)  # each computes one patch after another
+        if precision == "mixed":
+            place, exponent = grid_points(X, host)
+        else:
+            place, exponent = host.node, 0
+        heads = host.heads(exponent)
+        self.precision = precision
         self.patches = patch.Patches()
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
-        self.patches.node = wp.array(host.node, dtype=wp.int32)
-        self.patches.corner = wp.array(host.corner, dtype=wp.uint32)
-        self.patches.places = wp.array(np.ascontiguousarray(host.places.T).view(np.int32), dtype=wp.vec4i)
+        self.make_room(0)
+        self.place = wp.array(place, dtype=patch.POINT[precision])
+        self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
+        self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
         if points > 1:  # lanes read the points of one element together
             self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
         self.scheduled = block.plastic and points > 1
@@ -48,9 +57,14 @@ class PatchStage(ElementStage):
         """Those of a step."""
         return [*super().kernels(), *([patch.schedule] if self.scheduled else [])]
 
-    def make_room(self) -> None:
-        """A block for each patch: as they come to an end, contact finds registers and shared memory."""
-        self.blocks = len(self.patches.head)
+    def make_room(self, blocks: int) -> None:
+        """Leave multiprocessors room for so many blocks of threads of contact beside the elements.
+
+        Where that is much, a block computes one patch only: as they come to an end, contact finds what it needs.
+        """
+        places = wp.get_device().sm_count * patch.RESIDENT[self.precision]
+        patches = len(self.patches.head)
+        self.blocks = patches if blocks > ROOM * places else min(patches, places - blocks)
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
@@ -63,15 +77,15 @@ class PatchStage(ElementStage):
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.patches, self.material, law, u, self.slot, self.blocks]
+        inputs = [X, self.place, self.patches, law, u, self.slot, self.blocks]
         outputs = [self.yielded, self.history, force]
         wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 
 def hexahedral_stage(
-    block: Block, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
+    block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
 ) -> ElementStage:
     """By patches on a GPU at small strain, one by one otherwise; arguments as `PatchStage`."""
     if block.finite or not wp.get_device().is_cuda:
         return ElementStage(block, precision, kernels, points, rows)
-    return PatchStage(block, precision, kernels, patch_kernels, points, rows)
+    return PatchStage(block, X, precision, kernels, patch_kernels, points, rows)

@@ -73,8 +73,8 @@ class ElementStage:
         """Yield flags and history of a range of elements."""
         return [self.yielded[part], self.history[:, part]] if self.block.plastic else [self.yielded, self.history]
 
-    def make_room(self) -> None:
-        """Called where contact is computed beside the elements, which then must not fill the device all the time."""
+    def make_room(self, blocks: int) -> None:
+        """Called where contact is computed beside the elements: leave the device room for so many blocks of threads."""
 
     def schedule(self) -> None:
         """Launched now and then, between steps: choose in which order the next ones compute elements."""
