@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
-from warp_mca.kernels.node import gather_function, hold
+from warp_mca.kernels.node import gather_function, hold, take_contact
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
@@ -99,7 +99,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, contact)
+    gather = gather_function(precision)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_bound(
@@ -128,7 +128,9 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
             i = bonds.first[k]
         else:
             i = bonds.node[k - pairs]
-        total = gather(i, offset[i], offset[i + 1], slot, force, contact_force_out)
+        total = gather(offset[i], offset[i + 1], slot, force)
+        if wp.static(contact):
+            total += take_contact(i, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         free = v_out[i] + dt * a
         u_free = u_out[i] + dt * free
@@ -137,7 +139,9 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
         if k < pairs:
             j = bonds.second[k]
             if j >= 0:
-                total = gather(j, offset[j], offset[j + 1], slot, force, contact_force_out)
+                total = gather(offset[j], offset[j + 1], slot, force)
+                if wp.static(contact):
+                    total += take_contact(j, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
                 u = weighted_mean(mass[i], u_free, mass[j], u_out[j] + dt * v_j)
                 v = weighted_mean(mass[i], free, mass[j], v_j)

@@ -10,8 +10,13 @@ from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
 from warp_mca.kernels.projection import interpolate, project
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
+from warp_mca.kernels.shared_memory import exchange
+from warp_mca.surfaces import LIST_LENGTH
 
 wp.set_module_options({"enable_backward": False})
+
+BLOCK_DIM = 128  # threads of a block, which needs the registers of a block of elements
+LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 # A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
 _EDGE_REACH = 1.02
@@ -47,22 +52,28 @@ def spring_function(friction: bool) -> Any:
 
     @wp.func
     def press(s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k: wp.float64, mu: wp.float64, spring: Spring):
+        # all is read before anything is written, so that a GPU waits for memory once
+        impulse = spring.impulse[s]
+        normal_impulse = spring.normal_impulse[s]
+        depth = spring.depth[s]
         Fn = -k * gap
         force = Fn * normal
         energy = wp.float64(0.5) * Fn * Fn / k
         if wp.static(friction):
+            friction_work = spring.friction[s]
+            stick_impulse = spring.stick_impulse[s]
             Ft, work, stick = stick_slip(spring.tangential[s], du, normal, mu * Fn, k)
             force += Ft
             energy += wp.float64(0.5) * wp.dot(Ft, Ft) / k
             spring.tangential[s] = Ft
-            spring.friction[s] = spring.friction[s] + work
+            spring.friction[s] = friction_work + work
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
-                spring.stick_impulse[s] = spring.stick_impulse[s] + Fn
+                spring.stick_impulse[s] = stick_impulse + Fn
         spring.energy[s] = energy
         spring.force[s] = force
-        spring.impulse[s] = spring.impulse[s] + force
-        spring.normal_impulse[s] = spring.normal_impulse[s] + Fn
-        spring.depth[s] = wp.max(spring.depth[s], -gap)
+        spring.impulse[s] = impulse + force
+        spring.normal_impulse[s] = normal_impulse + Fn
+        spring.depth[s] = wp.max(depth, -gap)
         return force
 
     return press
@@ -102,7 +113,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
     open_contact = open_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
-    @wp.kernel(enable_backward=False, module="unique")
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
     def touch_surface(
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
@@ -124,8 +135,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         s = wp.tid()
         i = slave[s]
         k = of(scene, s)
-        if moved_too_far(u[i], u_search[i], of(margin, k)):
-            flag_out[k, STALE] = 1
+        f = candidate[s, 0]  # read before it is known whether there is one: memory answers late
         best = int(-1)
         best_gap = wp.float64(0.0)
         best_size = wp.float64(0.0)
@@ -133,7 +143,6 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         best_weight = wp.vec4d()
         x = X[i] + u[i]
         for c in range(count[s]):
-            f = candidate[s, c]
             i0 = face[f, 0]
             i1 = face[f, 1]
             i2 = face[f, 2]
@@ -145,9 +154,10 @@ def surface_kernel(friction: bool, each: bool) -> Any:
             p3 = X[i3] + u[i3] - x
             inside, w, area_normal = project(wp.vec3d(), p0, p1, p2, p3, i2 == i3, wp.float64(_EDGE_REACH))
             if inside:
-                normal = wp.normalize(area_normal)
+                area = wp.length(area_normal)
+                normal = area_normal / area
                 gap = -wp.dot(interpolate(w, p0, p1, p2, p3), normal)
-                size = wp.float64(2.0) * wp.sqrt(wp.length(area_normal))
+                size = wp.float64(2.0) * wp.sqrt(area)
                 if gap < wp.float64(0.0) and gap > -size:
                     # the shallowest face wins; the lower number at a tie, whatever the order of the search
                     if best < 0 or gap > best_gap or (gap == best_gap and f < best):
@@ -156,6 +166,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                         best_normal = normal
                         best_weight = w
                         best_size = size
+            f = candidate[s, wp.min(c + 1, wp.static(LIST_LENGTH - 1))]
         if best >= 0:
             if best_gap < wp.float64(-0.5) * best_size:
                 flag_out[k, TOO_DEEP] = 1
@@ -167,16 +178,21 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         elif spring.face[s] >= 0:
             du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
             open_contact(s, du, stiffness[s], spring)
+        if moved_too_far(u[i], u_search[i], of(margin, k)):
+            flag_out[k, STALE] = 1
 
     return touch_surface
 
 
 @cache
-def react_kernel(each: bool) -> Any:
-    """Kernel: each master node gathers its share of the reactions on the faces around it, in a fixed order."""
+def react_kernel(each: bool, lanes: int) -> Any:
+    """Kernel: each master node gathers its share of the reactions on the faces around it, in a fixed order.
+
+    With more `lanes`, on a GPU, so many of the faces side by side.
+    """
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
-    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    @wp.kernel(enable_backward=False, module="unique" if each or lanes > 1 else None, grid_stride=False)
     def react(
         u: wp.array(dtype=wp.vec3d),
         u_search: wp.array(dtype=wp.vec3d),
@@ -192,30 +208,39 @@ def react_kernel(each: bool) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        m = wp.tid()
+        lane = wp.tid() % wp.static(lanes)
+        m = wp.tid() // wp.static(lanes)
         i = master[m]
         k = of(scene, m)
-        if moved_too_far(u[i], u_search[i], of(margin, k)):
-            flag_out[k, STALE] = 1
         total = wp.vec3d()
-        touched = int(0)
-        for j in range(face_offset[m], face_offset[m + 1]):
+        touched = wp.float64(0.0)
+        for j in range(face_offset[m] + lane, face_offset[m + 1], wp.static(lanes)):
             f = face_of_node[j]
+            corners = wp.vec4i(face[f, 0], face[f, 1], face[f, 2], face[f, 3])
             for q in range(wp.min(face_count[f], face_slave.shape[1])):
                 s = face_slave[f, q]
+                w = spring.weight[s]  # read before it is known whether they count: memory answers late
+                force = spring.force[s]
                 if spring.face[s] == f:
-                    touched = int(1)
+                    touched = wp.float64(1.0)
                     for c in range(4):
-                        if face[f, c] == i:
-                            w = spring.weight[s]
-                            total -= w[c] * spring.force[s]
-        if touched == 1:
-            contact_force_out[i] = contact_force_out[i] + total
+                        if corners[c] == i:
+                            total -= w[c] * force
+        if wp.static(lanes > 1):
+            for step in range(wp.static(lanes.bit_length() - 1)):
+                touched += exchange(touched, 1 << step)
+                for c in range(3):
+                    total[c] += exchange(total[c], 1 << step)
+        if lane == 0:
+            if touched > wp.float64(0.0):
+                contact_force_out[i] = contact_force_out[i] + total
+            if moved_too_far(u[i], u_search[i], of(margin, k)):
+                flag_out[k, STALE] = 1
 
     return react
 
 
-react_kernel(False)  # belongs to this module, so it is made before that is loaded; a batch has one of its own
+react_kernel(False, 1)  # belongs to this module, so it is made before that is loaded; others have their own
 
 
 @cache

@@ -263,9 +263,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         if wp.static(plastic):
             if lane == 0:
                 todo[0] = 0
-        begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
-        head = ring[0]
-        corners = corners_of(patches, head, lane)
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)

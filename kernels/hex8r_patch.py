@@ -79,9 +79,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
-        begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
-        head = ring[0]
-        corners = corners_of(patches, head, lane)
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)

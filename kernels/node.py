@@ -10,35 +10,34 @@ from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
-BOUND = 8  # in the role of a node, whose lowest three bits are its axes at rest: `kernels.constraint` advances it
+# In the role of a node, whose lowest three bits are its axes at rest:
+BOUND = 8  # `kernels.constraint` advances it
+TOUCHABLE = 16  # it belongs to a surface of a contact
 
 
 @cache
-def gather_function(precision: str, contact: bool) -> Any:
-    """The function that sums the forces on a node, in slots [begin, end); with `contact` that force too, once."""
+def gather_function(precision: str) -> Any:
+    """The function that sums the forces of elements on a node, in slots [begin, end)."""
     vec3 = scalars(precision).vec3
 
     @wp.func
-    def gather(
-        i: int,
-        begin: int,
-        end: int,
-        slot: wp.array(dtype=wp.int32),
-        force: wp.array(dtype=vec3),
-        contact_force_out: wp.array(dtype=wp.vec3d),
-    ):
+    def gather(begin: int, end: int, slot: wp.array(dtype=wp.int32), force: wp.array(dtype=vec3)):
         total = wp.vec3d()
         for j in range(begin, end):
             f = force[slot[j]]
             total += wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
-        if wp.static(contact):
-            fc = contact_force_out[i]
-            if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
-                total += fc
-                contact_force_out[i] = wp.vec3d()
         return total
 
     return gather
+
+
+@wp.func
+def take_contact(i: int, contact_force_out: wp.array(dtype=wp.vec3d)):
+    """The contact force on a node, which is given once."""
+    fc = contact_force_out[i]
+    if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
+        contact_force_out[i] = wp.vec3d()
+    return fc
 
 
 @wp.func
@@ -60,7 +59,7 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, contact)
+    gather = gather_function(precision)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
@@ -79,9 +78,12 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
     ):
         i = wp.tid()
         if wp.static(bound):
-            if int(role[i]) >= wp.static(BOUND):
+            if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(i, offset[i], offset[i + 1], slot, force, contact_force_out)
+        total = gather(offset[i], offset[i + 1], slot, force)
+        if wp.static(contact):
+            if int(role[i]) & wp.static(TOUCHABLE) != 0:
+                total += take_contact(i, contact_force_out)
         a = inverse_mass[i] * total + of(gravity, of(scene, i))
         if wp.static(fixed):
             a = hold(int(role[i]), a)

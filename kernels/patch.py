@@ -121,9 +121,7 @@ def copy_head(patches: Patches, block: int, stride: int, k: int, ring_out: wp.ar
 
     Blocks that had the first patches, which take longest, come last from then on: some have one fewer.
     """
-    turn = block
-    if k > 0:
-        turn = (k + 1) * stride - 1 - block
+    turn = (k + 1) * stride - 1 - block
     if turn < patches.turn.shape[0]:
         copy_words(patches.turn, turn, k % wp.static(HEADS), ring_out)
     else:
@@ -145,9 +143,16 @@ def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.arra
             copy_pair(patches.places, head[1] + n, n, places_out)
 
 
+@wp.func
+def corners_of(patches: Patches, head: wp.vec4i, lane: int):
+    """Words of a thread's element within its patch; of any where it has none."""
+    e = from_start(head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0)))
+    return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
+
+
 @cache
 def copy_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions (begin a block of threads: heads, points, nodes; nodes of a patch; what comes after).
+    """Functions (begin a block of threads; begin to copy the nodes of a patch; what comes after the next).
 
     In shared memory, points of successive patches lie in turn from 0 and from SLOTS on. So do displacements of nodes in
     `mixed`; otherwise positions lie from 0 on, displacements from SLOTS on.
@@ -199,17 +204,19 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any]:
         point_out: wp.array(dtype=point),
         vector_out: wp.array(dtype=wp.vec3d),
     ):
-        """Heads of the first patches, all of the first of them, and the points of the second."""
-        if lane < wp.static(HEADS - 1):
+        """The first patch, but for its places, points of the second, and the head of the third; head and corners."""
+        head = patches.turn[block]
+        if lane == 1 or lane == 2:
             copy_head(patches, block, stride, lane, ring_out)
+        corners = corners_of(patches, head, lane)
+        copy_points(points, head, lane, 0, point_out)
         wait_for_copies()
         barrier()
-        copy_points(points, ring_out[0], lane, 0, point_out)
         copy_points(points, ring_out[1], lane, wp.static(slots), point_out)
-        wait_for_copies()
-        copy_nodes(X, u, point_out, ring_out[0], lane, 0, vector_out)
+        copy_nodes(X, u, point_out, head, lane, 0, vector_out)
         wait_for_copies()
         barrier()
+        return head, corners
 
     @wp.func
     def copy_ahead(
@@ -229,13 +236,6 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any]:
         copy_points(points, ring_out[(k + 2) % wp.static(HEADS)], lane, first, point_out)
 
     return begin_turns, copy_nodes, copy_ahead
-
-
-@wp.func
-def corners_of(patches: Patches, head: wp.vec4i, lane: int):
-    """Words of a thread's element within its patch; of any where it has none."""
-    e = from_start(head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0)))
-    return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
 
 
 @wp.func

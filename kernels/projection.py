@@ -73,8 +73,9 @@ def closest_point(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3
             h01 = wp.dot(along_xi, along_eta)
             det = h00 * h11 - h01 * h01
         two = wp.float64(2.0)
-        xi_new = wp.clamp(xi + (h11 * g0 - h01 * g1) / det, -two, two)
-        eta_new = wp.clamp(eta + (h00 * g1 - h01 * g0) / det, -two, two)
+        inverse = wp.float64(1.0) / det
+        xi_new = wp.clamp(xi + inverse * (h11 * g0 - h01 * g1), -two, two)
+        eta_new = wp.clamp(eta + inverse * (h00 * g1 - h01 * g0), -two, two)
         moved = wp.abs(xi_new - xi) + wp.abs(eta_new - eta)
         xi = xi_new
         eta = eta_new

@@ -1,4 +1,4 @@
-"""Owns the device side of what binds nodes: axes at rest, hinges, driven axes."""
+"""Owns the device side of what binds nodes: axes at rest, hinges, driven axes; and which nodes may be touched."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.constraint import Bonds
-from warp_mca.kernels.node import BOUND
+from warp_mca.kernels.node import BOUND, TOUCHABLE
 from warp_mca.layout import Layout
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ class BondStage:
     Attributes:
         count: tied pairs and driven nodes.
         bonds: pairs, driven nodes and their tables.
-        role: of each node, shape (node_count,), uint8; empty where nothing is bound or at rest.
+        role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
         at_rest: the same of a model without hinges and driven axes.
         impulse: that each joint's pair gave to its first node [N s], shape (pair_count,), vec3d.
         work, work_after: done on each driven node's axes up to t(n), and half a step later [J], shape (driven_count,),
@@ -36,6 +36,9 @@ class BondStage:
         pairs = len(model.joint_first)
         self.count = pairs + len(nodes)
         role = model.fixed_axes.astype(np.uint8)
+        for item in model.passes:
+            role[item.slave] |= TOUCHABLE
+            role[item.master] |= TOUCHABLE
         if not self.count and not role.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)

@@ -16,8 +16,6 @@ from warp_mca.surfaces import LIST_LENGTH, ContactPass
 if TYPE_CHECKING:
     from warp_mca.model import Model
 
-BLOCK_DIM = 64  # threads of a block: so few that it finds the registers it needs where one block of elements would go
-
 
 def per_scene(first: NDArray[np.int32]) -> Any:
     """The scene of each entry, as kernels take it: 0 where there is one scene, else an array; see `kernels.each`."""
@@ -63,7 +61,8 @@ class ContactStage:
             self._make_planes()
             return
         self.kernel = contact.surface_kernel(friction, self.each)
-        self.react, self.bounds = contact.react_kernel(self.each), search.bounds_kernel(self.each)
+        self.lanes = contact.LANES if wp.get_device().is_cuda else 1
+        self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
         self.find = search.candidates_kernel(self.each)
         self._make_faces(model)
 
@@ -117,8 +116,8 @@ class ContactStage:
 
     @property
     def blocks(self) -> int:
-        """Blocks of threads of the kernel that needs most registers."""
-        return -(-len(self.slave) // BLOCK_DIM)
+        """Blocks of threads that look at the slaves."""
+        return -(-len(self.slave) // contact.BLOCK_DIM)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -152,14 +151,15 @@ class ContactStage:
         if self.on_plane:
             inputs = [X, u, v, self.slave, self.stiffness, self.slave_scene, *self.planes]
             inputs += [self.mu, self.deepest, dt, self.spring]
-            wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=BLOCK_DIM)
+            wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
             return
         inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
-        wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=BLOCK_DIM)
+        wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
-        wp.launch(self.react, len(self.master), inputs=inputs, outputs=[force, flag], block_dim=BLOCK_DIM)
+        threads = self.lanes * len(self.master)
+        wp.launch(self.react, threads, inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
 
     def max_depth(self, scene: int) -> float:
         """Largest penetration so far of a slave of a scene [m]."""

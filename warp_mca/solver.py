@@ -24,7 +24,6 @@ import numpy as np
 import warp as wp
 
 from warp_mca.bonds import BondStage
-from warp_mca.contact_stage import BLOCK_DIM as CONTACT_BLOCK
 from warp_mca.contact_stage import ContactStage, per_scene
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
@@ -101,7 +100,7 @@ class Solver:
         if self.contacts:
             for stage in self.elements:
                 stage.make_room(max(contact.blocks for contact in self.contacts))
-        # contact and sums have few threads and wait long for memory, so that they go first where there is room
+        # contact and sums have few threads and wait long for memory: they take what room there is first
         self.side = wp.Stream(priority=-1) if wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
@@ -127,17 +126,23 @@ class Solver:
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
     def _forces(self, split: Split = whole, beside: Callable[[], None] | None = None) -> None:
-        """Contact and what is launched `beside`, in a stream of their own where there is one; elements."""
-        forked = self.contacts or beside
-        if forked:
-            with wp.ScopedStream(self.side):
-                for stage in self.contacts:
-                    stage.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
-                if beside:
-                    beside()
+        """Elements; contact and what is launched `beside` in a stream of their own, where there is one.
+
+        Elements go first: blocks of threads that find a multiprocessor at rest divide its memory as they want it, and
+        patches want another division than contact.
+        """
+        forked = self.side and (self.contacts or beside)
+        before = wp.record_event() if forked else None
         for stage in self.elements:
             stage.forces(self.X, self.law, self.u, self.force, split)
-        if forked and self.side:
+        with wp.ScopedStream(self.side if forked else None, sync_enter=False):
+            if before:
+                wp.wait_event(before)
+            for contact in self.contacts:
+                contact.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
+            if beside:
+                beside()
+        if forked:
             wp.wait_stream(self.side)
 
     def _integrate(self, kick: float, drift: float, role: wp.array, split: Split = whole) -> None:
@@ -246,7 +251,7 @@ class Solver:
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
             (nodes + elements, ELEMENT_BLOCK),
-            ([kernel for stage in self.contacts for kernel in stage.kernels()], CONTACT_BLOCK),
+            ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
     def search(self) -> None:

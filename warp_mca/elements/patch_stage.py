@@ -15,8 +15,6 @@ from warp_mca.threads import Split, whole
 if TYPE_CHECKING:
     from warp_mca.model import Block
 
-ROOM = 0.125  # of the places for blocks of threads that elements leave to contact
-
 
 class PatchStage(ElementStage):
     """Patches of the block on the device; a slot for each node of a patch.
@@ -39,10 +37,10 @@ class PatchStage(ElementStage):
         else:
             place, exponent = host.node, 0
         heads = host.heads(exponent)
-        self.precision = precision
         self.patches = patch.Patches()
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
-        self.make_room(0)
+        self.places = wp.get_device().sm_count * patch.RESIDENT[precision]
+        self.blocks = min(len(heads), self.places)
         self.place = wp.array(place, dtype=patch.POINT[precision])
         self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
@@ -58,13 +56,9 @@ class PatchStage(ElementStage):
         return [*super().kernels(), *([patch.schedule] if self.scheduled else [])]
 
     def make_room(self, blocks: int) -> None:
-        """Leave multiprocessors room for so many blocks of threads of contact beside the elements.
-
-        Where that is much, a block computes one patch only: as they come to an end, contact finds what it needs.
-        """
-        places = wp.get_device().sm_count * patch.RESIDENT[self.precision]
-        patches = len(self.patches.head)
-        self.blocks = patches if blocks > ROOM * places else min(patches, places - blocks)
+        """Leave so many blocks of contact a place; fewer where elements take many rounds, as contact may do too."""
+        rounds = max(1, len(self.patches.head) // (4 * self.places))
+        self.blocks = min(len(self.patches.head), max(self.places // 2, self.places + blocks // -rounds))
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""

@@ -74,7 +74,7 @@ class ElementStage:
         return [self.yielded[part], self.history[:, part]] if self.block.plastic else [self.yielded, self.history]
 
     def make_room(self, blocks: int) -> None:
-        """Called where contact is computed beside the elements: leave the device room for so many blocks of threads."""
+        """Called where contact is computed beside the elements: leave room on the device for its blocks of threads."""
 
     def schedule(self) -> None:
         """Launched now and then, between steps: choose in which order the next ones compute elements."""
