@@ -180,4 +180,4 @@ def test_every_field_is_documented(cls: ast.ClassDef):
     assert set(listed) <= set(names) | methods
     for name, kind in names.items():
         if kind in ("Array", "Index") or kind.startswith("NDArray"):
-            assert re.search(r"float64|float32|int32|bool", listed[name]), f"{name} has no dtype"
+            assert re.search(r"float64|float32|int32|uint16|uint8|bool", listed[name]), f"{name} has no dtype"

@@ -17,6 +17,7 @@ SLOTS = {"mixed": 384, "float64": 304}  # that a patch may have, as far as share
 NOWHERE = PATCH  # behind the forces of all elements on their corners of one number, where shared memory holds a zero
 MATERIAL_BITS = 14  # in each of the first two words of an element's corners
 GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners fit 32
+LARGEST = 512.0  # half extent of a patch over its smallest element's extent, beyond which its grid is too coarse
 LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
 
 Array = NDArray[np.float64]
@@ -142,7 +143,7 @@ class Patches:
 
 
 def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
-    """Positions of nodes on a grid of each patch, so fine that float32 cannot tell it from the positions themselves.
+    """Positions of nodes on a grid of each patch, about as fine as float32 beside an element, see `is_even`.
 
     Returns:
         (Places from the middle of the patch and node of each slot, shape (slot_count, 4), int32; exponents of the
@@ -161,6 +162,13 @@ def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
     for axis in range(3):
         points[:, axis] = np.rint((X[patches.node, axis] - np.repeat(middle[axis], count)) * unit)
     return points, (exponent + 127).astype(np.int32)
+
+
+def is_even(X: Array, conn: Index, patches: Patches, exponent: Index) -> bool:
+    """Whether no element is so small beside its patch that the grid of `grid_points` would show in its forces."""
+    lower, upper = cell_boxes(X, conn.T)
+    smallest = np.minimum.reduceat((upper - lower).max(axis=0), patches.start[:-1])
+    return bool((np.ldexp(1.0, exponent - 127 + GRID) <= LARGEST * smallest).all())
 
 
 def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixed"]) -> Patches:

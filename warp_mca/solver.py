@@ -131,19 +131,19 @@ class Solver:
         Elements go first: blocks of threads that find a multiprocessor at rest divide its memory as they want it, and
         patches want another division than contact.
         """
-        forked = self.side and (self.contacts or beside)
-        before = wp.record_event() if forked else None
+        side = self.side if self.contacts or beside else None
+        before = wp.record_event() if side else None
         for stage in self.elements:
             stage.forces(self.X, self.law, self.u, self.force, split)
-        with wp.ScopedStream(self.side if forked else None, sync_enter=False):
+        with wp.ScopedStream(side, sync_enter=False):
             if before:
                 wp.wait_event(before)
             for contact in self.contacts:
                 contact.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
             if beside:
                 beside()
-        if forked:
-            wp.wait_stream(self.side)
+        if side:
+            wp.wait_stream(side)
 
     def _integrate(self, kick: float, drift: float, role: wp.array, split: Split = whole) -> None:
         def launch(part: slice) -> None:

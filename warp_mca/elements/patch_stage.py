@@ -9,7 +9,7 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import patch
-from warp_mca.patches import PATCH, SLOTS, Array, grid_points, make_patches
+from warp_mca.patches import PATCH, SLOTS, Array, Index, Patches, grid_points, is_even, make_patches
 from warp_mca.threads import Split, whole
 
 if TYPE_CHECKING:
@@ -21,21 +21,35 @@ class PatchStage(ElementStage):
 
     Attributes:
         patches: on the device.
+        place: what `kernels.patch.POINT` says of each slot.
+        places: for blocks of threads on the device.
         blocks: of threads; each computes one patch after another.
     """
 
     def __init__(
-        self, block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
+        self,
+        block: Block,
+        host: Patches,
+        place: Index,
+        exponent: Index | int,
+        precision: str,
+        kernels: Any,
+        patch_kernels: Any,
+        points: int,
+        rows: int,
     ) -> None:
-        """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
+        """Allocate.
+
+        Args:
+            block, precision, kernels, points, rows: as in `ElementStage`.
+            host: the patches.
+            place: what `kernels.patch.POINT` says of each slot.
+            exponent: of each patch's grid, or 0 where there is none.
+            patch_kernels: module that makes the force kernel.
+        """
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
-        host = make_patches(block.conn, block.ends, SLOTS[precision])
         self.slot_node = host.node
-        if precision == "mixed":
-            place, exponent = grid_points(X, host)
-        else:
-            place, exponent = host.node, 0
         heads = host.heads(exponent)
         self.patches = patch.Patches()
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
@@ -79,7 +93,11 @@ class PatchStage(ElementStage):
 def hexahedral_stage(
     block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
 ) -> ElementStage:
-    """By patches on a GPU at small strain, one by one otherwise; arguments as `PatchStage`."""
+    """By patches on a GPU at small strain, one by one otherwise, and where sizes differ too much for a patch's grid."""
     if block.finite or not wp.get_device().is_cuda:
         return ElementStage(block, precision, kernels, points, rows)
-    return PatchStage(block, X, precision, kernels, patch_kernels, points, rows)
+    host = make_patches(block.conn, block.ends, SLOTS[precision])
+    place, exponent = grid_points(X, host) if precision == "mixed" else (host.node, 0)
+    if precision == "mixed" and not is_even(X, block.conn, host, exponent):
+        return ElementStage(block, precision, kernels, points, rows)
+    return PatchStage(block, host, place, exponent, precision, kernels, patch_kernels, points, rows)
