@@ -114,13 +114,13 @@ class Patches:
     corner: NDArray[np.uint16]
     places: NDArray[np.uint8]
 
-    def heads(self, exponent: Index | int) -> Index:
+    def heads(self, exponent: Index) -> Index:
         """What a block of threads must know of a patch, shape (patch_count, 4), int32.
 
         First element, first slot, (slots << 16) + (exponent << 8) + elements, and number.
 
         Args:
-            exponent: of each patch's grid, as `grid_points` has it.
+            exponent: of each patch's grid, as `grid_points` has it, shape (patch_count,), int32.
         """
         counts = (np.diff(self.slot_start) << 16) + (exponent << 8) + np.diff(self.start)
         return np.column_stack([self.start[:-1], self.slot_start[:-1], counts, np.arange(len(counts))]).astype(np.int32)

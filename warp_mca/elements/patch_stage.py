@@ -31,7 +31,7 @@ class PatchStage(ElementStage):
         block: Block,
         host: Patches,
         place: Index,
-        exponent: Index | int,
+        exponent: Index,
         precision: str,
         kernels: Any,
         patch_kernels: Any,
@@ -44,7 +44,7 @@ class PatchStage(ElementStage):
             block, precision, kernels, points, rows: as in `ElementStage`.
             host: the patches.
             place: what `kernels.patch.POINT` says of each slot.
-            exponent: of each patch's grid, or 0 where there is none.
+            exponent: of each patch's grid, see `warp_mca.patches`; 0 where there is none.
             patch_kernels: module that makes the force kernel.
         """
         super().__init__(block, precision, kernels, points, rows)
@@ -97,7 +97,9 @@ def hexahedral_stage(
     if block.finite or not wp.get_device().is_cuda:
         return ElementStage(block, precision, kernels, points, rows)
     host = make_patches(block.conn, block.ends, SLOTS[precision])
-    place, exponent = grid_points(X, host) if precision == "mixed" else (host.node, 0)
-    if precision == "mixed" and not is_even(X, block.conn, host, exponent):
-        return ElementStage(block, precision, kernels, points, rows)
+    place, exponent = host.node, np.zeros(len(host.start) - 1, dtype=np.int32)
+    if precision == "mixed":
+        place, exponent = grid_points(X, host)
+        if not is_even(X, block.conn, host, exponent):
+            return ElementStage(block, precision, kernels, points, rows)
     return PatchStage(block, host, place, exponent, precision, kernels, patch_kernels, points, rows)

@@ -53,8 +53,8 @@ MUTATIONS: dict[str, Mutation] = {
     "reaction_halved": Mutation(
         "what touches gives back half the force that it takes",
         "kernels/contact.py",
-        "total -= w[c] * spring.force[s]",
-        "total -= wp.float64(0.5) * w[c] * spring.force[s]",
+        "total -= w[c] * force",
+        "total -= wp.float64(0.5) * w[c] * force",
     ),
     "friction_limit_doubled": Mutation(
         "friction may reach 2 mu F_n",
