@@ -26,7 +26,7 @@ from warp_mca.kernels.shared_memory import (
     power_of_two,
     wait_for_copies,
 )
-from warp_mca.patches import MATERIAL_BITS, NOWHERE, PATCH, SLOTS
+from warp_mca.patches import MATERIAL_BITS, NOWHERE, PATCH, SECOND_SLOT, SLOT_BITS, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
 RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need
@@ -241,21 +241,21 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any]:
 @wp.func
 def lower(word: wp.uint32):
     """Slot of the first corner of a word."""
-    return int(word & wp.uint32(0x1FF))
+    return int(word & wp.uint32((1 << SLOT_BITS) - 1))
 
 
 @wp.func
 def upper(word: wp.uint32):
     """Slot of the second corner of a word."""
-    return int(word >> wp.uint32(23))
+    return int(word >> wp.uint32(SECOND_SLOT))
 
 
 @wp.func
 def material_of(first: wp.uint32, second: wp.uint32):
     """Material of an element, by its first words."""
     mask = wp.uint32((1 << MATERIAL_BITS) - 1)
-    low = (first >> wp.uint32(9)) & mask
-    return int(low + (((second >> wp.uint32(9)) & mask) << wp.uint32(MATERIAL_BITS)))
+    low = (first >> wp.uint32(SLOT_BITS)) & mask
+    return int(low + (((second >> wp.uint32(SLOT_BITS)) & mask) << wp.uint32(MATERIAL_BITS)))
 
 
 @cache
@@ -327,9 +327,9 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
         """Point and displacement of corner a, then of a + 4."""
         begin = displacements_of(first)
         origin = lower(patches.corner[0, e])
-        shift = wp.uint32(23 * (a & 1))
-        low = int((patches.corner[a >> 1, e] >> shift) & wp.uint32(0x1FF))
-        top = int((patches.corner[(a >> 1) + 2, e] >> shift) & wp.uint32(0x1FF))
+        shift = wp.uint32(wp.static(SECOND_SLOT) * (a & 1))
+        low = lower(patches.corner[a >> 1, e] >> shift)
+        top = lower(patches.corner[(a >> 1) + 2, e] >> shift)
         u = pool[begin + origin]
         return (
             point_difference(points, pool, low, origin, first, exponent),

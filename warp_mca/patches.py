@@ -15,7 +15,10 @@ from warp_mca.geometry.boxes import cell_boxes
 PATCH = 128  # elements of a patch, and threads of its block
 SLOTS = {"mixed": 384, "float64": 304}  # that a patch may have, as far as shared memory holds them
 NOWHERE = PATCH  # behind the forces of all elements on their corners of one number, where shared memory holds a zero
-MATERIAL_BITS = 14  # in each of the first two words of an element's corners
+# A word of an element's corners holds a slot from its first bit on, another up to its last, in the first two words half
+# of the material's number between them.
+SLOT_BITS, MATERIAL_BITS = 9, 14
+SECOND_SLOT = SLOT_BITS + MATERIAL_BITS
 GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners fit 32
 LARGEST = 512.0  # half extent of a patch over its smallest element's extent, beyond which its grid is too coarse
 LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
@@ -126,7 +129,7 @@ class Patches:
         return np.column_stack([self.start[:-1], self.slot_start[:-1], counts, np.arange(len(counts))]).astype(np.int32)
 
     def words(self, material: Index) -> NDArray[np.uint32]:
-        """Corners two in a word, the second 23 bits up, and between them, in the first words, the material's number.
+        """Corners two in a word, with the material's number; see SLOT_BITS.
 
         Args:
             material: of each element, shape (element_count,), int32.
@@ -135,10 +138,10 @@ class Patches:
             Words, shape (corners / 2, element_count), uint32.
         """
         words = self.corner[0::2].astype(np.uint32)
-        words |= self.corner[1::2].astype(np.uint32) << np.uint32(23)
+        words |= self.corner[1::2].astype(np.uint32) << np.uint32(SECOND_SLOT)
         for k in range(2):
             part = (material >> k * MATERIAL_BITS) & ((1 << MATERIAL_BITS) - 1)
-            words[k] |= part.astype(np.uint32) << np.uint32(9)
+            words[k] |= part.astype(np.uint32) << np.uint32(SLOT_BITS)
         return words
 
 
