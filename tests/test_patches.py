@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.patches import LOT, NOWHERE, PATCH, SLOTS, Patches, compact_order, grid_points, is_even, make_patches
+from warp_mca.patches import LOT, NOWHERE, PATCH, SLOTS, Patches, compact_order, grid_points, make_patches
 
 
 def patch_of_elements(patches: Patches) -> np.ndarray:
@@ -77,20 +77,27 @@ def test_points_lie_where_the_nodes_do():
         corner = points[patches.corner + patches.slot_start[patch_of_elements(patches)], :3]
         ways = (corner - corner[0]) * unit[:, None]
         np.testing.assert_allclose(ways, X[conn] - X[conn[0]], rtol=0, atol=0.6 * 2.0**-24 * cell / 8)
-        assert is_even(X, conn, patches, exponent)
+        np.testing.assert_array_equal(make_patches(conn, X=X).start, patches.start)
 
 
-def test_grids_too_coarse_for_an_element_are_noticed():
-    """A layer of cells, a thousandth as long in all directions as the block that it lies beside."""
+def test_patches_too_large_for_an_element_are_halved():
+    """Small cells beside one a thousand times as long; without positions there is no grid to be too coarse."""
     points, cells = [], []
     for size, n in ((1.0, 1), (1e-3, 4)):
         part = mca.Box(size=(size, size, size), divisions=(n, n, n), origin=(len(points) * 1.0, 0.0, 0.0)).build()
         cells.append(part.hexahedra + sum(map(len, points)))
         points.append(part.points)
     X, conn = np.concatenate(points), np.ascontiguousarray(np.concatenate(cells).T.astype(np.int32))
-    patches = make_patches(conn)
-    assert len(patches.start) == 2
-    assert not is_even(X, conn, patches, grid_points(X, patches)[1])
+    assert len(make_patches(conn).start) == 2
+    patches = make_patches(conn, X=X)
+    assert len(patches.start) > 2
+    points, exponent = grid_points(X, patches)
+    unit = np.ldexp(1.0, exponent - 127)[patch_of_elements(patches)]
+    corner = points[patches.corner + patches.slot_start[patch_of_elements(patches)], :3]
+    extent = np.ptp(X[conn], axis=0).max(axis=1)
+    error = (corner - corner[0]) * unit[:, None] - (X[conn] - X[conn[0]])
+    assert np.abs(error).max(axis=(0, 2)).max() > 0.0
+    assert (np.abs(error).max(axis=(0, 2)) < 1e-6 * extent).all()
 
 
 def test_compact_order_keeps_most_nodes_of_a_patch_inside_it():

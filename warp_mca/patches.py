@@ -20,7 +20,7 @@ NOWHERE = PATCH  # behind the forces of all elements on their corners of one num
 SLOT_BITS, MATERIAL_BITS = 9, 14
 SECOND_SLOT = SLOT_BITS + MATERIAL_BITS
 GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners fit 32
-LARGEST = 512.0  # half extent of a patch over its smallest element's extent, beyond which its grid is too coarse
+LARGEST = 512.0  # extent of a patch over that of its smallest element, beyond which its grid is too coarse
 LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
 
 Array = NDArray[np.float64]
@@ -146,7 +146,7 @@ class Patches:
 
 
 def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
-    """Positions of nodes on a grid of each patch, about as fine as float32 beside an element, see `is_even`.
+    """Positions of nodes on a grid of each patch, about as fine as float32 beside an element.
 
     Returns:
         (Places from the middle of the patch and node of each slot, shape (slot_count, 4), int32; exponents of the
@@ -167,15 +167,10 @@ def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
     return points, (exponent + 127).astype(np.int32)
 
 
-def is_even(X: Array, conn: Index, patches: Patches, exponent: Index) -> bool:
-    """Whether no element is so small beside its patch that the grid of `grid_points` would show in its forces."""
-    lower, upper = cell_boxes(X, conn.T)
-    smallest = np.minimum.reduceat((upper - lower).max(axis=0), patches.start[:-1])
-    return bool((np.ldexp(1.0, exponent - 127 + GRID) <= LARGEST * smallest).all())
-
-
-def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixed"]) -> Patches:
+def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixed"], X: Array | None = None) -> Patches:
     """Patches of elements that stand in a compact order; those with too many nodes are halved.
+
+    So are those that are too large for one of their elements, where there will be grids.
 
     A node has a slot in each patch around it: as many as corners of one number meet there, one in regular meshes.
 
@@ -183,12 +178,16 @@ def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixe
         conn: nodes of each element, shape (corners, element_count), int32.
         ends: where the elements of each scene of a batch end; each has patches of its own, as if it were alone.
         slots: that a patch may have.
+        X: positions of the nodes [m], shape (node_count, 3), float64, where `grid_points` will be called.
     """
     count = conn.shape[1]
     ends = sorted({0, *ends, count})
     start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
     lots = chunks(len(start) - 1, LOT // PATCH)
-    made = [_patches(conn[:, start[a.start] : start[a.stop]], start[a.start : a.stop + 1], slots) for a in lots]
+    made = []
+    for lot in lots:
+        part = slice(start[lot.start], start[lot.stop])
+        made.append(_patches(conn[:, part], start[lot.start : lot.stop + 1], slots, X))
     starts, slot_starts = [part.start[:-1] for part in made], [np.diff(part.slot_start) for part in made]
     return Patches(
         start=np.append(np.concatenate(starts), count).astype(np.int32),
@@ -199,9 +198,10 @@ def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixe
     )
 
 
-def _patches(conn: Index, start: NDArray[np.int64], slots: int) -> Patches:
+def _patches(conn: Index, start: NDArray[np.int64], slots: int, X: Array | None) -> Patches:
     """Patches of one range of elements; `start` counts from the first element of all."""
     corners, count = conn.shape
+    lower, upper = cell_boxes(X, conn.T) if X is not None else np.zeros((2, 3, count))
     bits = conn.size.bit_length()
     while True:
         patch = np.repeat(np.arange(len(start) - 1), np.diff(start))
@@ -213,7 +213,7 @@ def _patches(conn: Index, start: NDArray[np.int64], slots: int) -> Patches:
         key >>= bits
         opened, slot = _slots(key, corner // count)
         slot_start = np.searchsorted(opened, np.arange(len(start)) << 32)
-        large = np.flatnonzero(np.diff(slot_start) > slots)
+        large = np.flatnonzero((np.diff(slot_start) > slots) | _uneven(lower, upper, start[:-1] - start[0]))
         if not len(large):
             break
         start = np.sort(np.append(start, (start[large] + start[large + 1]) // 2))
@@ -229,6 +229,18 @@ def _patches(conn: Index, start: NDArray[np.int64], slots: int) -> Patches:
         corner=local,
         places=places,
     )
+
+
+def _uneven(lower: Array, upper: Array, start: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether an element of a patch is so small beside it that the patch's grid would show in its forces.
+
+    Args:
+        lower, upper: boxes around the elements [m], shape (3, element_count).
+        start: first element of each patch, shape (patch_count,).
+    """
+    smallest = np.minimum.reduceat((upper - lower).max(axis=0), start)
+    extent = np.maximum.reduceat(upper, start, axis=1) - np.minimum.reduceat(lower, start, axis=1)
+    return extent.max(axis=0) > LARGEST * smallest
 
 
 def _slots(key: NDArray[np.int64], number: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

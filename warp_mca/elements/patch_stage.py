@@ -9,7 +9,7 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels import patch
-from warp_mca.patches import PATCH, SLOTS, Array, Index, Patches, grid_points, is_even, make_patches
+from warp_mca.patches import PATCH, SLOTS, Array, grid_points, make_patches
 from warp_mca.threads import Split, whole
 
 if TYPE_CHECKING:
@@ -27,28 +27,14 @@ class PatchStage(ElementStage):
     """
 
     def __init__(
-        self,
-        block: Block,
-        host: Patches,
-        place: Index,
-        exponent: Index,
-        precision: str,
-        kernels: Any,
-        patch_kernels: Any,
-        points: int,
-        rows: int,
+        self, block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
     ) -> None:
-        """Allocate.
-
-        Args:
-            block, precision, kernels, points, rows: as in `ElementStage`.
-            host: the patches.
-            place: what `kernels.patch.POINT` says of each slot.
-            exponent: of each patch's grid, see `warp_mca.patches`; 0 where there is none.
-            patch_kernels: module that makes the force kernel.
-        """
+        """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
+        mixed = precision == "mixed"
+        host = make_patches(block.conn, block.ends, SLOTS[precision], X if mixed else None)
+        place, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
         self.patches = patch.Patches()
@@ -93,13 +79,7 @@ class PatchStage(ElementStage):
 def hexahedral_stage(
     block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
 ) -> ElementStage:
-    """By patches on a GPU at small strain, one by one otherwise, and where sizes differ too much for a patch's grid."""
+    """By patches on a GPU at small strain, one by one otherwise; arguments as `ElementStage`, `PatchStage`."""
     if block.finite or not wp.get_device().is_cuda:
         return ElementStage(block, precision, kernels, points, rows)
-    host = make_patches(block.conn, block.ends, SLOTS[precision])
-    place, exponent = host.node, np.zeros(len(host.start) - 1, dtype=np.int32)
-    if precision == "mixed":
-        place, exponent = grid_points(X, host)
-        if not is_even(X, block.conn, host, exponent):
-            return ElementStage(block, precision, kernels, points, rows)
-    return PatchStage(block, host, place, exponent, precision, kernels, patch_kernels, points, rows)
+    return PatchStage(block, X, precision, kernels, patch_kernels, points, rows)
