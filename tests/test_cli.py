@@ -95,6 +95,8 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 2) -> 
         (["two_link", "--duration", "soon"], ["'soon'"]),
         (["two_link", "--duration", "nan"], ["duration = nan"]),
         (["two_link", "--duration=-1"], ["duration = -1"]),
+        (["two_link", "--time-step-scale", "2"], ["time_step_scale = 2", "0 to 1"]),
+        (["landing.py", "--time-step-scale", "0"], ["time_step_scale = 0", "(0, 1]"]),
         (["two_link", "--viewer", "paraview"], ["'paraview'", "rerun"]),
         (["two_link", "--colour"], ["--colour"]),
         ([], ["SCENE"]),
@@ -150,6 +152,18 @@ def test_scenes_lists_presets_and_every_parameter(capsys: pytest.CaptureFixture[
         source = mca.registry.load_source(name)
         assert all(word in out for word in (name, *source.presets, *source.parameters))
     assert "0 to 10" in out and "kg/m^3" in out
+
+
+def test_time_steps_of_any_scene_can_be_shortened(here: Path):
+    """An option for all, though only some have it among their parameters, which then tell of it."""
+    dts = []
+    for scale in ("0.8", "0.4"):
+        assert cli.main(["run", "landing.py", "--duration", "1e-5", "--time-step-scale", scale, "--out", scale]) == 0
+        dts.append(load(scale).summary["dt"])
+    assert dts[0] == pytest.approx(2.0 * dts[1], rel=0.1)  # whole numbers of steps in an interval
+    request = cli._request(cli._parser().parse_args(["run", "two_link", "--time-step-scale", "0.4"]))
+    assert request.scene.impact.time_step_scale == 0.4
+    assert request.origin is not None and request.origin.parameters["time_step_scale"] == 0.4
 
 
 def test_scenes_lists_a_file_too(capsys: pytest.CaptureFixture[str]):
