@@ -110,13 +110,13 @@ CASES = {
     "free": (scene(shaken(box(2, 2, 2), 0.1)), 0.75),
     "plane": (scene(box(2, 1, 2), mu=0.0), 0.75),
     "plane, rough": (scene(shaken(box(2, 1, 2), 2e-4), mu=1e3), 0.75),
-    "plane, stiff": (scene(box(2, 1, 2), penalty=10.0), 0.75),
+    "plane, stiff": (scene(box(2, 1, 2), penalty=10.0), 0.6),
     "alike": (scene(box(2, 1, 2), box(2, 1, 2), penalty=1.0), 0.7),
     "alike, rough": (scene(box(2, 1, 2), box(2, 1, 2), mu=1e3, penalty=3.0), 0.7),
     "alike, two-way": (scene(box(2, 1, 2), box(2, 1, 2), mu=1e3, two_way=True), 0.7),
-    "fine on coarse": (scene(box(1, 1, 1), box(4, 1, 4, size=(2 * H, H / 2, 2 * H)), penalty=10.0), 0.5),
+    "fine on coarse": (scene(box(1, 1, 1), box(4, 1, 4, size=(2 * H, H / 2, 2 * H)), penalty=10.0), 0.35),
     "coarse on fine": (scene(box(4, 1, 4, size=(2 * H, H / 2, 2 * H)), box(2, 1, 2), two_way=True, penalty=10.0), 0.4),
-    "graded on coarse": (scene(box(2, 2, 2), graded(box(5, 1, 5)), penalty=10.0), 0.4),
+    "graded on coarse": (scene(box(2, 2, 2), graded(box(5, 1, 5)), penalty=10.0), 0.3),
 }
 
 
@@ -133,9 +133,18 @@ def test_springs_shorten_the_step_as_their_penalty_grows():
     free = assemble(scene(box(2, 1, 2))).stable
     assert steps[0].dt == pytest.approx(free.dt, rel=1e-6)
     assert free.contact_share == 0.0 < steps[1].contact_share < steps[2].contact_share < 1.0
-    k_over_m = 100.0 * STEEL.bulk_modulus * H / (7800.0 * H**3 / 8.0)  # a corner's spring: K A^2 / V on its mass
+    k_over_m = STEEL.bulk_modulus * H / (7800.0 * H**3 / 8.0)  # a corner's spring: K A^2 / V on its mass
     element = (2.0 / free.dt) ** 2
-    assert (2.0 / steps[2].dt) ** 2 == pytest.approx(k_over_m + element, rel=1e-9)
+    assert (2.0 / steps[1].dt) ** 2 == pytest.approx(k_over_m + element, rel=1e-9)
+    # a spring that opens and closes by itself takes (omega dt)^2 of 1 at 0.9 of the step, not of 4
+    assert 100.0 * k_over_m * (0.9 * steps[2].dt) ** 2 == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("penalty", [10.0, 30.0])
+def test_nodes_that_bounce_on_stiff_springs_gain_no_energy(penalty: float):
+    """Steps as long as linear springs allow would throw the nodes through the plane within a tenth of this time."""
+    sphere = mca.make_scene("hertz_sphere", section=4, penalty=penalty)
+    assert mca.run(sphere).summary["energy_error"] < 1e-3
 
 
 def test_worst_of_many_elements_is_found_wherever_it_lies():

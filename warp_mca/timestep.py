@@ -16,6 +16,9 @@ Index = NDArray[np.int32]
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
 MOST = 100 * BATCH  # of them: 24 x 24 problems cost 50 us each
+# Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring is all
+# that holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
+BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 4.0, 0.9
 KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
 
 
@@ -40,6 +43,8 @@ def stable_step(
     formulation: Element, X: Array, conn: Index, K: Array, G: Array, mass: Array, contact: Array, index: Index
 ) -> StableStep:
     """Stable step from max over elements of (element eigenvalue + contact eigenvalue), both upper bounds of their part.
+
+    Springs that dominate count for more, since they open and close.
 
     The largest eigenvalue of an assembly never exceeds the largest of its elements (Irons and Treharne, 1971). A
     coarse bound ranks the elements, a closer one those that could still be the worst after the first exact
@@ -92,13 +97,33 @@ def stable_step(
         value = exact(part)
         if value.max() > worst:
             worst, element = float(value.max()), int(part[value.argmax()])
-    share = float(contact[element] / worst)
+    own = worst - float(contact[element])
+    stiff = np.flatnonzero(_switching(contact, 1.0) > worst)
+    if len(stiff):
+        bound = formulation.eigenvalue_bounds(X[conn[stiff]], K[stiff], G[stiff], mass[stiff], False)
+        value = _switching(contact[stiff], contact[stiff] / (bound + contact[stiff]))
+        most = int(value.argmax())
+        if value[most] > worst:
+            worst, element, own = float(value[most]), int(stiff[most]), float(bound[most])
     return StableStep(
         dt=2.0 / np.sqrt(worst),
         element=int(index[element]),
-        contact_share=share,
-        shortened=float(np.sqrt((1.0 - share) * worst / usual)),
+        contact_share=1.0 - own / worst,
+        shortened=float(np.sqrt(own / usual)),
     )
+
+
+def _switching(contact: Array, share: Array | float) -> Array:
+    """Eigenvalue [1/s^2] that stands for a contact spring which opens and closes.
+
+    Central differences keep a linear spring bounded up to (omega dt)^2 = 4. A node that bounces on a spring of one side
+    gains energy from less on, because it is pushed back for whole steps only.
+
+    Args:
+        contact: of the spring on its node [1/s^2].
+        share: of the spring in the eigenvalue of node and element [-].
+    """
+    return (2.0 * USUAL_SCALE) ** 2 / (BOUNCE + SUPPORT * (1.0 - share)) * contact
 
 
 def _greatest(value: Array, count: int) -> NDArray[np.intp]:
