@@ -16,8 +16,8 @@ Index = NDArray[np.int32]
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
 MOST = 100 * BATCH  # of them: 24 x 24 problems cost 50 us each
-# Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring is all
-# that holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
+# Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring alone
+# holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
 BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 4.0, 0.9
 KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
 
