@@ -45,7 +45,7 @@ def step_bytes(held: Held) -> float:
     for stage in s.elements:
         if isinstance(stage, PatchStage):
             lists, vectors = stage.patches, 1 if s.precision == "mixed" else 2  # points stand for positions
-            total += size(lists.corner) + size(stage.place) + size(lists.places) + vectors * 24 * len(stage.place)
+            total += size(lists.corner) + size(stage.point) + size(lists.places) + vectors * 24 * len(stage.point)
         else:
             total += size(stage.conn) + size(stage.material) + 2 * 24 * nodes
         total += size(s.force)

@@ -15,7 +15,7 @@ from warp_mca.surfaces import LIST_LENGTH
 
 wp.set_module_options({"enable_backward": False})
 
-BLOCK_DIM = 128  # threads of a block, which needs the registers of a block of elements
+BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
 LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 # A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.

@@ -204,7 +204,7 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any]:
         point_out: wp.array(dtype=point),
         vector_out: wp.array(dtype=wp.vec3d),
     ):
-        """The first patch, but for its places, points of the second, and the head of the third; head and corners."""
+        """The first patch, but for its places, points of the second, and two more heads; head and corners."""
         head = patches.turn[block]
         if lane == 1 or lane == 2:
             copy_head(patches, block, stride, lane, ring_out)

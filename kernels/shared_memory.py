@@ -11,7 +11,7 @@ import warp as wp
 from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import PATCH, SLOTS
 
-ROW = PATCH + 1  # of the forces of a patch: those on the corners of one number, and a zero behind them
+ROW = PATCH + 1  # a component of the forces on the corners of one number, and a zero behind them
 FORCES = 24 * ROW
 HEADS = 4  # patches whose heads are in shared memory: this one, two to come, and one on its way
 

@@ -109,6 +109,31 @@ def test_scenes_may_differ_in_all_that_is_data(scenes):
         np.testing.assert_allclose(result.paths[0].stress, stress, atol=1e-5 * np.abs(stress).max())
 
 
+def test_scenes_with_other_kinds_of_elements_give_the_bits_that_they_give_alone():
+    """Whichever comes first: sums over elements keep the order of a scene alone."""
+    elastic = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
+    metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9)
+
+    def body(name: str, material: mca.Elastic, element: str, x: float) -> mca.Body:
+        box = mca.Box(size=(0.02, 0.02, 0.02), divisions=(3, 3, 3))
+        place = (x, -1e-6, 0.0)
+        return mca.Body(
+            name=name, geometry=box, material=material, element=element, position=place, velocity=(0, -2, 0)
+        )
+
+    def scene(*bodies: mca.Body) -> mca.Scene:
+        floor = mca.Contact(slave=mca.Surface(body="a", nodes="ymin"), master=mca.RigidPlane())
+        impact = mca.ImpactPhase(duration=2e-5, output_interval=1e-6)
+        return mca.Scene(name="falls", bodies=bodies, contacts=(floor,), impact=impact)
+
+    one = scene(body("a", elastic, "tet4", 0.0))
+    other = scene(body("a", metal, "hex8", 0.0), body("b", elastic, "hex8r", 0.1), body("c", elastic, "tet4", 0.2))
+    for scenes in ([one, other], [other, one]):
+        for made, result in zip(scenes, mca.run_batch(scenes, precision="float64"), strict=True):
+            own = alone(made, result, "float64")
+            assert all(np.array_equal(own[name], result[name], equal_nan=True) for name in own.history)
+
+
 def test_patches_of_a_gpu_are_those_of_each_scene_alone():
     """So that sums over a patch have the order that they have without the other scenes."""
     meshes = [mca.Box(size=(1.0, 1.0, 1.0), divisions=n).build() for n in ((7, 6, 7), (5, 5, 5), (8, 8, 4))]

@@ -141,9 +141,10 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
             stage.schedule()
         assert np.array_equal(held.forces(), one)
         assert np.abs(one - exact).max() < tolerance * np.abs(exact).max()
-        stage.blocks //= 3
-        held.solver.graphs.clear()
-        assert np.array_equal(held.forces(), one)
+        for blocks in (stage.blocks // 3, 7):
+            stage.blocks = blocks
+            held.solver.graphs.clear()
+            assert np.array_equal(held.forces(), one)
         host = Held(model, Case(yielding), "cpu", precision)
         host.forces()
         assert held.yielded() == host.yielded()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -118,6 +121,61 @@ def test_order_does_not_hang_on_rounding(divisions: tuple[int, int, int]):
     for seed in range(3):
         moved = mesh.points + np.random.default_rng(seed).uniform(-1e-13, 1e-13, mesh.points.shape)
         np.testing.assert_array_equal(compact_order(moved, mesh.hexahedra, PATCH), order)
+
+
+def test_grids_are_those_of_each_scene_alone():
+    """Also where patches are halved for their grids, and beyond the elements that are computed together."""
+    rng = np.random.default_rng(5)
+    counts, node_counts = (LOT + 300, 700, 2 * LOT - 50), (3000, 400, 5000)
+    ends, nodes = np.cumsum(counts), np.cumsum([0, *node_counts])
+    Xs = [rng.normal(size=(n, 3)) * 10.0 ** rng.uniform(-4, 1, (n, 1)) for n in node_counts]
+    conns = [rng.integers(0, n, (8, count)).astype(np.int32) for n, count in zip(node_counts, counts, strict=True)]
+    shifted = [conn + np.int32(first) for conn, first in zip(conns, nodes, strict=False)]
+    X = np.concatenate(Xs)
+    joined = make_patches(np.concatenate(shifted, axis=1), ends.tolist(), X=X)
+    single = [make_patches(conn, X=x) for conn, x in zip(conns, Xs, strict=True)]
+    assert len(joined.start) > len(make_patches(np.concatenate(shifted, axis=1), ends.tolist()).start)
+    points, exponent = grid_points(X, joined)
+    grids = [grid_points(x, patches) for x, patches in zip(Xs, single, strict=True)]
+    np.testing.assert_array_equal(points[:, :3], np.concatenate([own[:, :3] for own, _ in grids]))
+    np.testing.assert_array_equal(exponent, np.concatenate([own for _, own in grids]))
+    np.testing.assert_array_equal(joined.places, np.concatenate([patches.places for patches in single]))
+
+
+def test_heads_hold_what_kernels_read_from_them():
+    """Bits as `kernels/patch.py` takes them apart; and the widths that they need."""
+    conn = np.ascontiguousarray(mca.Box(size=(1.0, 2.0, 1.0), divisions=(9, 17, 8)).build().hexahedra.T)
+    patches = make_patches(conn.astype(np.int32))
+    exponent = np.arange(len(patches.start) - 1, dtype=np.int32) + 245
+    head = patches.heads(exponent)
+    np.testing.assert_array_equal(head[:, 0], patches.start[:-1])
+    np.testing.assert_array_equal(head[:, 1], patches.slot_start[:-1])
+    np.testing.assert_array_equal(head[:, 2] & 0xFF, np.diff(patches.start))
+    np.testing.assert_array_equal((head[:, 2] >> 8) & 0xFF, exponent)
+    np.testing.assert_array_equal(head[:, 2] >> 16, np.diff(patches.slot_start))
+    np.testing.assert_array_equal(head[:, 3], np.arange(len(head)))
+    assert max(SLOTS.values()) < 1 << 9 and PATCH < 256
+
+
+@pytest.mark.parametrize("edge", [2.0, np.nextafter(2.0, 0.0), 1.7, 3e-9])
+def test_sums_over_the_corners_of_an_element_fit_32_bits(edge: float):
+    """An element as large as its patch, just below a power of two: `hex8r` adds up to eight of its places."""
+    X = edge * mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build().points
+    points, exponent = grid_points(X, make_patches(np.arange(8, dtype=np.int32)[:, None], X=X))
+    assert 8 * np.abs(points[:, :3].astype(np.int64)).max() < 1 << 31
+    assert np.abs(points[:, :3]).max() > 1 << 26  # and the grid is as fine as that allows, to a bit
+    assert 0 < exponent[0] < 255
+
+
+def test_elements_leave_room_for_contact():
+    from warp_mca.elements.patch_stage import PatchStage
+
+    for patches, blocks in itertools.product((1, 40, 528, 1229, 7814), (1, 19, 64, 5000)):
+        stage = object.__new__(PatchStage)
+        stage.most, stage.patches = 528, SimpleNamespace(head=range(patches))
+        stage.make_room(blocks)
+        assert min(patches, 264) <= stage.blocks <= min(patches, 527)
+        assert patches > 2000 or blocks > 264 or stage.blocks == min(patches, 528 - blocks)
 
 
 def test_patches_are_those_of_each_scene_alone():

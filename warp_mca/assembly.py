@@ -47,6 +47,11 @@ class Block:
     first: int
     ends: tuple[int, ...] = ()
 
+    @property
+    def kind(self) -> tuple[bool, str, bool]:
+        """What tells it from other blocks: not plastic, element, finite. Blocks of a model stand in this order."""
+        return not self.plastic, self.element, self.finite
+
 
 def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
     """Materials of a body with the cells that each fills; together they fill the body.
@@ -197,7 +202,7 @@ class Assembly:
                 np.concatenate([part.conn for part in parts]),
                 np.concatenate([part.index for part in parts]),
             )
-            for parts in found.values()
+            for _, parts in sorted(found.items())
         ]
 
     def law(self) -> Array:

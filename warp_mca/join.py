@@ -77,7 +77,8 @@ def join_models(models: Sequence[Model]) -> Model:
 def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tuple[Block, ...], Index, Index]:
     """Blocks of all scenes, the order of the elements in the joined meshes, and `Layout.elements`."""
     laws = offsets([len(model.law) for model in models])
-    kinds = dict.fromkeys((b.element, b.plastic, b.finite) for model in models for b in model.blocks)
+    # in the order that a scene alone has them in, so that sums over elements come out alike
+    kinds = sorted({block.kind for model in models for block in model.blocks})
     blocks, order, first = [], [], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
@@ -85,18 +86,18 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
         for k, model in enumerate(models):
             ranges[k, column] = end
             for block in model.blocks:
-                if (block.element, block.plastic, block.finite) == kind:
+                if block.kind == kind:
                     count = block.conn.shape[1]
                     conn.append(block.conn + nodes[k])
                     material.append(block.material + laws[k])
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
-        element, plastic, finite = kind
+        elastic, element, finite = kind
         blocks.append(
             Block(
                 element=element,
-                plastic=plastic,
+                plastic=not elastic,
                 finite=finite,
                 conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),

@@ -19,8 +19,8 @@ NOWHERE = PATCH  # behind the forces of all elements on their corners of one num
 # of the material's number between them.
 SLOT_BITS, MATERIAL_BITS = 9, 14
 SECOND_SLOT = SLOT_BITS + MATERIAL_BITS
-GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners fit 32
-LARGEST = 512.0  # extent of a patch over that of its smallest element, beyond which its grid is too coarse
+GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners just fit 32
+LARGEST = 128.0  # extent of a patch over that of its smallest element, where the grid rounds 4 times as much as float32
 LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
 
 Array = NDArray[np.float64]
@@ -146,7 +146,7 @@ class Patches:
 
 
 def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
-    """Positions of nodes on a grid of each patch, about as fine as float32 beside an element.
+    """Positions of nodes on a grid of each patch, which rounds about as float32 does beside an element.
 
     Returns:
         (Places from the middle of the patch and node of each slot, shape (slot_count, 4), int32; exponents of the
@@ -159,7 +159,7 @@ def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
     for axis in range(3):
         x = X[patches.node, axis]
         lower[axis], upper[axis] = np.minimum.reduceat(x, first), np.maximum.reduceat(x, first)
-    half = np.maximum(0.5 * (1.0 + 1e-8) * (upper - lower).max(axis=0), 2.0**-60)  # the grid's last lines stay free
+    half = np.maximum(0.5 * (1.0 + 1e-8) * (upper - lower).max(axis=0), 2.0**-60)  # without its last lines sums fit
     exponent = np.frexp(half)[1] - GRID
     middle, unit = 0.5 * (lower + upper), np.repeat(np.ldexp(1.0, -exponent), count)
     for axis in range(3):
@@ -201,7 +201,7 @@ def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixe
 def _patches(conn: Index, start: NDArray[np.int64], slots: int, X: Array | None) -> Patches:
     """Patches of one range of elements; `start` counts from the first element of all."""
     corners, count = conn.shape
-    lower, upper = cell_boxes(X, conn.T) if X is not None else np.zeros((2, 3, count))
+    boxes = cell_boxes(X, conn.T) if X is not None else None
     bits = conn.size.bit_length()
     while True:
         patch = np.repeat(np.arange(len(start) - 1), np.diff(start))
@@ -213,7 +213,10 @@ def _patches(conn: Index, start: NDArray[np.int64], slots: int, X: Array | None)
         key >>= bits
         opened, slot = _slots(key, corner // count)
         slot_start = np.searchsorted(opened, np.arange(len(start)) << 32)
-        large = np.flatnonzero((np.diff(slot_start) > slots) | _uneven(lower, upper, start[:-1] - start[0]))
+        too_large = np.diff(slot_start) > slots
+        if boxes:
+            too_large |= _uneven(*boxes, start[:-1] - start[0])
+        large = np.flatnonzero(too_large)
         if not len(large):
             break
         start = np.sort(np.append(start, (start[large] + start[large + 1]) // 2))

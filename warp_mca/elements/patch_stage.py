@@ -21,8 +21,8 @@ class PatchStage(ElementStage):
 
     Attributes:
         patches: on the device.
-        place: what `kernels.patch.POINT` says of each slot.
-        places: for blocks of threads on the device.
+        point: what `kernels.patch.POINT` says of each slot.
+        most: blocks of threads that the device holds.
         blocks: of threads; each computes one patch after another.
     """
 
@@ -34,14 +34,14 @@ class PatchStage(ElementStage):
         self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
         mixed = precision == "mixed"
         host = make_patches(block.conn, block.ends, SLOTS[precision], X if mixed else None)
-        place, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
+        point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
         self.patches = patch.Patches()
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
-        self.places = wp.get_device().sm_count * patch.RESIDENT[precision]
-        self.blocks = min(len(heads), self.places)
-        self.place = wp.array(place, dtype=patch.POINT[precision])
+        self.most = wp.get_device().sm_count * patch.RESIDENT[precision]
+        self.blocks = min(len(heads), self.most)
+        self.point = wp.array(point, dtype=patch.POINT[precision])
         self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
         if points > 1:  # lanes read the points of one element together
@@ -56,9 +56,14 @@ class PatchStage(ElementStage):
         return [*super().kernels(), *([patch.schedule] if self.scheduled else [])]
 
     def make_room(self, blocks: int) -> None:
-        """Leave so many blocks of contact a place; fewer where elements take many rounds, as contact may do too."""
-        rounds = max(1, len(self.patches.head) // (4 * self.places))
-        self.blocks = min(len(self.patches.head), max(self.places // 2, self.places + blocks // -rounds))
+        """Leave a place to each of so many blocks of contact; to fewer where elements take many rounds.
+
+        Contact then takes rounds too, but a quarter as many at most: it has two kernels, and other work to wait for.
+        """
+        patches = len(self.patches.head)
+        rounds = max(1, patches // (4 * self.most))
+        room = -(-blocks // rounds)
+        self.blocks = min(patches, max(self.most // 2, self.most - room))
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
@@ -71,7 +76,7 @@ class PatchStage(ElementStage):
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.place, self.patches, law, u, self.slot, self.blocks]
+        inputs = [X, self.point, self.patches, law, u, self.slot, self.blocks]
         outputs = [self.yielded, self.history, force]
         wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
