@@ -98,8 +98,9 @@ class Solver:
         scenes, passes = self.layout.count, len(model.passes) // self.layout.count
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         if self.contacts:
+            blocks = max(stage.blocks for stage in self.contacts)
             for stage in self.elements:
-                stage.make_room(max(contact.blocks for contact in self.contacts))
+                stage.make_room(blocks)
         # contact and sums have few threads and wait long for memory: they take what room there is first
         self.side = wp.Stream(priority=-1) if wp.get_device().is_cuda else None
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
@@ -120,9 +121,9 @@ class Solver:
         each = bool((model.gravity != model.gravity[0]).any())
         self.node_gravity = self.gravity if each else wp.vec3d(*model.gravity[0])
         self.node_scene = per_scene(self.layout.nodes) if each else 0
-        contact, fixed = bool(self.contacts), bool(model.fixed_axes.any())
-        self.integrate_kernel = node.integrate_kernel(self.precision, contact, fixed, self.bonds.count > 0, each)
-        self.bound_kernel = constraint.bound_kernel(self.precision, contact, each) if self.bonds.count else None
+        touched, fixed = bool(self.contacts), bool(model.fixed_axes.any())
+        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, self.bonds.count > 0, each)
+        self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if self.bonds.count else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
     def _forces(self, split: Split = whole, beside: Callable[[], None] | None = None) -> None:
