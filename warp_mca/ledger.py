@@ -24,8 +24,8 @@ _FLAGS = (
     "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike, "
     "or choose a smaller output_interval if they are fast",
     "a node outran the contact search; choose a smaller output_interval",
-    "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or lower time_step_scale "
-    "if penalty is high",
+    "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or, if penalty is high, "
+    "lower time_step_scale",
 )
 
 
