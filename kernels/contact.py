@@ -10,7 +10,7 @@ from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
 from warp_mca.kernels.projection import interpolate, project
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
-from warp_mca.kernels.shared_memory import exchange
+from warp_mca.kernels.shared_memory import shared_functions
 from warp_mca.surfaces import LIST_LENGTH
 
 wp.set_module_options({"enable_backward": False})
@@ -191,6 +191,7 @@ def react_kernel(each: bool, lanes: int) -> Any:
     With more `lanes`, on a GPU, so many of the faces side by side.
     """
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
+    _, exchange = shared_functions("float64")
 
     @wp.kernel(enable_backward=False, module="unique" if each or lanes > 1 else None, grid_stride=False)
     def react(

@@ -14,7 +14,6 @@ from warp_mca.kernels import j2
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, THIRD, frame_functions
 from warp_mca.kernels.patch import (
-    AHEAD,
     POINT,
     RESIDENT,
     Patches,
@@ -24,10 +23,8 @@ from warp_mca.kernels.patch import (
     element_count,
     exponent_of,
     from_start,
-    load_functions,
-    material_of,
-    sum_functions,
 )
+from warp_mca.kernels.patch_element import load_functions, material_of, sum_functions
 from warp_mca.kernels.scalars import scalars
 from warp_mca.kernels.shared_memory import (
     FORCES,
@@ -171,7 +168,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     force_pool, _ = shared_functions(precision)
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
-    early = AHEAD[precision] or not plastic  # otherwise lanes of elements that yield still need the nodes of this patch
+    # otherwise lanes of elements that yield still need the nodes of this patch where those of the next would go
+    early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
     load_points, load_displacements, load_corners = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
@@ -255,7 +253,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
-        place = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        near = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
         pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
@@ -263,20 +261,20 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         if wp.static(plastic):
             if lane == 0:
                 todo[0] = 0
-        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, near, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
-            Xl = load_points(place, pool, corners, first, exponent_of(head))
+            Xl = load_points(near, pool, corners, first, exponent_of(head))
             ul = load_displacements(pool, corners, first)
             coming = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
             if wp.static(early):
-                copy_nodes(X, u, place, coming, lane, wp.static(slots) - first, pool)
+                copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 W = element_rotation(Xl, ul)
                 flows = bool(False)
@@ -308,15 +306,15 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                     valid = item < listed
                     exponent = exponent_of(head)
                     q = lane & 3
-                    flow(place, pool, first, exponent, patches, mine, law, thread, q, valid, history_out, forces)
+                    flow(near, pool, first, exponent, patches, mine, law, thread, q, valid, history_out, forces)
                 if listed > 0:
                     barrier()
                     if lane == 0:
                         todo[0] = 0
             if wp.static(not early):
-                copy_nodes(X, u, place, coming, lane, wp.static(slots) - first, pool)
+                copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             corners = corners_of(patches, coming, lane)
-            copy_ahead(points, patches, block, stride, k, lane, first, ring, place)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, near)
             sum_patch(forces, places, head, lane, slot, force_out)
             if wp.static(not early):
                 wait_for_copies()

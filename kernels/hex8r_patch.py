@@ -16,11 +16,8 @@ from warp_mca.kernels.patch import (
     element_count,
     exponent_of,
     from_start,
-    load_functions,
-    material_of,
-    pattern_function,
-    sum_functions,
 )
+from warp_mca.kernels.patch_element import load_functions, load_pattern_function, material_of, sum_functions
 from warp_mca.kernels.patterns import pattern_functions
 from warp_mca.kernels.scalars import scalars
 from warp_mca.kernels.shared_memory import (
@@ -46,7 +43,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
-    load_patterns = pattern_function(precision)
+    load_patterns = load_pattern_function(precision)
     _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
@@ -74,24 +71,24 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         lane = wp.tid() & wp.static(PATCH - 1)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
-        place = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        near = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
         pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
-        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, place, pool)
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, near, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
-            x = load_patterns(place, pool, corners, first, exponent_of(head))
+            x = load_patterns(near, pool, corners, first, exponent_of(head))
             du = to_patterns(load_displacements(pool, corners, first))
             coming = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
-            copy_nodes(X, u, place, coming, lane, wp.static(slots) - first, pool)
+            copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 b, volume, W, H, q = shape_and_strain(x, du)
                 P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out)
@@ -99,7 +96,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             corners = corners_of(patches, coming, lane)
             wait_for_copies()
             barrier()
-            copy_ahead(points, patches, block, stride, k, lane, first, ring, place)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, near)
             sum_patch(forces, places, head, lane, slot, force_out)
             head = coming
             k += 1

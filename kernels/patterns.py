@@ -18,7 +18,7 @@ VOLUME_SCALE = 1.0 / 64.0  # of a volume over what `mean_gradients` gives, and o
 
 
 @cache
-def sum_function(scalar: Any) -> Any:
+def pattern_sum_function(scalar: Any) -> Any:
     """The function corner values -> pattern sums, of a scalar type, integers too."""
     mat73, mat83 = wp.types.matrix((7, 3), scalar), wp.types.matrix((8, 3), scalar)
 
@@ -88,7 +88,7 @@ def pattern_functions(precision: str) -> tuple[Any, Any]:
         f[7] = s3 - d3
         return f
 
-    return sum_function(t.real), to_corners
+    return pattern_sum_function(t.real), to_corners
 
 
 @cache

@@ -42,12 +42,6 @@ def head_ring() -> wp.uint64:
     ...
 
 
-@wp.func_native("return __shfl_xor_sync(0xffffffffu, value, mask);")
-def exchange(value: wp.float64, mask: int) -> wp.float64:
-    """The value of the lane that differs in `mask`; every lane of the warp that has not ended must ask."""
-    ...
-
-
 @cache
 def slot_pools(precision: str) -> tuple[Any, Any, Any]:
     """Functions: addresses of shared memory for what each slot of a patch has.

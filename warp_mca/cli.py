@@ -13,7 +13,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -234,8 +234,7 @@ def _request(args: argparse.Namespace, more: Mapping[str, str] | None = None) ->
     scale = getattr(args, SCALE, None)
     if Path(args.scene).suffix != SUFFIX:
         source = registry.load_source(args.scene)
-        if scale is not None and SCALE in source.parameters:
-            overrides[SCALE], scale = scale, None
+        scale = _where_no_parameter(scale, source.parameters, overrides)
         values = source.resolve(args.preset, overrides)
         preset = args.preset or source.default_preset
         origin = Origin(source.name, preset, values) if source.builtin else None
@@ -244,11 +243,18 @@ def _request(args: argparse.Namespace, more: Mapping[str, str] | None = None) ->
     if args.preset is not None:
         raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
     stored = scene_file.load(args.scene)
-    if scale is not None and stored.origin and SCALE in stored.origin.parameters:
-        overrides[SCALE], scale = scale, None
+    scale = _where_no_parameter(scale, stored.origin.parameters if stored.origin else (), overrides)
     stored = scene_file.changed(stored, overrides)
     scene = _with(stored.scene, args.element, scale)
     return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
+
+
+def _where_no_parameter(scale: float | None, names: Collection[str], overrides: dict[str, object]) -> float | None:
+    """The share of the stable time step, or None where the scene has it among its parameters, which take it then."""
+    if scale is not None and SCALE in names:
+        overrides[SCALE] = scale
+        return None
+    return scale
 
 
 def _with(scene: Scene, element: str | None, scale: float | None) -> Scene:
