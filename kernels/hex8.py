@@ -12,11 +12,11 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.fused import NOTHING
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hex8_finite import finite_force_kernel
 from warp_mca.kernels.hexahedron import (
     LINE_SCALE,
-    THIRD,
     edge_functions,
     frame_functions,
     gradient_function,
@@ -28,7 +28,7 @@ from warp_mca.kernels.hexahedron import (
     stress_function,
 )
 from warp_mca.kernels.kinematics import kinematics
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -127,11 +127,11 @@ def _plastic_force_kernel(precision: str) -> Any:
         Sx = mat43()
         Sy = mat43()
         Sz = mat43()
-        Bx = mat43()
-        By = mat43()
-        Bz = mat43()
-        volume = R(0.0)
-        dilation = R(0.0)
+        Bx = mat43(R(NOTHING))
+        By = mat43(R(NOTHING))
+        Bz = mat43(R(NOTHING))
+        volume = R(NOTHING)
+        dilation = R(NOTHING)
         flag = yielded_out[e]
         flag_new = flag
         for g in range(8):
@@ -153,7 +153,7 @@ def _plastic_force_kernel(precision: str) -> Any:
             trace = xx + yy + zz
             volume += det
             dilation += trace
-            shear = R(0.5) / det
+            shear = G / det
             direct = shear + shear
             mean = R(THIRD) * trace
             xx = direct * (xx - mean)
@@ -162,8 +162,8 @@ def _plastic_force_kernel(precision: str) -> Any:
             xy = shear * xy
             yz = shear * yz
             xz = shear * xz
-            strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-            S, eps_new, p_new = j2_return(strain, eps_p, p, G, limit, H, beta)
+            S = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+            S, eps_new, p_new = j2_return(S, eps_p, p, G, limit, H, beta)
             if p_new > p:
                 write_plastic_strain(history_out, g, e, eps_new, p_new)
                 flag_new = int(1)

@@ -5,8 +5,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hexahedron import THIRD, line_functions, node_force_function
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.fused import NOTHING
+from warp_mca.kernels.hexahedron import line_functions, node_force_function
+from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -64,11 +65,11 @@ def elastic_function(precision: str) -> Any:
         Sx = mat43()  # stress times cofactor, summed over the two points of each Gauss line
         Sy = mat43()
         Sz = mat43()
-        Bx = mat43()  # cofactors alone, which carry the element's one pressure
-        By = mat43()
-        Bz = mat43()
-        volume = R(0.0)
-        dilation = R(0.0)
+        Bx = mat43(R(NOTHING))  # cofactors alone, which carry the element's one pressure
+        By = mat43(R(NOTHING))
+        Bz = mat43(R(NOTHING))
+        volume = R(NOTHING)
+        dilation = R(NOTHING)
         largest = R(0.0)
         for g in range(8):
             i = g & 1

@@ -35,7 +35,7 @@ def finite_force_kernel(precision: str, plastic: bool) -> Any:
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
     k = kinematics(precision, True)
-    dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
+    dilation_of, deviator, nominal, pressure_of = k.dilation, k.deviator, k.nominal, k.pressure
 
     @wp.kernel(enable_backward=False, module="unique")
     def hex8_finite_force(
@@ -92,11 +92,11 @@ def finite_force_kernel(precision: str, plastic: bool) -> Any:
                 p = R(0.0)
                 if flag != 0:
                     eps_p, p = read_plastic_strain(history_out, g, e)
-                S, eps_new, p_new = j2_return(strain, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
+                S, eps_new, p_new = j2_return(S, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
                 if p_new > p:
                     write_plastic_strain(history_out, g, e, eps_new, p_new)
                     flag_new = int(1)
-            P = nominal(grad, S, N, d) + pressure * cofactor(grad)
+            P = nominal(grad, S, N, d, pressure)
             Sx[jx] = Sx[jx] + P * wp.cross(gy[jy], gz[jz])
             Sy[jy] = Sy[jy] + P * wp.cross(gz[jz], gx[jx])
             Sz[jz] = Sz[jz] + P * wp.cross(gx[jx], gy[jy])

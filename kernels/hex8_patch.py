@@ -11,8 +11,9 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
-from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, THIRD, frame_functions
+from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
 from warp_mca.kernels.patch import (
     POINT,
     RESIDENT,
@@ -25,7 +26,7 @@ from warp_mca.kernels.patch import (
     from_start,
 )
 from warp_mca.kernels.patch_element import load_functions, material_of, sum_functions
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.scalars import THIRD, scalars
 from warp_mca.kernels.shared_memory import (
     FORCES,
     HEADS,
@@ -100,18 +101,17 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any]:
 
 
 @cache
-def point_functions(precision: str) -> tuple[Any, Any, Any]:
+def point_functions(precision: str) -> tuple[Any, Any, Any, Any]:
     """Functions of one Gauss point.
 
     (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
-    stress of a point, and its history; forces of the edges.)
+    stress and plastic strain of a point; the history of two points; forces of the edges.)
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     add_traction, symmetric_gradient = stress_functions(precision)
     j2_return = j2.return_map(precision)
-    read_row, write_row = row_functions(precision, j2.HISTORY_SIZE)
-    row = wp.types.vector(j2.HISTORY_SIZE, R)
+    pair = wp.types.vector(2 * j2.HISTORY_SIZE, R)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -128,13 +128,12 @@ def point_functions(precision: str) -> tuple[Any, Any, Any]:
         det: R,
         law: wp.array2d(dtype=R),
         m: int,
-        q: int,
-        e: int,
-        valid: bool,
-        history_out: wp.array2d(dtype=R),
+        history: pair,
+        first: int,
     ):
-        """Direct `sums` are strains times det, the others twice that."""
-        shear = R(0.5) / det
+        """Direct `sums` are strains times det, the others twice that; the history of the point begins at `first`."""
+        G = R(scale) * law[m, 1]
+        shear = G / det
         direct = shear + shear
         mean = R(THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
         xx = direct * (sums[0, 0] - mean)
@@ -143,21 +142,30 @@ def point_functions(precision: str) -> tuple[Any, Any, Any]:
         xy = shear * sums[0, 1]
         yz = shear * sums[1, 2]
         xz = shear * sums[0, 2]
-        strain = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-        h = read_row(history_out, q * wp.static(j2.HISTORY_SIZE), e)
-        eps_p = mat33(h[0], h[2], h[4], h[2], h[1], h[3], h[4], h[3], -h[0] - h[1])
-        G = R(scale) * law[m, 1]
-        S, eps, p = j2_return(strain, eps_p, h[5], G, R(scale) * law[m, 2], R(scale) * law[m, 3], law[m, 4])
-        if valid and p > h[5]:
-            h = row(eps[0, 0], eps[1, 1], eps[0, 1], eps[1, 2], eps[0, 2], p)
-            write_row(h, q * wp.static(j2.HISTORY_SIZE), e, history_out)
-        return S
+        elastic = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+        p_xx = history[first]
+        p_yy = history[first + 1]
+        p_xy = history[first + 2]
+        p_yz = history[first + 3]
+        p_xz = history[first + 4]
+        eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
+        H = R(scale) * law[m, 3]
+        return j2_return(elastic, eps_p, history[first + 5], G, R(scale) * law[m, 2], H, law[m, 4])
 
     @wp.func
     def force_of_edge(S: mat33, pressure: R, b: vec3):
         return add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b, pressure * b)
 
-    return shape_of_point, stress_of_point, force_of_edge
+    @wp.func
+    def history_of_points(eps0: mat33, p0: R, eps1: mat33, p1: R):
+        # fmt: off
+        return pair(
+            eps0[0, 0], eps0[1, 1], eps0[0, 1], eps0[1, 2], eps0[0, 2], p0,
+            eps1[0, 0], eps1[1, 1], eps1[0, 1], eps1[1, 2], eps1[0, 2], p1,
+        )
+        # fmt: on
+
+    return shape_of_point, stress_of_point, history_of_points, force_of_edge
 
 
 @cache
@@ -173,10 +181,13 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
     load_points, load_displacements, load_corners = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
-    element_rotation, local_displacement = frame_functions(precision)
+    element_rotation, local_displacement = frame_functions(precision, flush=False)
     elastic_forces = elastic_function(precision)
+    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
     to_point_lines, to_corners, lane_sum = lane_functions(precision)
-    shape_of_point, stress_of_point, force_of_edge = point_functions(precision)
+    shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision)
+    size, last = j2.HISTORY_SIZE, j2.HISTORY_SIZE - 1
+    read_row, write_row = row_functions(precision, 2 * size)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -202,16 +213,18 @@ def force_kernel(precision: str, plastic: bool) -> Any:
         for k in range(9):
             W[k // 3, k % 3] = force_out[k * wp.static(ROW) + thread]
         warp_barrier()
+        history = read_row(history_out, 2 * size * q, e)
         xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
         eta = wp.where(q > 1, R(1.0), R(-1.0))
         gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
-        T = wp.transpose(W)
-        lx0, lx1, ly0, ly1, lz = to_point_lines(d0 + T * (x0 + d0), d1 + T * (x1 + d1), xi, eta)
+        lx0, lx1, ly0, ly1, lz = to_point_lines(add_transposed(d0, W, x0 + d0), add_transposed(d1, W, x1 + d1), xi, eta)
         b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
         b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
         pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
-        S0 = stress_of_point(sums0, det0, law, m, q, e, valid, history_out)
-        S1 = stress_of_point(sums1, det1, law, m, q + 4, e, valid, history_out)
+        S0, eps0, p0 = stress_of_point(sums0, det0, law, m, history, 0)
+        S1, eps1, p1 = stress_of_point(sums1, det1, law, m, history, size)
+        if valid and (p0 > history[last] or p1 > history[size + last]):
+            write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
         f0, f1 = to_corners(
             force_of_edge(S0, pressure, b00),
@@ -222,8 +235,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             xi,
             eta,
         )
-        f0 = f0 + W * f0
-        f1 = f1 + W * f1
+        f0 = add_product(f0, W, f0)
+        f1 = add_product(f1, W, f1)
         if valid:
             for i in range(3):
                 force_out[(3 * a + i) * wp.static(ROW) + thread] = f0[i]

@@ -13,6 +13,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.fused import NOTHING, fused
 from warp_mca.kernels.hexahedron import history_functions, load_function, store_function, stress_function
 from warp_mca.kernels.kinematics import kinematics
 from warp_mca.kernels.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
@@ -31,15 +32,15 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
     """Functions (hourglass amplitudes; generalised forces and energy)."""
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
+    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
 
     @wp.func
     def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
         """What the mean displacement gradient H leaves of the hourglass patterns, one row for each, in frame W."""
-        Wt = wp.transpose(W)
         q = mat43()
         for m in range(4):
-            left = R(0.125) * (u[3 + m] - H * x[3 + m])
-            q[m] = left + Wt * left
+            left = add_product(u[3 + m], H, -x[3 + m])
+            q[m] = add_transposed(left, W, left)
         return q
 
     @wp.func
@@ -53,28 +54,35 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
         third = volume / R(3.0)
         plane = third * R(2.0) * G / (one - nu)
         E = third * R(2.0) / R(3.0) * G * (one + nu)
-        inverse = vec3(one / wp.length(x[0]), one / wp.length(x[1]), one / wp.length(x[2]))
+        length = vec3(wp.length(x[0]), wp.length(x[1]), wp.length(x[2]))
+        inverse = vec3(one / length[0], one / length[1], one / length[2])
+        y = mat33()
+        for k in range(3):
+            y[k] = (inverse[k] * inverse[k]) * x[k]
         F = mat43()
-        energy = R(0.0)
+        along = vec3(R(NOTHING))
+        energy = R(NOTHING)
         for k in range(3):  # strains that vary along edge k, in the plane of the two others
             i = (k + 1) % 3
             j = (k + 2) % 3
             # pattern number m varies along the two edges other than m
-            ii = R(8.0) * inverse[i] * inverse[i]
-            jj = R(8.0) * inverse[j] * inverse[j]
-            kk = R(8.0) * inverse[k] * inverse[k]
-            ij = R(8.0) * inverse[i] * inverse[j]
-            ei = ii * wp.dot(q[j], x[i])
-            ej = jj * wp.dot(q[i], x[j])
-            shear = ij * (wp.dot(q[j], x[j]) + wp.dot(q[i], x[i]))
-            last = kk * wp.dot(q[3], x[k])
+            ei = wp.dot(q[j], y[i])
+            ej = wp.dot(q[i], y[j])
+            ij = length[i] * inverse[j]
+            ji = length[j] * inverse[i]
+            shear = ji * wp.dot(q[j], y[j]) + ij * wp.dot(q[i], y[i])
+            last = wp.dot(q[3], y[k])
             si = plane * (ei + nu * ej)
             sj = plane * (ej + nu * ei)
             sij = third * G * shear
-            F[j] = F[j] + (ii * si) * x[i] + (ij * sij) * x[j]
-            F[i] = F[i] + (jj * sj) * x[j] + (ij * sij) * x[i]
-            F[3] = F[3] + (kk * E * last) * x[k]
+            F[j] = F[j] + si * y[i]
+            F[i] = F[i] + sj * y[j]
+            along[j] = along[j] + ji * sij
+            along[i] = along[i] + ij * sij
+            F[3] = F[3] + (E * last) * y[k]
             energy += R(0.5) * (si * ei + sj * ej + sij * shear + E * last * last)
+        for k in range(3):
+            F[k] = F[k] + along[k] * y[k]
         return F, energy
 
     return amplitudes, hourglass
@@ -104,22 +112,23 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any, Any, Any]:
+def element_functions(precision: str, plastic: bool, finite: bool, flush: bool = True) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
     """
     t = scalars(precision)
     R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
+    add_product, add_matrices = fused(precision).add_product, fused(precision).add_matrices
     _, to_corners = pattern_functions(precision)
-    rotated = mean_frame(precision, finite)
+    rotated = mean_frame(precision, finite, flush)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
     j2_return = j2.return_map(precision)
     k = kinematics(precision, finite)
-    dilation_of, deviator, nominal, cofactor, pressure_of = k.dilation, k.deviator, k.nominal, k.cofactor, k.pressure
+    dilation_of, deviator, nominal, pressure_of = k.dilation, k.deviator, k.nominal, k.pressure
 
     @wp.func
     def shape_and_strain(x: mat73, du: mat73):
@@ -154,7 +163,7 @@ def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any,
                 eps_p, p = read_plastic_strain(history_out, 0, e)
                 q_p = read_amplitudes(history_out, e)
                 q = q - q_p
-            S, eps_new, p_new = j2_return(strain, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
+            S, eps_new, p_new = j2_return(S, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
             if p_new > p:
                 write_plastic_strain(history_out, 0, e, eps_new, p_new)
                 # the flow rule at a point is linear in its stress: the part about the mean relaxes by 3 G dp / S_eq
@@ -163,7 +172,7 @@ def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any,
                 write_amplitudes(history_out, e, q_p + (R(1.0) - kept) * q)
                 if flag == 0:
                     yielded_out[e] = int(1)
-        P = nominal(H, S, N, d) + pressure_of(K, dilation_of(H)) * cofactor(H)
+        P = nominal(H, S, N, d, pressure_of(K, dilation_of(H)))
         Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):
             if kept < R(1.0):
@@ -175,14 +184,17 @@ def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any,
 
     @wp.func
     def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
+        share = R(-1.0) / volume
         for n in range(4):  # amplitudes feel the mean gradient too
-            P = P - (R(0.125) / volume) * wp.outer(Q[n], x[3 + n])
-        P = -R(VOLUME_SCALE) * (P + W * P)
+            P = P + wp.outer(Q[n], share * x[3 + n])
+        P = -R(VOLUME_SCALE) * add_matrices(P, W, P)
         f = mat73()
-        for n in range(6):
+        for n in range(3):
             f[n] = P * b[n]
         for n in range(4):
-            f[3 + n] = f[3 + n] - R(0.125) * (Q[n] + W * Q[n])
+            f[3 + n] = -add_product(Q[n], W, Q[n])
+        for n in range(3):
+            f[3 + n] = add_product(f[3 + n], P, b[3 + n])
         return to_corners(f)
 
     return shape_and_strain, stress_and_flow, corner_forces

@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.fused import fused
 from warp_mca.kernels.rotation import nearest_rotation
 from warp_mca.kernels.scalars import scalars
 
@@ -64,7 +65,6 @@ def edge_functions(precision: str) -> tuple[Any, Any]:
     return half_edges, to_gauss
 
 
-THIRD = 1.0 / 3.0  # a division of two constants in a kernel is one of float32
 LINE_RATIO = _FAR / _NEAR
 LINE_SCALE = 0.5 * _NEAR * _NEAR  # of half edges at the Gauss lines over what `line_functions` gives
 
@@ -117,12 +117,13 @@ def line_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
+def frame_functions(precision: str, finite: bool = False, flush: bool = True) -> tuple[Any, Any]:
     """Functions that take an element to its rotated frame: (rotation as W = Q - I, local displacements)."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
     edges, _ = line_functions(precision)
-    polar_rotation = nearest_rotation(precision, finite)
+    polar_rotation = nearest_rotation(precision, finite, flush)
+    add_transposed = fused(precision).add_transposed
 
     @wp.func
     def edge_sum(x: mat83, direction: int):
@@ -143,10 +144,9 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
 
     @wp.func
     def local_displacement(X: mat83, u: mat83, W: mat33):
-        Wt = wp.transpose(W)
         local = mat83()
         for a in range(1, 8):  # the first node is the origin of both
-            local[a] = u[a] + Wt * (X[a] + u[a])  # Q^T (X + u) - X, without the digits that would cancel
+            local[a] = add_transposed(u[a], W, X[a] + u[a])  # Q^T (X + u) - X, without the digits that would cancel
         return local
 
     return element_rotation, local_displacement
@@ -180,6 +180,7 @@ def node_force_function(precision: str) -> Any:
     """The function that turns edge forces, one 4 x 3 matrix for each direction, into node forces, out of frame W."""
     t = scalars(precision)
     mat33, mat43, mat83 = t.mat33, t.mat43, t.mat83
+    add_product = fused(precision).add_product
 
     @wp.func
     def edge_to_node(Fx: mat43, Fy: mat43, Fz: mat43, W: mat33):
@@ -193,7 +194,7 @@ def node_force_function(precision: str) -> Any:
         f[6] = -Fx[3] - Fy[3] - Fz[3]
         f[7] = Fx[3] - Fy[2] - Fz[2]
         for a in range(8):
-            f[a] = f[a] + W * f[a]
+            f[a] = add_product(f[a], W, f[a])
         return f
 
     return edge_to_node
@@ -236,13 +237,16 @@ def load_function(precision: str) -> Any:
 
 @cache
 def history_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that read and write the J2 history of one integration point."""
+    """Functions that read and write the J2 history of one integration point.
+
+    Points g and g + 4, which differ along zeta, lie side by side: a lane of `kernels.hex8_patch` takes both.
+    """
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
 
     @wp.func
     def read_plastic_strain(history: wp.array2d(dtype=R), point: int, e: int):
-        k = point * wp.static(j2.HISTORY_SIZE)
+        k = (2 * (point & 3) + (point >> 2)) * wp.static(j2.HISTORY_SIZE)
         xx = history[k, e]
         yy = history[k + 1, e]
         xy = history[k + 2, e]
@@ -252,7 +256,7 @@ def history_functions(precision: str) -> tuple[Any, Any]:
 
     @wp.func
     def write_plastic_strain(history_out: wp.array2d(dtype=R), point: int, e: int, eps_p: mat33, p: R):
-        k = point * wp.static(j2.HISTORY_SIZE)
+        k = (2 * (point & 3) + (point >> 2)) * wp.static(j2.HISTORY_SIZE)
         history_out[k, e] = eps_p[0, 0]
         history_out[k + 1, e] = eps_p[1, 1]
         history_out[k + 2, e] = eps_p[0, 1]

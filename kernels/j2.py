@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -18,29 +18,26 @@ HISTORY_SIZE = 6  # xx, yy, xy, yz, xz of the plastic strain, and the equivalent
 
 @cache
 def return_map(precision: str) -> Any:
-    """The function (e, eps_p, p, G, sigma_y, H, beta) -> (S, eps_p, p) in the scalars of `precision`.
+    """The function (elastic, eps_p, p, G, sigma_y, H, beta) -> (S, eps_p, p) in the scalars of `precision`.
 
-    e: deviatoric strain [-]; eps_p: plastic strain [-], symmetric and traceless; p: equivalent plastic strain [-];
-    G, sigma_y, H [Pa]; beta [-]; S: deviatoric stress [Pa].
+    elastic: 2 G e of the deviatoric strain e [Pa], which callers often have already; eps_p: plastic strain [-],
+    symmetric and traceless; p: equivalent plastic strain [-]; G, sigma_y, H [Pa]; beta [-]; S: deviatoric stress [Pa].
     """
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
 
     @wp.func
-    def j2_return(e: mat33, eps_p: mat33, p: R, G: R, sigma_y: R, H: R, beta: R):
-        S = R(2.0) * G * (e - eps_p)
-        xi = S - (R(2.0) / R(3.0)) * (R(1.0) - beta) * H * eps_p
-        xi_eq2 = R(1.5) * wp.ddot(xi, xi)
+    def j2_return(elastic: mat33, eps_p: mat33, p: R, G: R, sigma_y: R, H: R, beta: R):
+        xi = elastic - (R(2.0) * G + R(2.0) * R(THIRD) * (R(1.0) - beta) * H) * eps_p
+        shear2 = xi[0, 1] * xi[0, 1] + xi[1, 2] * xi[1, 2] + xi[0, 2] * xi[0, 2]
+        direct2 = xi[0, 0] * xi[0, 0] + xi[1, 1] * xi[1, 1] + xi[2, 2] * xi[2, 2]
+        xi_eq2 = R(1.5) * direct2 + R(3.0) * shear2
         radius = sigma_y + beta * H * p
-        if xi_eq2 > radius * radius:
-            xi_eq = wp.sqrt(xi_eq2)
-            p_new = p + (xi_eq - radius) / (R(3.0) * G + H)
-            dp = p_new - p  # what p takes of it: the next step then finds what rounding left, and nothing adds up
-            d_eps = (R(1.5) * dp / xi_eq) * xi
-            S = S - R(2.0) * G * d_eps
-            eps_p = eps_p + d_eps
-            p = p_new
-        return S, eps_p, p
+        xi_eq = wp.sqrt(xi_eq2)
+        p_new = p + wp.max(xi_eq - radius, R(0.0)) / (R(3.0) * G + H)
+        dp = p_new - p  # what p takes of it: the next step then finds what rounding left, and nothing adds up
+        eps_p = eps_p + wp.where(dp > R(0.0), R(1.5) * dp / xi_eq, R(0.0)) * xi
+        return elastic - R(2.0) * G * eps_p, eps_p, p_new
 
     return j2_return
 

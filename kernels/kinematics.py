@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -101,8 +101,8 @@ class Kinematics:
     Attributes:
         dilation: H -> J - 1 [-], change of volume over volume.
         deviator: H -> (deviatoric strain e, principal directions N, eigenvalues d of F^T F - I).
-        nominal: (H, S, N, d) -> first Piola-Kirchhoff stress [Pa] of the stress S conjugate to e.
-        cofactor: H -> derivative of J with respect to F.
+        nominal: (H, S, N, d, pressure) -> first Piola-Kirchhoff stress [Pa] of the stress S conjugate to e, and of the
+            pressure, which goes with the derivative of J with respect to F.
         pressure: (K, J - 1) -> derivative of the volumetric energy with respect to J [Pa].
         volumetric_energy: (K, J - 1) -> energy per reference volume [J/m^3].
         cauchy: (H, S, N, d, pressure) -> Cauchy stress in the rotated frame [Pa].
@@ -111,7 +111,6 @@ class Kinematics:
     dilation: Any
     deviator: Any
     nominal: Any
-    cofactor: Any
     pressure: Any
     volumetric_energy: Any
     cauchy: Any
@@ -133,16 +132,19 @@ def _small(precision: str) -> Kinematics:
 
     @wp.func
     def small_deviator(H: mat33):
-        mean = wp.trace(H) / R(3.0)
-        return R(0.5) * (H + wp.transpose(H)) - mean * wp.identity(n=3, dtype=R), mat33(), vec3()
+        mean = R(THIRD) * wp.trace(H)
+        xy = R(0.5) * (H[0, 1] + H[1, 0])
+        yz = R(0.5) * (H[1, 2] + H[2, 1])
+        xz = R(0.5) * (H[0, 2] + H[2, 0])
+        # no products with zeros of an identity, which compilers keep
+        return mat33(H[0, 0] - mean, xy, xz, xy, H[1, 1] - mean, yz, xz, yz, H[2, 2] - mean), mat33(), vec3()
 
     @wp.func
-    def small_nominal(H: mat33, S: mat33, N: mat33, d: vec3):
-        return S
-
-    @wp.func
-    def small_cofactor(H: mat33):
-        return wp.identity(n=3, dtype=R)
+    def small_stress(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
+        P = S
+        for i in range(3):
+            P[i, i] = P[i, i] + pressure
+        return P
 
     @wp.func
     def small_pressure(K: R, theta: R):
@@ -152,13 +154,7 @@ def _small(precision: str) -> Kinematics:
     def small_volumetric(K: R, theta: R):
         return R(0.5) * K * theta * theta
 
-    @wp.func
-    def small_cauchy(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
-        return S + pressure * wp.identity(n=3, dtype=R)
-
-    return Kinematics(
-        small_dilation, small_deviator, small_nominal, small_cofactor, small_pressure, small_volumetric, small_cauchy
-    )
+    return Kinematics(small_dilation, small_deviator, small_stress, small_pressure, small_volumetric, small_stress)
 
 
 def _logarithmic(precision: str) -> Kinematics:
@@ -193,7 +189,7 @@ def _logarithmic(precision: str) -> Kinematics:
         return R(0.5) * (e + wp.transpose(e)), N, d
 
     @wp.func
-    def log_nominal(H: mat33, S: mat33, N: mat33, d: vec3):
+    def log_deviatoric(H: mat33, S: mat33, N: mat33, d: vec3):
         T = wp.transpose(N) * S * N
         one = R(1.0)
         # divided differences of ln at the squared stretches
@@ -218,6 +214,10 @@ def _logarithmic(precision: str) -> Kinematics:
         return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
 
     @wp.func
+    def log_nominal(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
+        return log_deviatoric(H, S, N, d) + pressure * log_cofactor(H)
+
+    @wp.func
     def log_pressure(K: R, theta: R):
         return K * theta * log_over(theta) / (R(1.0) + theta)
 
@@ -228,8 +228,8 @@ def _logarithmic(precision: str) -> Kinematics:
 
     @wp.func
     def log_cauchy(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
-        P = log_nominal(H, S, N, d)
+        P = log_deviatoric(H, S, N, d)
         sigma = (P + P * wp.transpose(H)) / (R(1.0) + log_dilation(H))
         return R(0.5) * (sigma + wp.transpose(sigma)) + pressure * wp.identity(n=3, dtype=R)
 
-    return Kinematics(log_dilation, log_deviator, log_nominal, log_cofactor, log_pressure, log_volumetric, log_cauchy)
+    return Kinematics(log_dilation, log_deviator, log_nominal, log_pressure, log_volumetric, log_cauchy)

@@ -9,6 +9,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.fused import NOTHING, fused
 from warp_mca.kernels.rotation import nearest_rotation
 from warp_mca.kernels.scalars import scalars
 
@@ -100,6 +101,7 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
     """
     t = scalars(precision)
     R, mat33, mat63, mat73 = t.real, t.mat33, t.mat63, t.mat73
+    add_cross = fused(precision).add_cross
 
     @wp.func
     def mean_gradients(x: mat73):
@@ -108,21 +110,19 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
         h1 = third * x[3]
         h2 = third * x[4]
         h3 = third * x[5]
-        b[0] = wp.cross(x[1], x[2]) + wp.cross(h3, x[4])
-        b[1] = wp.cross(x[2], x[0]) + wp.cross(h1, x[5])
-        b[2] = wp.cross(x[0], x[1]) + wp.cross(h2, x[3])
-        b[3] = wp.cross(h3, x[1]) + wp.cross(x[2], h2)
-        b[4] = wp.cross(h1, x[2]) + wp.cross(x[0], h3)
-        b[5] = wp.cross(h2, x[0]) + wp.cross(x[1], h1)
-        volume = R(0.0)
-        for p in range(6):  # Euler's theorem: it is of third degree
-            volume += wp.dot(x[p], b[p])
-        volume = third * volume
-        return b, volume
+        area = wp.cross(x[1], x[2])
+        b[0] = add_cross(area, h3, x[4])
+        b[1] = add_cross(wp.cross(x[2], x[0]), h1, x[5])
+        b[2] = add_cross(wp.cross(x[0], x[1]), h2, x[3])
+        b[3] = add_cross(wp.cross(h3, x[1]), x[2], h2)
+        b[4] = add_cross(wp.cross(h1, x[2]), x[0], h3)
+        b[5] = add_cross(wp.cross(h2, x[0]), x[1], h1)
+        bent = wp.dot(x[3], b[3]) + wp.dot(x[4], b[4]) + wp.dot(x[5], b[5])  # Euler's theorem: of second degree in h
+        return b, wp.dot(x[0], area) + R(0.5) * bent
 
     @wp.func
     def mean_gradient_of(u: mat73, b: mat63, volume: R):
-        H = mat33()
+        H = mat33(R(NOTHING))
         for p in range(6):
             H = H + wp.outer(u[p], b[p])
         return H / volume
@@ -131,16 +131,17 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def mean_frame(precision: str, finite: bool = False) -> Any:
+def mean_frame(precision: str, finite: bool = False, flush: bool = True) -> Any:
     """The function H -> (rotation of the mean deformation gradient I + H as W = Q - I, H in the rotated frame)."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    polar_rotation = nearest_rotation(precision, finite)
+    polar_rotation = nearest_rotation(precision, finite, flush)
+    add_matrices = fused(precision).add_matrices
 
     @wp.func
     def rotated(H: mat33):
         F = wp.identity(n=3, dtype=R) + H
         W = polar_rotation(F)
-        return W, H + wp.transpose(W) * F  # Q^T F - I, without the digits that would cancel
+        return W, add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without the digits that would cancel
 
     return rotated

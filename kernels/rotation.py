@@ -5,14 +5,15 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.fused import fused
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def nearest_rotation(precision: str, finite: bool = False) -> Any:
-    """The function F -> W = Q - I with F = Q U; with `finite`, for stretches of up to ten.
+def nearest_rotation(precision: str, finite: bool = False, flush: bool = True) -> Any:
+    """The function F -> W = Q - I with F = Q U; with `finite`, for stretches of up to ten; `flush` suits a CPU.
 
     Higham's iteration Q <- (Q + Q^-T) / 2 (SIAM J. Sci. Stat. Comput. 7 (1986) 1160) acts on the singular values only
     and squares their distance from one. A last step by Newton and Schulz, Q <- Q (I - (Q^T Q - I) / 2), works on W, so
@@ -21,29 +22,33 @@ def nearest_rotation(precision: str, finite: bool = False) -> Any:
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
+    add_matrices = fused(precision).add_matrices
     iterations = 7 if finite else 2 if precision == "mixed" else 3
+    last = 0.5**iterations
 
     @wp.func
     def polar_rotation(F: mat33):
-        Q = F
+        A = F  # 2^n Q, which saves the halves
+        factor = R(1.0)
         for _ in range(wp.static(iterations)):
-            r0 = vec3(Q[0, 0], Q[0, 1], Q[0, 2])
-            r1 = vec3(Q[1, 0], Q[1, 1], Q[1, 2])
-            r2 = vec3(Q[2, 0], Q[2, 1], Q[2, 2])
+            r0 = vec3(A[0, 0], A[0, 1], A[0, 2])
+            r1 = vec3(A[1, 0], A[1, 1], A[1, 2])
+            r2 = vec3(A[2, 0], A[2, 1], A[2, 2])
             k0 = wp.cross(r1, r2)
             k1 = wp.cross(r2, r0)
             k2 = wp.cross(r0, r1)
-            half = R(0.5) / wp.dot(r0, k0)
+            weight = factor / wp.dot(r0, k0)
             cofactor = mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
-            Q = R(0.5) * Q + half * cofactor
-        W = Q - wp.identity(n=3, dtype=R)
+            A = A + weight * cofactor
+            factor = R(4.0) * factor
+        W = R(last) * A - wp.identity(n=3, dtype=R)
         V = W
-        if wp.static(precision == "mixed"):
+        if wp.static(flush and precision == "mixed"):
             # The cube of what is smaller is subnormal, on which CPUs are slow; it needs no correction either.
             for i in range(3):
                 for j in range(3):
                     V[i, j] = wp.where(wp.abs(W[i, j]) < R(1e-12), R(0.0), W[i, j])
-        excess = R(0.5) * (V + wp.transpose(V) + wp.transpose(V) * V)
-        return W - excess - V * excess
+        excess = R(0.5) * add_matrices(V + wp.transpose(V), wp.transpose(V), V)
+        return add_matrices(W - excess, V, -excess)
 
     return polar_rotation

@@ -6,6 +6,8 @@ from typing import Any
 
 import warp as wp
 
+THIRD = 1.0 / 3.0  # a division of two constants in a kernel is one of float32
+
 
 @dataclass(frozen=True)
 class Scalars:

@@ -128,18 +128,30 @@ def wait_for_copies():
 
 @cache
 def row_functions(precision: str, size: int) -> tuple[Any, Any]:
-    """Functions that read and write `size` entries of a column, which lie side by side, two at a time."""
-    R = scalars(precision).real
-    name = "float" if precision == "mixed" else "double"
-    row = wp.types.vector(size, R)
-    pairs = f"{name}2* pair = ({name}2*)wp::address({{}}, first, column);"
-    read = "".join(f"row[{2 * k}] = pair[{k}].x; row[{2 * k + 1}] = pair[{k}].y; " for k in range(size // 2))
-    write = "".join(f"pair[{k}] = make_{name}2(row[{2 * k}], row[{2 * k + 1}]); " for k in range(size // 2))
+    """Functions that read and write `size` entries of a column, which lie side by side, 16 bytes at a time.
 
-    @wp.func_native(f"wp::vec_t<{size}, {name}> row; {pairs.format('value')} {read} return row;")
+    What is written leaves the cache first: it is not read again in this step.
+    """
+    R = scalars(precision).real
+    name, width = ("float", 4) if precision == "mixed" else ("double", 2)
+    row = wp.types.vector(size, R)
+    begin = f"{name}{width}* part = ({name}{width}*)wp::address({{}}, first, column);"
+    parts = [range(k, k + width) for k in range(0, size, width)]
+    read = "".join(
+        f"{{ {name}{width} w = part[{k}]; "
+        + "".join(f"row[{n}] = w.{c}; " for n, c in zip(part, "xyzw", strict=False))
+        + "} "
+        for k, part in enumerate(parts)
+    )
+    write = "".join(
+        f"__stcs(&part[{k}], make_{name}{width}({', '.join(f'row[{n}]' for n in part)})); "
+        for k, part in enumerate(parts)
+    )
+
+    @wp.func_native(f"wp::vec_t<{size}, {name}> row; {begin.format('value')} {read} return row;")
     def read_row(value: wp.array2d(dtype=R), first: int, column: int) -> row: ...
 
-    @wp.func_native(f"{pairs.format('value_out')} {write}")
+    @wp.func_native(f"{begin.format('value_out')} {write}")
     def write_row(row: row, first: int, column: int, value_out: wp.array2d(dtype=R)): ...
 
     return read_row, write_row

@@ -11,10 +11,11 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels import j2
+from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hexahedron import history_functions, stress_function
 from warp_mca.kernels.kinematics import kinematics
-from warp_mca.kernels.rotation import nearest_rotation
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.patterns import mean_frame
+from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -24,7 +25,7 @@ def gradient_function(precision: str, finite: bool) -> Any:
     """The function (X, conn, u, e) -> (W, H, cofactors of the edges as rows, volume): rotation W = Q - I."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    polar_rotation = nearest_rotation(precision, finite)
+    rotated = mean_frame(precision, finite)
 
     @wp.func
     def edge(field: wp.array(dtype=wp.vec3d), i: int, j: int):
@@ -48,12 +49,7 @@ def gradient_function(precision: str, finite: bool) -> Any:
         det = wp.dot(d0, c0)
         inverse = R(1.0) / det
         H = inverse * (wp.outer(l0, c0) + wp.outer(l1, c1) + wp.outer(l2, c2))
-        W = polar_rotation(wp.identity(n=3, dtype=R) + H)
-        Wt = wp.transpose(W)
-        l0 = l0 + Wt * (d0 + l0)
-        l1 = l1 + Wt * (d1 + l1)
-        l2 = l2 + Wt * (d2 + l2)
-        H = inverse * (wp.outer(l0, c0) + wp.outer(l1, c1) + wp.outer(l2, c2))
+        W, H = rotated(H)
         rows = mat33(c0[0], c0[1], c0[2], c1[0], c1[1], c1[2], c2[0], c2[1], c2[2])
         return W, H, rows, det / R(6.0)
 
@@ -111,8 +107,9 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     tet_gradient = gradient_function(precision, finite)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     j2_return = j2.return_map(precision)
+    add_matrices = fused(precision).add_matrices
     k = kinematics(precision, finite)
-    deviator, nominal, cofactor, pressure_of = k.deviator, k.nominal, k.cofactor, k.pressure
+    deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
 
     # ln(1 + x) of small x needs the rounding that fast math gives away
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -145,13 +142,13 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
             flag = yielded_out[e]
             if flag != 0:
                 eps_p, p = read_plastic_strain(history_out, 0, e)
-            S, eps_new, p_new = j2_return(strain, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
+            S, eps_new, p_new = j2_return(S, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
             if p_new > p:
                 write_plastic_strain(history_out, 0, e, eps_new, p_new)
                 if flag == 0:
                     yielded_out[e] = int(1)
-        P = nominal(H, S, N, d) + pressure * cofactor(H)
-        P = (R(-1.0) / R(6.0)) * (P + W * P)
+        P = nominal(H, S, N, d, pressure)
+        P = R(-0.5) * R(THIRD) * add_matrices(P, W, P)
         f0 = P * c[0]
         f1 = P * c[1]
         f2 = P * c[2]

@@ -28,7 +28,7 @@ class Point:
             S_out: wp.array(dtype=mat33),
             w_out: wp.array(dtype=R),
         ):
-            S, eps_new, p_new = j2_return(e[0], eps_p[0], p[0], R(G), R(SIGMA_Y), R(H), beta)
+            S, eps_new, p_new = j2_return(R(2.0) * R(G) * e[0], eps_p[0], p[0], R(G), R(SIGMA_Y), R(H), beta)
             eps_p[0] = eps_new
             p[0] = p_new
             S_out[0] = S
@@ -110,22 +110,29 @@ def test_plastic_energy_is_the_integral_of_stress_over_plastic_strain(beta):
 def test_rounding_of_many_small_steps_does_not_add_up():
     """Sixty thousand steps to and fro: p is what ten strokes add up to, but for what one rounding makes of it."""
     t = scalars("mixed")
-    R, mat33, j2_return = t.real, t.mat33, return_map("mixed")
-    e_yield, reach, steps = SIGMA_Y / (3.0 * G), 5.0, 6_000
+    R, D, mat33, j2_return = t.real, wp.float64, t.mat33, return_map("mixed")
+    e_yield, steps = SIGMA_Y / (3.0 * G), 6_000
+    peak = 5.0 * e_yield
 
     @wp.kernel(enable_backward=False, module="unique")
     def strokes(p_out: wp.array(dtype=R)):
         i = wp.tid()
         eps_p, p = mat33(), R(0.0)
         for k in range(10 * steps + 1):
-            way = R(1.0) - R(2.0) * R((k // steps) % 2)
-            e = way * R(reach * e_yield) * (R(2.0) * R(k % steps) / R(steps) - R(1.0)) * (R(1.0) + R(1e-3) * R(i))
-            if k > steps // 2:  # from rest
-                _, eps_p, p = j2_return(wp.diag(e * wp.vec3(1.0, -0.5, -0.5)), eps_p, p, R(G), R(SIGMA_Y), R(H), R(0.0))
+            way = D(1.0) - D(2.0) * D((k // steps) % 2)
+            e = (
+                way
+                * D(peak)
+                * (D(2.0) * D(k % steps) / D(wp.static(float(steps))) - D(1.0))
+                * (D(1.0) + D(1e-3) * D(i))
+            )
+            if k > wp.static(steps // 2):  # from rest
+                elastic = R(D(2.0) * D(G) * e) * wp.diag(wp.vec3(1.0, -0.5, -0.5))
+                _, eps_p, p = j2_return(elastic, eps_p, p, R(G), R(SIGMA_Y), R(H), R(0.0))
         p_out[i] = p
 
     p = wp.zeros(20, dtype=R, device="cpu")
     wp.launch(strokes, len(p), outputs=[p], device="cpu")
-    amplitude = reach * e_yield * (1.0 + 1e-3 * np.arange(len(p)))
+    amplitude = peak * (1.0 + 1e-3 * np.arange(len(p)))
     exact = ((amplitude - e_yield) + 9.0 * 2.0 * (amplitude - e_yield)) * 3.0 * G / (3.0 * G + H)
     np.testing.assert_allclose(p.numpy(), exact, rtol=3e-7)

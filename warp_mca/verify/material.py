@@ -271,7 +271,7 @@ def yield_surface(setup: Setup) -> list[Row]:
     for precision, rounding in (("mixed", 2.0**-24), ("float64", 2.0**-53)):
         t = scalars(precision)
         numbers = [np.full(count, value) for value in (G, SIGMA_Y, H)]
-        tensor = [wp.array(a, dtype=t.mat33, device=setup.device) for a in (strain, before)]
+        tensor = [wp.array(a, dtype=t.mat33, device=setup.device) for a in (2.0 * G * strain, before)]
         scalar = [wp.array(a, dtype=t.real, device=setup.device) for a in (passed, *numbers, share)]
         found: Any = wp.map(return_map(precision), *tensor, *scalar, device=setup.device)
         S, plastic, p = (np.asarray(item.numpy(), dtype=np.float64) for item in found)

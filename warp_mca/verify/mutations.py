@@ -31,8 +31,8 @@ MUTATIONS: dict[str, Mutation] = {
     "shear_modulus_doubled": Mutation(
         "the deviatoric stress is 4 G e in place of 2 G e",
         "kernels/j2.py",
-        "S = R(2.0) * G * (e - eps_p)",
-        "S = R(4.0) * G * (e - eps_p)",
+        "return elastic - R(2.0) * G * eps_p, eps_p, p_new",
+        "return R(2.0) * (elastic - R(2.0) * G * eps_p), eps_p, p_new",
     ),
     "pressure_halved": Mutation(
         "the pressure of an element is halved",
@@ -125,8 +125,8 @@ MUTATIONS: dict[str, Mutation] = {
     "back_stress_high": Mutation(
         "the back stress is 0.68 (1 - beta) H eps_p in place of two thirds of (1 - beta) H eps_p",
         "kernels/j2.py",
-        "xi = S - (R(2.0) / R(3.0)) * (R(1.0) - beta) * H * eps_p",
-        "xi = S - R(0.68) * (R(1.0) - beta) * H * eps_p",
+        "R(2.0) * R(THIRD) * (R(1.0) - beta) * H",
+        "R(0.68) * (R(1.0) - beta) * H",
     ),
     "isotropic_work_high": Mutation(
         "the plastic work of isotropic hardening is one percent too high",
@@ -155,14 +155,14 @@ MUTATIONS: dict[str, Mutation] = {
     "rotation_to_first_order": Mutation(
         "displacements are turned back without their own part",
         "kernels/hexahedron.py",
-        "u[a] + Wt * (X[a] + u[a])",
-        "u[a] + Wt * X[a]",
+        "add_transposed(u[a], W, X[a] + u[a])",
+        "add_transposed(u[a], W, X[a])",
     ),
     "forces_not_turned_back": Mutation(
         "forces stay in the element's own frame",
         "kernels/hexahedron.py",
-        "f[a] = f[a] + W * f[a]",
-        "f[a] = f[a] + (W - W) * f[a]",
+        "f[a] = add_product(f[a], W, f[a])",
+        "f[a] = add_product(f[a], W - W, f[a])",
     ),
     "rate_force_reversed": Mutation(
         "centrifugal forces of the rigid chain have the wrong sign",
@@ -215,8 +215,8 @@ MUTATIONS: dict[str, Mutation] = {
     "hourglass_reversed": Mutation(
         "hourglass forces of hex8r have the wrong sign",
         "kernels/hex8r.py",
-        "f[3 + n] = f[3 + n] - R(0.125)",
-        "f[3 + n] = f[3 + n] + R(0.125)",
+        "= -add_product(Q[n], W, Q[n])",
+        "= add_product(Q[n], W, Q[n])",
         element="hex8r",
     ),
     "hourglass_stays_elastic": Mutation(
@@ -292,8 +292,8 @@ MUTATIONS: dict[str, Mutation] = {
     "hourglass_feels_strain": Mutation(
         "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
         "kernels/hex8r.py",
-        "left = R(0.125) * (u[3 + m] - H * x[3 + m])",
-        "left = R(0.125) * u[3 + m]",
+        "left = add_product(u[3 + m], H, -x[3 + m])",
+        "left = u[3 + m]",
         element="hex8r",
     ),
     "hex8r_shear_low": Mutation(
@@ -313,7 +313,7 @@ MUTATIONS: dict[str, Mutation] = {
     "tet4_forces_not_turned_back": Mutation(
         "forces of tetrahedra stay in the element's own frame",
         "kernels/tet4.py",
-        "(P + W * P)",
+        "add_matrices(P, W, P)",
         "P",
         element="tet4",
     ),
