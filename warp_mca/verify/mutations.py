@@ -29,10 +29,10 @@ class Mutation:
 
 MUTATIONS: dict[str, Mutation] = {
     "shear_modulus_doubled": Mutation(
-        "the deviatoric stress is 4 G e in place of 2 G e",
+        "the return map takes 4 G e for the deviatoric stress in place of 2 G e",
         "kernels/j2.py",
-        "return elastic - R(2.0) * G * eps_p, eps_p, p_new",
-        "return R(2.0) * (elastic - R(2.0) * G * eps_p), eps_p, p_new",
+        "xi = elastic - (R(2.0) * G",
+        "xi = R(2.0) * elastic - (R(4.0) * G",
     ),
     "pressure_halved": Mutation(
         "the pressure of an element is halved",
