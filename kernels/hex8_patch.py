@@ -181,7 +181,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
     load_points, load_displacements, load_corners = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
-    element_rotation, local_displacement = frame_functions(precision, flush=False)
+    element_rotation, local_displacement = frame_functions(precision)
     elastic_forces = elastic_function(precision)
     add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
     to_point_lines, to_corners, lane_sum = lane_functions(precision)

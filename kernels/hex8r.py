@@ -112,7 +112,7 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def element_functions(precision: str, plastic: bool, finite: bool, flush: bool = True) -> tuple[Any, Any, Any]:
+def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
@@ -121,7 +121,7 @@ def element_functions(precision: str, plastic: bool, finite: bool, flush: bool =
     R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
     add_product, add_matrices = fused(precision).add_product, fused(precision).add_matrices
     _, to_corners = pattern_functions(precision)
-    rotated = mean_frame(precision, finite, flush)
+    rotated = mean_frame(precision, finite)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)

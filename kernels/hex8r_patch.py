@@ -47,7 +47,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, finite=False, flush=False)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, False)
 
     @wp.kernel(
         enable_backward=False,

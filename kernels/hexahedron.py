@@ -117,12 +117,12 @@ def line_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def frame_functions(precision: str, finite: bool = False, flush: bool = True) -> tuple[Any, Any]:
+def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
     """Functions that take an element to its rotated frame: (rotation as W = Q - I, local displacements)."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
     edges, _ = line_functions(precision)
-    polar_rotation = nearest_rotation(precision, finite, flush)
+    polar_rotation = nearest_rotation(precision, finite)
     add_transposed = fused(precision).add_transposed
 
     @wp.func

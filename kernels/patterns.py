@@ -131,11 +131,11 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def mean_frame(precision: str, finite: bool = False, flush: bool = True) -> Any:
+def mean_frame(precision: str, finite: bool = False) -> Any:
     """The function H -> (rotation of the mean deformation gradient I + H as W = Q - I, H in the rotated frame)."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    polar_rotation = nearest_rotation(precision, finite, flush)
+    polar_rotation = nearest_rotation(precision, finite)
     add_matrices = fused(precision).add_matrices
 
     @wp.func

@@ -12,8 +12,8 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def nearest_rotation(precision: str, finite: bool = False, flush: bool = True) -> Any:
-    """The function F -> W = Q - I with F = Q U; with `finite`, for stretches of up to ten; `flush` suits a CPU.
+def nearest_rotation(precision: str, finite: bool = False) -> Any:
+    """The function F -> W = Q - I with F = Q U; with `finite`, for stretches of up to ten.
 
     Higham's iteration Q <- (Q + Q^-T) / 2 (SIAM J. Sci. Stat. Comput. 7 (1986) 1160) acts on the singular values only
     and squares their distance from one. A last step by Newton and Schulz, Q <- Q (I - (Q^T Q - I) / 2), works on W, so
@@ -42,13 +42,7 @@ def nearest_rotation(precision: str, finite: bool = False, flush: bool = True) -
             A = A + weight * cofactor
             factor = R(4.0) * factor
         W = R(last) * A - wp.identity(n=3, dtype=R)
-        V = W
-        if wp.static(flush and precision == "mixed"):
-            # The cube of what is smaller is subnormal, on which CPUs are slow; it needs no correction either.
-            for i in range(3):
-                for j in range(3):
-                    V[i, j] = wp.where(wp.abs(W[i, j]) < R(1e-12), R(0.0), W[i, j])
-        excess = R(0.5) * add_matrices(V + wp.transpose(V), wp.transpose(V), V)
-        return add_matrices(W - excess, V, -excess)
+        excess = R(0.5) * add_matrices(W + wp.transpose(W), wp.transpose(W), W)
+        return add_matrices(W - excess, W, -excess)
 
     return polar_rotation

@@ -1,10 +1,12 @@
 """Threads: the same figures for any number of them, bad numbers, and failures while they run."""
 
 import os
+import platform
 import threading
 
 import numpy as np
 import pytest
+import warp as wp
 
 import warp_mca as mca
 from warp_mca import solver, threads
@@ -112,3 +114,53 @@ def test_threads_end_with_their_pool():
     for worker in workers:
         worker.join(timeout=10.0)
         assert not worker.is_alive()
+
+
+def smallest() -> float:
+    """A subnormal number, made here and now."""
+    return float(np.float32(1e-38) * np.float32(0.1))
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="other processors are not told")
+def test_subnormal_numbers_are_zero_in_steps_and_nowhere_else():
+    assert smallest() > 0.0
+    flush, outer = threads.Flush(), threads.Flush()
+    with flush:
+        assert smallest() == 0.0
+    assert smallest() > 0.0
+    with outer:
+        with flush:
+            pass
+        assert smallest() == 0.0  # as it was before
+    with pytest.raises(KeyError), flush:
+        raise KeyError
+    assert smallest() > 0.0
+    pool, found = threads.Pool(2), {}
+    meet = threading.Barrier(2)
+
+    def task() -> None:
+        meet.wait(10.0)  # so that each thread takes one
+        found[threading.current_thread().name] = smallest()
+
+    pool.run([task, task])
+    pool.close()
+    assert sorted(value > 0.0 for value in found.values()) == [False, True]  # a worker's, and that of this thread
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="other processors are not told")
+@pytest.mark.parametrize("count", [1, 2])
+def test_steps_take_subnormal_numbers_for_zero(count, monkeypatch):
+    """Each replay of a step's graphs does, and leaves the thread as it was."""
+    seen = []
+    replay = wp.capture_launch
+
+    def watched(*args: object, **more: object) -> None:
+        seen.append(smallest())
+        replay(*args, **more)
+
+    monkeypatch.setattr(wp, "capture_launch", watched)
+    monkeypatch.setattr(threads, "_task", lambda graph: lambda: watched(graph))
+    mca.run(scene(), threads=count)
+    assert len(seen) > 10
+    assert set(seen) == {0.0}
+    assert smallest() > 0.0

@@ -18,6 +18,7 @@ in ranges, which threads compute side by side.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,13 +30,13 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
-from warp_mca.kernels import constraint, contact, ledger, node, output
+from warp_mca.kernels import constraint, contact, ledger, node, output, subnormals
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
 from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
 from warp_mca.model import Model
 from warp_mca.threads import ELEMENTS as RANGE
-from warp_mca.threads import NODES, Pool, Split, Stages, whole
+from warp_mca.threads import NODES, Flush, Pool, Split, Stages, whole
 
 if TYPE_CHECKING:
     from warp_mca.output import Output
@@ -79,6 +80,7 @@ class Solver:
         largest = max(block.conn.shape[1] for block in model.blocks)
         self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
         self.pool = Pool(self.threads) if self.threads > 1 else None
+        self._flushed: Flush | None = None
         self.output: Output | None = None
 
     def _allocate(self) -> None:
@@ -220,15 +222,24 @@ class Solver:
                 with wp.ScopedCapture() as capture:
                     body()
                 self.graphs[name] = capture.graph
-            wp.capture_launch(self.graphs[name])
+            with self._flush():
+                wp.capture_launch(self.graphs[name])
 
     def _replay(self, pool: Pool, name: str, body: Callable[[Split], None], count: int = 1) -> None:
         """Replay the stages `name`, captured from `body` at their first use, `count` times with all threads."""
         with wp.ScopedDevice(self.device):
             if name not in self.stages:
                 self.stages[name] = Stages(self.threads, body)
-            for _ in range(count):
-                self.stages[name].replay(pool)
+            with self._flush():
+                for _ in range(count):
+                    self.stages[name].replay(pool)
+
+    def _flush(self) -> AbstractContextManager[object]:
+        """Where a CPU takes subnormal numbers for zero; a GPU does anyway."""
+        if self.side:
+            return nullcontext()
+        self._flushed = self._flushed or Flush()
+        return self._flushed
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
@@ -246,6 +257,7 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         sums = [ledger.record_motion, contact.sum_springs, self.sum_elements_kernel]
         sums += [output.nodal_stress] if self._shows_stress else []
+        sums += [] if self.side else [subnormals.begin_flush]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if self._shows_stress]
         nodes = [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]

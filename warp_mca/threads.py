@@ -20,6 +20,7 @@ import warp as wp
 
 from warp_mca.errors import bad_value
 from warp_mca.kernels.lanes import LANES
+from warp_mca.kernels.subnormals import begin_flush, end_flush
 
 Task = Callable[[], object]
 Launch = Callable[[slice], None]  # of the elements or nodes of a range
@@ -45,6 +46,22 @@ def thread_count(threads: int | None) -> int:
 def whole(count: int, launch: Launch, least: int) -> None:
     """Launch everything at once."""
     launch(slice(0, count))
+
+
+class Flush:
+    """While it is entered, subnormal numbers are zero in the present thread of a CPU."""
+
+    def __init__(self) -> None:
+        """Load the kernels."""
+        before, until_now = (wp.zeros(1, dtype=wp.bool, device="cpu") for _ in range(2))
+        self._begin: Any = wp.launch(begin_flush, 1, outputs=[before], device="cpu", record_cmd=True)
+        self._end: Any = wp.launch(end_flush, 1, inputs=[before], outputs=[until_now], device="cpu", record_cmd=True)
+
+    def __enter__(self) -> None:
+        self._begin.launch()
+
+    def __exit__(self, *_: object) -> None:
+        self._end.launch()
 
 
 class Pool:
@@ -102,8 +119,12 @@ def _taken(tasks: deque[Task]) -> Iterator[Task]:
 
 
 def _work(inbox: SimpleQueue[deque[Task] | None], done: SimpleQueue[BaseException | None]) -> None:
+    flush: Flush | None = None
     while (tasks := inbox.get()) is not None:
         try:
+            if not flush:
+                flush = Flush()
+                flush.__enter__()  # for good: the thread does nothing else
             for task in _taken(tasks):
                 task()
                 done.put(None)
