@@ -6,9 +6,12 @@ import math
 import statistics
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import warp as wp
+
+from warp_mca.threads import Flush
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,13 @@ def captured(body: Callable[[], None], count: int, device: str) -> Callable[[], 
         with wp.ScopedCapture() as capture:
             for _ in range(count):
                 body()
-    return lambda: wp.capture_launch(capture.graph)
+    flush = nullcontext() if wp.get_device(device).is_cuda else Flush()
+
+    def replay() -> None:
+        with flush:
+            wp.capture_launch(capture.graph)
+
+    return replay
 
 
 def steps_per_graph(seconds: float, care: Care) -> int:

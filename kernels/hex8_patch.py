@@ -298,7 +298,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
                     f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], R(scale) * law[m, 1])
                     keep_forces(forces, lane, f)
                     if wp.static(plastic):
-                        if R(1.5) * largest > R(scale * scale) * law[m, 2] * law[m, 2]:
+                        if R(1.5) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
                             flows = bool(True)
                             yielded_out[e] = 1
                 if wp.static(plastic):

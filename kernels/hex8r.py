@@ -36,7 +36,10 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
 
     @wp.func
     def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
-        """What the mean displacement gradient H leaves of the hourglass patterns, one row for each, in frame W."""
+        """What the mean displacement gradient H leaves of the sums over patterns, one row for each, in frame W.
+
+        Eight times the amplitudes of docs/theory.md; forces are conjugate to these.
+        """
         q = mat43()
         for m in range(4):
             left = add_product(u[3 + m], H, -x[3 + m])

@@ -1,37 +1,48 @@
 """Owns what a CPU makes of numbers too small to have all their digits: zeros, while it computes steps.
 
-Ahead of a wave float32 leaves such numbers, on which x86-64 is ten times slower; a GPU takes them for zero as well.
+Ahead of a wave float32 leaves such numbers, on which x86-64 is many times slower. Kernels of a GPU that use fast math
+take them for zero as well.
 """
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-# Bits of x86-64's MXCSR: results that are subnormal become zero, and so do operands. Each thread has its own.
-_SET = """
-#if defined(__x86_64__) && !defined(__CUDA_ARCH__)
-    unsigned before = __builtin_ia32_stmxcsr();
-    __builtin_ia32_ldmxcsr(flush ? before | 0x8040u : before & ~0x8040u);
-    return (before & 0x8040u) == 0x8040u;
-#else
-    return flush;
-#endif
-"""
+# Of x86-64's MXCSR, which each thread has to itself: results that are subnormal become zero, and so do operands.
+_FLUSH = "0x8040u"
 
 
-@wp.func_native(_SET)
-def set_flush(flush: wp.bool) -> wp.bool:
-    """Whether the present thread takes subnormal numbers for zero from now on; returns whether it did."""
+def _exchange(wanted: str) -> str:
+    return f"""
+    #if defined(__x86_64__) && !defined(__CUDA_ARCH__)
+        unsigned before = __builtin_ia32_stmxcsr();
+        __builtin_ia32_ldmxcsr({wanted});
+        return before;
+    #else
+        return 0;
+    #endif
+    """
+
+
+@wp.func_native(_exchange(f"before | {_FLUSH}"))
+def flush() -> wp.uint32:
+    """Subnormal numbers are zero in the present thread from now on; returns its mode until now."""
+    ...
+
+
+@wp.func_native(_exchange("mode"))
+def set_mode(mode: wp.uint32) -> wp.uint32:
+    """The mode of the present thread; returns that until now."""
     ...
 
 
 @wp.kernel(enable_backward=False, grid_stride=False)
-def begin_flush(before_out: wp.array(dtype=wp.bool)):
+def begin_flush(before_out: wp.array(dtype=wp.uint32)):
     """Subnormal numbers are zero in this thread."""
-    before_out[0] = set_flush(True)
+    before_out[0] = flush()
 
 
 @wp.kernel(enable_backward=False, grid_stride=False)
-def end_flush(before: wp.array(dtype=wp.bool), flushed_out: wp.array(dtype=wp.bool)):
-    """They are what they were before `begin_flush`; whether they were zero until now."""
-    flushed_out[0] = set_flush(before[0])
+def end_flush(before: wp.array(dtype=wp.uint32), flushed_out: wp.array(dtype=wp.uint32)):
+    """This thread's mode is what it was before `begin_flush`; and what it was until now."""
+    flushed_out[0] = set_mode(before[0])

@@ -235,7 +235,7 @@ class Solver:
                     self.stages[name].replay(pool)
 
     def _flush(self) -> AbstractContextManager[object]:
-        """Where a CPU takes subnormal numbers for zero; a GPU does anyway."""
+        """Where a CPU takes subnormal numbers for zero; fast math on a GPU does anyway."""
         if self.side:
             return nullcontext()
         self._flushed = self._flushed or Flush()

@@ -49,11 +49,11 @@ def whole(count: int, launch: Launch, least: int) -> None:
 
 
 class Flush:
-    """While it is entered, subnormal numbers are zero in the present thread of a CPU."""
+    """While it is entered, subnormal numbers are zero in the present thread of a CPU; it is not entered twice."""
 
     def __init__(self) -> None:
         """Load the kernels."""
-        before, until_now = (wp.zeros(1, dtype=wp.bool, device="cpu") for _ in range(2))
+        before, until_now = (wp.zeros(1, dtype=wp.uint32, device="cpu") for _ in range(2))
         self._begin: Any = wp.launch(begin_flush, 1, outputs=[before], device="cpu", record_cmd=True)
         self._end: Any = wp.launch(end_flush, 1, inputs=[before], outputs=[until_now], device="cpu", record_cmd=True)
 
@@ -68,16 +68,23 @@ class Pool:
     """Worker threads that share the tasks of a stage with the thread that calls; a task that fails ends them."""
 
     def __init__(self, threads: int) -> None:
-        """Start `threads` - 1 of them."""
+        """Make ready for `threads` - 1 of them, which start with the first tasks."""
         self._done: SimpleQueue[BaseException | None] = SimpleQueue()
         self._inboxes: list[SimpleQueue[deque[Task] | None]] = [SimpleQueue() for _ in range(threads - 1)]
+        self._workers: list[threading.Thread] = []
+        self._finalizer = weakref.finalize(self, _stop, self._inboxes)
+
+    def _start(self) -> None:
+        """Start the threads and wait until they are ready: Warp may not launch anything while another captures."""
         self._workers = [
-            threading.Thread(target=_work, args=(inbox, self._done), name=f"warp_mca-{k}", daemon=True)
+            threading.Thread(target=_work, args=(Flush(), inbox, self._done), name=f"warp_mca-{k}", daemon=True)
             for k, inbox in enumerate(self._inboxes, 1)
         ]
         for worker in self._workers:
             worker.start()
-        self._finalizer = weakref.finalize(self, _stop, self._inboxes)
+        for _ in self._workers:
+            if error := self._done.get():
+                raise error
 
     def run(self, tasks: Sequence[Task]) -> None:
         """Carry out the tasks, in any order, and return when all are done.
@@ -87,6 +94,8 @@ class Pool:
         """
         shared = deque(tasks)
         try:
+            if not self._workers:
+                self._start()
             for inbox in self._inboxes[: len(tasks) - 1]:
                 inbox.put(shared)
             left = len(tasks)
@@ -118,13 +127,15 @@ def _taken(tasks: deque[Task]) -> Iterator[Task]:
         yield task
 
 
-def _work(inbox: SimpleQueue[deque[Task] | None], done: SimpleQueue[BaseException | None]) -> None:
-    flush: Flush | None = None
+def _work(flush: Flush, inbox: SimpleQueue[deque[Task] | None], done: SimpleQueue[BaseException | None]) -> None:
+    try:
+        flush.__enter__()  # for good: the thread does nothing else
+    except BaseException as error:
+        done.put(error)
+        return
+    done.put(None)
     while (tasks := inbox.get()) is not None:
         try:
-            if not flush:
-                flush = Flush()
-                flush.__enter__()  # for good: the thread does nothing else
             for task in _taken(tasks):
                 task()
                 done.put(None)

@@ -30,8 +30,8 @@ class ElementStage:
         block: the host side.
         conn, material: as in `Block`.
         yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
-        history: plastic strain and equivalent plastic strain of each point in turn, then what the element keeps more;
-            empty where elastic.
+        history: plastic strain and equivalent plastic strain of each point, in the order of
+            `kernels.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
     """
