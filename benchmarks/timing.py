@@ -6,12 +6,11 @@ import math
 import statistics
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 import warp as wp
 
-from warp_mca.threads import Flush
+from warp_mca.threads import flushing
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def captured(body: Callable[[], None], count: int, device: str) -> Callable[[], 
         with wp.ScopedCapture() as capture:
             for _ in range(count):
                 body()
-    flush = nullcontext() if wp.get_device(device).is_cuda else Flush()
+    flush = flushing(device)
 
     def replay() -> None:
         with flush:

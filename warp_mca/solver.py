@@ -18,7 +18,7 @@ in ranges, which threads compute side by side.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,7 +36,7 @@ from warp_mca.layout import layout_of
 from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
 from warp_mca.model import Model
 from warp_mca.threads import ELEMENTS as RANGE
-from warp_mca.threads import NODES, Flush, Pool, Split, Stages, whole
+from warp_mca.threads import NODES, Pool, Split, Stages, flushing, whole
 
 if TYPE_CHECKING:
     from warp_mca.output import Output
@@ -80,7 +80,7 @@ class Solver:
         largest = max(block.conn.shape[1] for block in model.blocks)
         self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
         self.pool = Pool(self.threads) if self.threads > 1 else None
-        self._flushed: Flush | None = None
+        self._flushing: AbstractContextManager[object] | None = None
         self.output: Output | None = None
 
     def _allocate(self) -> None:
@@ -235,11 +235,9 @@ class Solver:
                     self.stages[name].replay(pool)
 
     def _flush(self) -> AbstractContextManager[object]:
-        """Where a CPU takes subnormal numbers for zero; fast math on a GPU does anyway."""
-        if self.side:
-            return nullcontext()
-        self._flushed = self._flushed or Flush()
-        return self._flushed
+        """Made at its first use, when `compile` has loaded what it needs."""
+        self._flushing = self._flushing or flushing(self.device)
+        return self._flushing
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
