@@ -55,7 +55,7 @@ def step_bytes(held: Held) -> float:
             total += size(stage.conn) + 2 * 24 * nodes + 2 * size(stage.growth) + size(stage.element)
             total += size(stage.offset) + size(stage.inverse_volume) + 2 * size(stage.dilation)
             total += size(stage.group)
-    total += size(s.force) + size(s.slot) + size(s.offset)
+    total += size(s.force) + size(s.near) + size(s.more)
     return total + (8 + 4 * 24) * nodes  # inverse mass; u and v read and written
 
 

@@ -105,8 +105,8 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
     def advance_bound(
         mass: wp.array(dtype=wp.float64),
         inverse_mass: wp.array(dtype=wp.float64),
-        offset: wp.array(dtype=wp.int32),
-        slot: wp.array(dtype=wp.int32),
+        near: wp.array(dtype=wp.vec2i),
+        more: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
         scene: Index,
@@ -116,6 +116,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
+        v_before_out: wp.array(dtype=wp.vec3d),
         impulse_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
@@ -128,18 +129,22 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
             i = bonds.first[k]
         else:
             i = bonds.node[k - pairs]
-        total = gather(offset[i], offset[i + 1], slot, force)
+        total = gather(near[i], more, force)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         free = v_out[i] + dt * a
         u_free = u_out[i] + dt * free
+        if v_before_out.shape[0] > 0:
+            v_before_out[i] = v_out[i]
         u = wp.vec3d()
         v = wp.vec3d()
         if k < pairs:
             j = bonds.second[k]
             if j >= 0:
-                total = gather(offset[j], offset[j + 1], slot, force)
+                if v_before_out.shape[0] > 0:
+                    v_before_out[j] = v_out[j]
+                total = gather(near[j], more, force)
                 if wp.static(contact):
                     total += take_contact(j, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))

@@ -8,7 +8,7 @@ import warp as wp
 from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
-from warp_mca.kernels.projection import interpolate, project
+from warp_mca.kernels.projection import interpolate, project, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
 from warp_mca.surfaces import LIST_LENGTH
@@ -16,7 +16,7 @@ from warp_mca.surfaces import LIST_LENGTH
 wp.set_module_options({"enable_backward": False})
 
 BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
-LANES = 4  # of a GPU for each master: faces that it looks at side by side
+SLAVE_LANES, MASTER_LANES = 2, 4  # of a GPU for each node: faces that it looks at side by side
 
 # A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
 _EDGE_REACH = 1.02
@@ -58,18 +58,18 @@ def spring_function(friction: bool) -> Any:
         depth = spring.depth[s]
         Fn = -k * gap
         force = Fn * normal
-        energy = wp.float64(0.5) * Fn * Fn / k
+        squares = Fn * Fn
         if wp.static(friction):
             friction_work = spring.friction[s]
             stick_impulse = spring.stick_impulse[s]
             Ft, work, stick = stick_slip(spring.tangential[s], du, normal, mu * Fn, k)
             force += Ft
-            energy += wp.float64(0.5) * wp.dot(Ft, Ft) / k
+            squares += wp.dot(Ft, Ft)
             spring.tangential[s] = Ft
             spring.friction[s] = friction_work + work
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
                 spring.stick_impulse[s] = stick_impulse + Fn
-        spring.energy[s] = energy
+        spring.energy[s] = wp.float64(0.5) * squares / k
         spring.force[s] = force
         spring.impulse[s] = impulse + force
         spring.normal_impulse[s] = normal_impulse + Fn
@@ -104,14 +104,30 @@ def master_velocity(
 
 
 @cache
-def surface_kernel(friction: bool, each: bool) -> Any:
+def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
 
-    With `each`, scenes of a batch have values of their own, and slaves know their scene.
+    With `each`, scenes of a batch have values of their own, and slaves know their scene. With more `lanes`, on a GPU,
+    so many candidates of a slave are looked at side by side.
     """
     press = spring_function(friction)
+    _, exchange = shared_functions("float64")
     open_contact = open_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
+
+    @wp.func
+    def shallowest(best: int, gap: wp.float64):
+        """Of the faces that the lanes of a slave have found the one that wins, -1 where none has any."""
+        winner = wp.float64(best)
+        for step in range(wp.static(lanes.bit_length() - 1)):
+            other = exchange(winner, 1 << step)
+            other_gap = exchange(gap, 1 << step)
+            if other >= wp.float64(0.0) and (
+                winner < wp.float64(0.0) or other_gap > gap or (other_gap == gap and other < winner)
+            ):
+                winner = other
+                gap = other_gap
+        return int(winner)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
     def touch_surface(
@@ -132,17 +148,19 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        s = wp.tid()
+        lane = wp.tid() % wp.static(lanes)
+        s = wp.tid() // wp.static(lanes)
         i = slave[s]
         k = of(scene, s)
-        f = candidate[s, 0]  # read before it is known whether there is one: memory answers late
+        f = candidate[s, lane]  # read before it is known whether there is one: memory answers late
         best = int(-1)
         best_gap = wp.float64(0.0)
-        best_size = wp.float64(0.0)
+        best_area = wp.float64(0.0)
         best_normal = wp.vec3d()
-        best_weight = wp.vec4d()
+        best_at = wp.vec2d()
+        best_triangle = bool(False)
         x = X[i] + u[i]
-        for c in range(count[s]):
+        for c in range(lane, count[s], wp.static(lanes)):
             i0 = face[f, 0]
             i1 = face[f, 1]
             i2 = face[f, 2]
@@ -152,33 +170,37 @@ def surface_kernel(friction: bool, each: bool) -> Any:
             p1 = X[i1] + u[i1] - x
             p2 = X[i2] + u[i2] - x
             p3 = X[i3] + u[i3] - x
-            inside, w, area_normal = project(wp.vec3d(), p0, p1, p2, p3, i2 == i3, wp.float64(_EDGE_REACH))
+            inside, at, away, area_normal = project(p0, p1, p2, p3, i2 == i3, wp.float64(_EDGE_REACH))
             if inside:
-                area = wp.length(area_normal)
-                normal = area_normal / area
-                gap = -wp.dot(interpolate(w, p0, p1, p2, p3), normal)
-                size = wp.float64(2.0) * wp.sqrt(area)
-                if gap < wp.float64(0.0) and gap > -size:
+                area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
+                normal = (wp.float64(1.0) / area) * area_normal
+                gap = wp.dot(away, normal)
+                if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area:
                     # the shallowest face wins; the lower number at a tie, whatever the order of the search
                     if best < 0 or gap > best_gap or (gap == best_gap and f < best):
                         best = f
                         best_gap = gap
                         best_normal = normal
-                        best_weight = w
-                        best_size = size
-            f = candidate[s, wp.min(c + 1, wp.static(LIST_LENGTH - 1))]
-        if best >= 0:
-            if best_gap < wp.float64(-0.5) * best_size:
+                        best_at = at
+                        best_triangle = i2 == i3
+                        best_area = area
+            f = candidate[s, wp.min(c + wp.static(lanes), wp.static(LIST_LENGTH - 1))]
+        first = best
+        if wp.static(lanes > 1):
+            first = shallowest(best, best_gap)
+        if best >= 0 and best == first:
+            if best_gap * best_gap > best_area:
                 flag_out[k, TOO_DEEP] = 1
-            du = dt * (v[i] - master_velocity(v, face, best, best_weight))
+            weight = weights_at(best_at, best_triangle)
+            du = dt * (v[i] - master_velocity(v, face, best, weight))
             force = press(s, best_gap, best_normal, du, stiffness[s], of(mu, k), spring)
             spring.face[s] = best
-            spring.weight[s] = best_weight
+            spring.weight[s] = weight
             contact_force_out[i] = contact_force_out[i] + force
-        elif spring.face[s] >= 0:
+        elif first < 0 and lane == 0 and spring.face[s] >= 0:
             du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
             open_contact(s, du, stiffness[s], spring)
-        if moved_too_far(u[i], u_search[i], of(margin, k)):
+        if lane == 0 and moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
     return touch_surface

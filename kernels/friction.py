@@ -40,4 +40,4 @@ def release(f_old: wp.vec3d, du: wp.vec3d, k: wp.float64) -> wp.float64:
 
     It is the dissipation of `stick_slip` for a limit of zero.
     """
-    return wp.float64(0.5) * wp.dot(f_old, f_old / k - du)
+    return wp.float64(0.5) * (wp.dot(f_old, f_old) / k - wp.dot(f_old, du))

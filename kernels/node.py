@@ -17,15 +17,32 @@ TOUCHABLE = 16  # it belongs to a surface of a contact
 
 @cache
 def gather_function(precision: str) -> Any:
-    """The function that sums the forces of elements on a node, in slots [begin, end)."""
+    """The function that sums the forces of elements on a node, in the slots that `near` and `more` list.
+
+    Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`.
+    """
     vec3 = scalars(precision).vec3
 
     @wp.func
-    def gather(begin: int, end: int, slot: wp.array(dtype=wp.int32), force: wp.array(dtype=vec3)):
-        total = wp.vec3d()
-        for j in range(begin, end):
-            f = force[slot[j]]
-            total += wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
+    def force_at(slot: int, force: wp.array(dtype=vec3)):
+        f = force[slot]
+        return wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
+
+    @wp.func
+    def gather(pair: wp.vec2i, more: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
+        total = force_at(pair[0], force)
+        second = force_at(wp.max(pair[1], 0), force)
+        if pair[1] >= 0:
+            total += second
+        row = -2 - pair[1]
+        while row >= 0:
+            r = more[row]
+            total += force_at(r[0], force)
+            if r[1] >= 0:
+                total += force_at(r[1], force)
+            if r[2] >= 0:
+                total += force_at(r[2], force)
+            row = r[3]
         return total
 
     return gather
@@ -53,8 +70,8 @@ def hold(role: int, a: wp.vec3d):
 def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = False, each: bool = False) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
-    Each node sums its element forces in the fixed order of a compressed list, so that runs repeat bit for bit.
-    `fixed`: some axes are at rest; `bound`: some nodes are left to `constraint.bound_kernel`.
+    Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
+    where it is not empty. `fixed`: some axes are at rest; `bound`: some nodes are left to `constraint.bound_kernel`.
     With `each`, gravity differs between the scenes of a batch, and nodes know their scene.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
@@ -64,8 +81,8 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
         inverse_mass: wp.array(dtype=wp.float64),
-        offset: wp.array(dtype=wp.int32),
-        slot: wp.array(dtype=wp.int32),
+        near: wp.array(dtype=wp.vec2i),
+        more: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
         scene: Index,
@@ -75,12 +92,13 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
         contact_force_out: wp.array(dtype=wp.vec3d),
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
+        v_before_out: wp.array(dtype=wp.vec3d),
     ):
         i = wp.tid()
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(offset[i], offset[i + 1], slot, force)
+        total = gather(near[i], more, force)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)
@@ -88,6 +106,8 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
         if wp.static(fixed):
             a = hold(int(role[i]), a)
         v = v_out[i] + kick * a
+        if v_before_out.shape[0] > 0:
+            v_before_out[i] = v_out[i]
         v_out[i] = v
         u_out[i] = u_out[i] + drift * v
 

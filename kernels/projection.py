@@ -19,20 +19,23 @@ def shape(xi: wp.float64, eta: wp.float64) -> wp.vec4d:
 
 
 @wp.func
-def triangle_weights(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec4d:
-    """Area coordinates of the point of the (extended) triangle nearest to x; the last is 0."""
-    ab = b - a
-    ac = c - a
-    ax = x - a
+def weights_at(at: wp.vec2d, triangle: bool) -> wp.vec4d:
+    """Weights of the corners at natural coordinates of a face, or at those of a triangle, whose last is 0."""
+    if triangle:
+        return wp.vec4d(wp.float64(1.0) - at[0] - at[1], at[0], at[1], wp.float64(0.0))
+    return shape(at[0], at[1])
+
+
+@wp.func
+def triangle_coordinates(ax: wp.vec3d, ab: wp.vec3d, ac: wp.vec3d) -> wp.vec2d:
+    """Second and third area coordinate of the point of the (extended) triangle nearest to the point at `ax` from a."""
     d00 = wp.dot(ab, ab)
     d01 = wp.dot(ab, ac)
     d11 = wp.dot(ac, ac)
     d20 = wp.dot(ax, ab)
     d21 = wp.dot(ax, ac)
     inverse = wp.float64(1.0) / (d00 * d11 - d01 * d01)
-    s = inverse * (d11 * d20 - d01 * d21)
-    t = inverse * (d00 * d21 - d01 * d20)
-    return wp.vec4d(wp.float64(1.0) - s - t, s, t, wp.float64(0.0))
+    return wp.vec2d(inverse * (d11 * d20 - d01 * d21), inverse * (d00 * d21 - d01 * d20))
 
 
 @wp.func
@@ -42,35 +45,38 @@ def interpolate(w: wp.vec4d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d)
 
 
 @wp.func
-def face_tangents(xi: wp.float64, eta: wp.float64, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d):
-    """Derivatives of the position along xi and eta."""
-    one = wp.float64(1.0)
+def bilinear(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d):
+    """Vectors m, e, f, t of the face m + xi e + eta f + xi eta t with these corners."""
     q = wp.float64(0.25)
-    along_xi = q * ((one - eta) * (b - a) + (one + eta) * (c - d))
-    along_eta = q * ((one - xi) * (d - a) + (one + xi) * (c - b))
-    return along_xi, along_eta
+    ac = a + c
+    bd = b + d
+    across = c - a
+    other = b - d
+    return q * (ac + bd), q * (across + other), q * (across - other), q * (ac - bd)
 
 
 @wp.func
-def closest_point(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d) -> wp.vec2d:
-    """Natural coordinates of the point of the (extended) face nearest to x, by Newton's method.
+def closest_point(r0: wp.vec3d, e: wp.vec3d, f: wp.vec3d, t: wp.vec3d) -> wp.vec2d:
+    """Natural coordinates of the point of the (extended) face nearest to the point at r0 from its middle.
 
-    At most six iterations: it is quadratic, and exact in one on a parallelogram. Iterates stay within [-2, 2].
+    Newton's method, at most six iterations: it is quadratic, and exact in one on a parallelogram. Iterates stay within
+    [-2, 2]. `e`, `f`, `t` are as `bilinear` has them.
     """
     xi = wp.float64(0.0)
     eta = wp.float64(0.0)
-    twist = wp.float64(0.25) * (a - b + c - d)
     for _ in range(6):
-        along_xi, along_eta = face_tangents(xi, eta, a, b, c, d)
-        r = x - interpolate(shape(xi, eta), a, b, c, d)
+        along_xi = e + eta * t
+        along_eta = f + xi * t
+        r = r0 - xi * e - eta * along_eta
         g0 = wp.dot(r, along_xi)
         g1 = wp.dot(r, along_eta)
         h00 = wp.dot(along_xi, along_xi)
         h11 = wp.dot(along_eta, along_eta)
-        h01 = wp.dot(along_xi, along_eta) - wp.dot(r, twist)
+        flat = wp.dot(along_xi, along_eta)
+        h01 = flat - wp.dot(r, t)
         det = h00 * h11 - h01 * h01
         if det <= wp.float64(0.0):  # far from the face the curvature term can spoil the matrix: leave it out
-            h01 = wp.dot(along_xi, along_eta)
+            h01 = flat
             det = h00 * h11 - h01 * h01
         two = wp.float64(2.0)
         inverse = wp.float64(1.0) / det
@@ -79,23 +85,29 @@ def closest_point(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3
         moved = wp.abs(xi_new - xi) + wp.abs(eta_new - eta)
         xi = xi_new
         eta = eta_new
-        if moved < wp.float64(1e-9):  # the next step would be its square
+        if moved < wp.float64(1e-7):  # the next step would be its square
             break
     return wp.vec2d(xi, eta)
 
 
 @wp.func
-def project(x: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, triangle: bool, reach: wp.float64):
-    """Nearest point of a face: whether it lies within `reach` of its half size, weights, a quarter of its area vector.
+def project(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, triangle: bool, reach: wp.float64):
+    """The nearest point of a face to the origin of its corners' coordinates.
 
-    A triangle has its last corner twice; coordinates that run along its edges then have no inverse there.
+    Returns whether it lies within `reach` of the face's half size, its coordinates as `weights_at` takes them, the
+    vector from it to the origin, and a quarter of the face's area vector. A triangle has its last corner twice;
+    coordinates that run along its edges then have no inverse there.
     """
     if triangle:
-        w = triangle_weights(x, a, b, c)
-        least = wp.min(w[0], wp.min(w[1], w[2]))
+        ab = b - a
+        ac = c - a
+        at = triangle_coordinates(-a, ab, ac)
+        least = wp.min(at[0], wp.min(at[1], wp.float64(1.0) - at[0] - at[1]))
         inside = least >= wp.float64(0.5) * (wp.float64(1.0) - reach)
-        return inside, w, wp.float64(0.125) * wp.cross(b - a, c - a)
-    at = closest_point(x, a, b, c, d)
-    along_xi, along_eta = face_tangents(at[0], at[1], a, b, c, d)
+        return inside, at, -a - at[0] * ab - at[1] * ac, wp.float64(0.125) * wp.cross(ab, ac)
+    m, e, f, t = bilinear(a, b, c, d)
+    at = closest_point(-m, e, f, t)
     inside = wp.abs(at[0]) <= reach and wp.abs(at[1]) <= reach
-    return inside, shape(at[0], at[1]), wp.cross(along_xi, along_eta)
+    along_xi = e + at[1] * t
+    along_eta = f + at[0] * t
+    return inside, at, -m - at[0] * e - at[1] * along_eta, wp.cross(along_xi, along_eta)

@@ -9,14 +9,15 @@ import warp_mca as mca
 from warp_mca import solver
 from warp_mca.kernels import search
 from warp_mca.kernels.friction import release, stick_slip
-from warp_mca.kernels.projection import closest_point, interpolate, shape
+from warp_mca.kernels.projection import bilinear, closest_point, interpolate, shape
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)
 
 
 @wp.kernel(enable_backward=False, module="unique")
 def project(x: wp.array(dtype=wp.vec3d), quad: wp.array(dtype=wp.vec3d), point_out: wp.array(dtype=wp.vec3d)):
-    at = closest_point(x[0], quad[0], quad[1], quad[2], quad[3])
+    m, e, f, t = bilinear(quad[0], quad[1], quad[2], quad[3])
+    at = closest_point(x[0] - m, e, f, t)
     point_out[0] = interpolate(shape(at[0], at[1]), quad[0], quad[1], quad[2], quad[3])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +12,16 @@ from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 from warp_mca.elements import ELEMENTS
+from warp_mca.elements.stage import gather_lists
 from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
+from warp_mca.kernels.node import gather_function
 from warp_mca.model import build_model
 from warp_mca.solver import Solver
 from warp_mca.verify.elements import mixed_cube
+
+gather = gather_function("float64")
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 KINDS = [(name, kinematics) for name in ELEMENTS for kinematics in ("corotational", "finite")]
@@ -239,3 +244,32 @@ def test_cutting_keeps_volume_boundary_and_sets():
     assert (faces[:, 2] == faces[:, 3]).all()
     area = 0.5 * np.linalg.norm(np.cross(*(cut.points[faces[:, k]] - cut.points[faces[:, 0]] for k in (1, 2))), axis=1)
     assert area.sum() == pytest.approx(6.0, rel=1e-12)
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def gather_all(
+    near: wp.array(dtype=wp.vec2i),
+    more: wp.array(dtype=wp.vec4i),
+    force: wp.array(dtype=wp.vec3d),
+    total_out: wp.array(dtype=wp.vec3d),
+):
+    i = wp.tid()
+    total_out[i] = gather(near[i], more, force)
+
+
+def test_nodes_gather_each_of_their_slots_in_rising_order():
+    """With one to eleven forces on a node, of two blocks, sums have the bits of a loop over rising slots."""
+    rng = np.random.default_rng(0)
+    node = rng.permutation(np.repeat(np.arange(66), np.tile(np.arange(1, 12), 6))).astype(np.int32)
+    stages = [SimpleNamespace(slot_node=part, slot=0) for part in np.split(node, [150])]
+    near, more = gather_lists(stages, 66)  # type: ignore[arg-type]
+    assert [stage.slot for stage in stages] == [0, 150]
+    force = rng.normal(size=(len(node), 3)) * 10.0 ** rng.integers(-8, 8, (len(node), 1))
+    out = wp.full(66, np.nan, dtype=wp.vec3d, device="cpu")
+    inputs = [wp.array(array, dtype=kind, device="cpu") for array, kind in ((near, wp.vec2i), (more, wp.vec4i))]
+    inputs.append(wp.array(force, dtype=wp.vec3d, device="cpu"))
+    wp.launch(gather_all, 66, inputs=inputs, outputs=[out], device="cpu")
+    expected = np.zeros((66, 3))
+    for slot, n in enumerate(node):
+        expected[n] += force[slot]
+    np.testing.assert_array_equal(out.numpy(), expected)

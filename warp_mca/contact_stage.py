@@ -56,13 +56,15 @@ class ContactStage:
         self.mu = _numbers([item.mu for item in items])
         self._make_springs()
         friction = any(item.mu > 0.0 for item in items)
+        self.lanes = 1
         if items[0].plane is not None:
             self.kernel = contact.plane_kernel(friction, self.each)
             self._make_planes()
             return
-        self.kernel = contact.surface_kernel(friction, self.each)
-        self.lanes = contact.LANES if wp.get_device().is_cuda else 1
-        self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
+        cuda = wp.get_device().is_cuda
+        self.lanes, self.master_lanes = (contact.SLAVE_LANES, contact.MASTER_LANES) if cuda else (1, 1)
+        self.kernel = contact.surface_kernel(friction, self.each, self.lanes)
+        self.react, self.bounds = contact.react_kernel(self.each, self.master_lanes), search.bounds_kernel(self.each)
         self.find = search.candidates_kernel(self.each)
         self._make_faces(model)
 
@@ -117,7 +119,7 @@ class ContactStage:
     @property
     def blocks(self) -> int:
         """Blocks of threads that look at the slaves."""
-        return -(-len(self.slave) // contact.BLOCK_DIM)
+        return -(-len(self.slave) * self.lanes // contact.BLOCK_DIM)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -155,10 +157,11 @@ class ContactStage:
             return
         inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
-        wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
+        threads = self.lanes * len(self.slave)
+        wp.launch(self.kernel, threads, inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
-        threads = self.lanes * len(self.master)
+        threads = self.master_lanes * len(self.master)
         wp.launch(self.react, threads, inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
 
     def max_depth(self, scene: int) -> float:

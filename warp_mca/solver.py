@@ -94,9 +94,9 @@ class Solver:
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
         self.law = wp.array(model.law, dtype=t.real)
         self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
-        offset, slot = gather_lists(self.elements, model.node_count)
-        self.offset, self.slot = wp.array(offset, dtype=wp.int32), wp.array(slot, dtype=wp.int32)
-        self.force = wp.zeros(len(slot), dtype=t.vec3)
+        near, more = gather_lists(self.elements, model.node_count)
+        self.near, self.more = wp.array(near, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)
+        self.force = wp.zeros(sum(len(stage.slot_node) for stage in self.elements), dtype=t.vec3)
         scenes, passes = self.layout.count, len(model.passes) // self.layout.count
         self.contacts = [ContactStage(model.passes[k::passes], model, PASS + PASS_COLUMNS * k) for k in range(passes)]
         if self.contacts:
@@ -104,7 +104,8 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         # contact and sums have few threads and wait long for memory: they take what room there is first
-        self.side = wp.Stream(priority=-1) if wp.get_device().is_cuda else None
+        cuda = wp.get_device().is_cuda
+        self.side, self.sums = (wp.Stream(priority=-1), wp.Stream(priority=-1)) if cuda else (None, None)
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
         self.bonds = BondStage(model, self.layout)
@@ -148,31 +149,33 @@ class Solver:
         if side:
             wp.wait_stream(side)
 
-    def _integrate(self, kick: float, drift: float, role: wp.array, split: Split = whole) -> None:
+    def _integrate(
+        self, kick: float, drift: float, role: wp.array, split: Split = whole, before: wp.array | None = None
+    ) -> None:
         def launch(part: slice) -> None:
             scene = 0 if isinstance(self.node_scene, int) else self.node_scene[part]
             contact_force = self.contact_force[part] if self.contacts else self.contact_force
-            inputs = [self.inverse_mass[part], self.offset[part.start : part.stop + 1], self.slot]
+            inputs = [self.inverse_mass[part], self.near[part], self.more]
             inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
-            outputs = [contact_force, self.u[part], self.v[part]]
+            outputs = [contact_force, self.u[part], self.v[part], None if before is None else before[part]]
             wp.launch(
                 self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK
             )
 
         split(self.model.node_count, launch, NODES)
 
-    def _advance_bound(self) -> None:
-        inputs = [self.mass, self.inverse_mass, self.offset, self.slot, self.bonds.role, self.force, self.node_scene]
+    def _advance_bound(self, before: wp.array | None = None) -> None:
+        inputs = [self.mass, self.inverse_mass, self.near, self.more, self.bonds.role, self.force, self.node_scene]
         inputs += [self.node_gravity, self.bonds.bonds, self.dt]
-        outputs = [self.contact_force, self.u, self.v, *self.bonds.counts()]
+        outputs = [self.contact_force, self.u, self.v, before, *self.bonds.counts()]
         wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK)
 
-    def _advance(self, split: Split = whole) -> None:
-        """Advance all nodes by a step, those that are bound beside the others."""
+    def _advance(self, split: Split = whole, before: wp.array | None = None) -> None:
+        """Advance all nodes by a step, those that are bound beside the others; `before` takes their velocities."""
         if self.bound_kernel:
             with wp.ScopedStream(self.side):
-                self._advance_bound()
-        self._integrate(self.dt, self.dt, self.bonds.role, split)
+                self._advance_bound(before)
+        self._integrate(self.dt, self.dt, self.bonds.role, split, before)
         if self.bound_kernel and self.side:
             wp.wait_stream(self.side)
 
@@ -186,30 +189,30 @@ class Solver:
         threads = (self.layout.count, runs, ledger.RUN if self.side else 1)
         wp.launch(kernel, threads, inputs=[self.row, *inputs], outputs=[self.partial, *outputs])
 
-    def _begin_record(self) -> None:
-        """What a record takes of the time before its step, and of contact."""
-        wp.copy(self.v_before, self.v)
+    def _next_row(self) -> None:
         wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
-        for stage in self.contacts:
-            self._sum(contact.sum_springs, int(np.diff(stage.slaves).max()), [stage.column, stage.first, stage.spring])
 
     def _record_step(self, needs: frozenset[str], split: Split = whole) -> None:
         """One step that also writes a record of the state at its start, and a frame of `needs`."""
-        self._forces(split, self._begin_record)
+        self._forces(split, self._next_row)
         if self.output:
             self.output.before_step(needs)
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
-        self._advance(split)
-        with wp.ScopedStream(self.side):
+        with wp.ScopedStream(self.sums):
+            for contact_stage in self.contacts:
+                slaves = int(np.diff(contact_stage.slaves).max())
+                springs = [contact_stage.column, contact_stage.first, contact_stage.spring]
+                self._sum(contact.sum_springs, slaves, springs)
             self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
+        self._advance(split, self.v_before)
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
         motion += [self.bonds.work, self.bonds.driven_first, self.point_node]
         self._sum(ledger.record_motion, self.most_nodes, motion, self.point_velocity)
         if self.output:
             self.output.after_step(needs)
-        if self.side:
-            wp.wait_stream(self.side)
+        if self.sums:
+            wp.wait_stream(self.sums)
 
     def _schedule(self) -> None:
         for stage in self.elements:

@@ -122,12 +122,32 @@ class ElementStage:
 
 
 def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index, Index]:
-    """Give each stage its slots; slots of the forces on each node as compressed rows (offset, slot), int32."""
+    """Give each stage its slots; list the slots of the forces on each node, in rising order.
+
+    Returns:
+        (The first slot of each node and its second, -1 where it has one, -2 - row where it has more than two, shape
+        (node_count, 2), int32; rows of three more slots, -1 where there are fewer, and the row that follows or -1,
+        shape (row_count, 4), int32.)
+    """
     first = 0
     for stage in stages:
         stage.slot = first
         first += len(stage.slot_node)
     node = np.concatenate([stage.slot_node for stage in stages])
-    offset = np.zeros(node_count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(node, minlength=node_count), out=offset[1:])
-    return offset, np.argsort(node, kind="stable").astype(np.int32)
+    slot, count = np.argsort(node, kind="stable").astype(np.int32), np.bincount(node, minlength=node_count)
+    begin = np.cumsum(count) - count
+    near = np.full((node_count, 2), -1, dtype=np.int32)
+    near[:, 0] = slot[begin]
+    near[count == 2, 1] = slot[begin[count == 2] + 1]
+    many = np.flatnonzero(count > 2)
+    others = count[many] - 1
+    end = np.cumsum((others + 2) // 3)
+    first_row = end - (others + 2) // 3
+    near[many, 1] = -2 - first_row
+    more = np.full((int(end[-1]) if len(end) else 0, 4), -1, dtype=np.int32)
+    more[:, 3] = np.arange(1, len(more) + 1)
+    more[end - 1, 3] = -1
+    k = np.arange(others.sum()) - np.repeat(np.cumsum(others) - others, others)
+    row, column = np.divmod(k, 3)
+    more[np.repeat(first_row, others) + row, column] = slot[np.repeat(begin[many], others) + 1 + k]
+    return near, more
