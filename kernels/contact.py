@@ -16,7 +16,7 @@ from warp_mca.surfaces import LIST_LENGTH
 wp.set_module_options({"enable_backward": False})
 
 BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
-SLAVE_LANES, MASTER_LANES = 2, 4  # of a GPU for each node: faces that it looks at side by side
+LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 # A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
 _EDGE_REACH = 1.02
@@ -104,33 +104,19 @@ def master_velocity(
 
 
 @cache
-def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
+def surface_kernel(friction: bool, each: bool) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
 
-    With `each`, scenes of a batch have values of their own, and slaves know their scene. With more `lanes`, on a GPU,
-    so many candidates of a slave are looked at side by side.
+    Slaves are those from `first` on. With `each`, scenes of a batch have values of their own, and slaves know their
+    scene.
     """
     press = spring_function(friction)
-    _, exchange = shared_functions("float64")
     open_contact = open_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
-    @wp.func
-    def shallowest(best: int, gap: wp.float64):
-        """Of the faces that the lanes of a slave have found the one that wins, -1 where none has any."""
-        winner = wp.float64(best)
-        for step in range(wp.static(lanes.bit_length() - 1)):
-            other = exchange(winner, 1 << step)
-            other_gap = exchange(gap, 1 << step)
-            if other >= wp.float64(0.0) and (
-                winner < wp.float64(0.0) or other_gap > gap or (other_gap == gap and other < winner)
-            ):
-                winner = other
-                gap = other_gap
-        return int(winner)
-
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
     def touch_surface(
+        first: int,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
         v: wp.array(dtype=wp.vec3d),
@@ -148,11 +134,10 @@ def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        lane = wp.tid() % wp.static(lanes)
-        s = wp.tid() // wp.static(lanes)
+        s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
-        f = candidate[s, lane]  # read before it is known whether there is one: memory answers late
+        f = candidate[s, 0]  # read before it is known whether there is one: memory answers late
         best = int(-1)
         best_gap = wp.float64(0.0)
         best_area = wp.float64(0.0)
@@ -160,7 +145,7 @@ def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
         best_at = wp.vec2d()
         best_triangle = bool(False)
         x = X[i] + u[i]
-        for c in range(lane, count[s], wp.static(lanes)):
+        for c in range(count[s]):
             i0 = face[f, 0]
             i1 = face[f, 1]
             i2 = face[f, 2]
@@ -184,11 +169,8 @@ def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
                         best_at = at
                         best_triangle = i2 == i3
                         best_area = area
-            f = candidate[s, wp.min(c + wp.static(lanes), wp.static(LIST_LENGTH - 1))]
-        first = best
-        if wp.static(lanes > 1):
-            first = shallowest(best, best_gap)
-        if best >= 0 and best == first:
+            f = candidate[s, wp.min(c + 1, wp.static(LIST_LENGTH - 1))]
+        if best >= 0:
             if best_gap * best_gap > best_area:
                 flag_out[k, TOO_DEEP] = 1
             weight = weights_at(best_at, best_triangle)
@@ -197,10 +179,10 @@ def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
             spring.face[s] = best
             spring.weight[s] = weight
             contact_force_out[i] = contact_force_out[i] + force
-        elif first < 0 and lane == 0 and spring.face[s] >= 0:
+        elif spring.face[s] >= 0:
             du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
             open_contact(s, du, stiffness[s], spring)
-        if lane == 0 and moved_too_far(u[i], u_search[i], of(margin, k)):
+        if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
     return touch_surface
@@ -210,13 +192,14 @@ def surface_kernel(friction: bool, each: bool, lanes: int) -> Any:
 def react_kernel(each: bool, lanes: int) -> Any:
     """Kernel: each master node gathers its share of the reactions on the faces around it, in a fixed order.
 
-    With more `lanes`, on a GPU, so many of the faces side by side.
+    Masters are those from `first` on; with more `lanes`, on a GPU, each looks at so many faces side by side.
     """
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     _, exchange = shared_functions("float64")
 
     @wp.kernel(enable_backward=False, module="unique" if each or lanes > 1 else None, grid_stride=False)
     def react(
+        first: int,
         u: wp.array(dtype=wp.vec3d),
         u_search: wp.array(dtype=wp.vec3d),
         master: wp.array(dtype=wp.int32),
@@ -232,7 +215,7 @@ def react_kernel(each: bool, lanes: int) -> Any:
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         lane = wp.tid() % wp.static(lanes)
-        m = wp.tid() // wp.static(lanes)
+        m = first + wp.tid() // wp.static(lanes)
         i = master[m]
         k = of(scene, m)
         total = wp.vec3d()
@@ -268,13 +251,14 @@ react_kernel(False, 1)  # belongs to this module, so it is made before that is l
 
 @cache
 def plane_kernel(friction: bool, each: bool) -> Any:
-    """Kernel: contact of slave nodes with an analytic plane that may move along itself; `each` as for surfaces."""
+    """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
     press = spring_function(friction)
     open_contact = open_function(friction)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
     def touch_plane(
+        first: int,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
         v: wp.array(dtype=wp.vec3d),
@@ -291,7 +275,7 @@ def plane_kernel(friction: bool, each: bool) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        s = wp.tid()
+        s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
         normal = of(plane_normal, k)

@@ -22,13 +22,14 @@ def short_ranges(monkeypatch):
     for module in ("warp_mca.elements.stage", "warp_mca.elements.tet4_stage"):
         monkeypatch.setattr(f"{module}.ELEMENTS", threads.LANES)
     monkeypatch.setattr("warp_mca.elements.tet4_stage.NODES", threads.LANES)
+    monkeypatch.setattr("warp_mca.contact_stage.CONTACT", threads.LANES // 2)
 
 
 def scene(element: str = "hex8", **impact: float) -> mca.Scene:
     """Two hinged bars that yield fly aslant into a rough plate; no number of elements is a multiple of a range."""
     metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)
     flight = {"material": metal, "velocity": (1.0, -3.0, 0.5), "element": element}
-    bar = mca.Box(size=(0.02, 0.06, 0.02), divisions=(5, 15, 5), origin=(-0.011, 0.0, -0.012))
+    bar = mca.Box(size=(0.02, 0.06, 0.02), divisions=(9, 9, 9), origin=(-0.011, 0.0, -0.012))
     plate = mca.Box(size=(0.06, 0.03, 0.06), divisions=(9, 5, 9), origin=(-0.03, -0.03, -0.03))
     return mca.Scene(
         name="hinged",

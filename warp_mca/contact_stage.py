@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.kernels import contact, search
 from warp_mca.layout import offsets
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
+from warp_mca.threads import CONTACT, Launch, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
@@ -56,15 +57,13 @@ class ContactStage:
         self.mu = _numbers([item.mu for item in items])
         self._make_springs()
         friction = any(item.mu > 0.0 for item in items)
-        self.lanes = 1
         if items[0].plane is not None:
             self.kernel = contact.plane_kernel(friction, self.each)
             self._make_planes()
             return
-        cuda = wp.get_device().is_cuda
-        self.lanes, self.master_lanes = (contact.SLAVE_LANES, contact.MASTER_LANES) if cuda else (1, 1)
-        self.kernel = contact.surface_kernel(friction, self.each, self.lanes)
-        self.react, self.bounds = contact.react_kernel(self.each, self.master_lanes), search.bounds_kernel(self.each)
+        self.kernel = contact.surface_kernel(friction, self.each)
+        self.lanes = contact.LANES if wp.get_device().is_cuda else 1
+        self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
         self.find = search.candidates_kernel(self.each)
         self._make_faces(model)
 
@@ -119,7 +118,7 @@ class ContactStage:
     @property
     def blocks(self) -> int:
         """Blocks of threads that look at the slaves."""
-        return -(-len(self.slave) * self.lanes // contact.BLOCK_DIM)
+        return -(-len(self.slave) // contact.BLOCK_DIM)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -148,21 +147,29 @@ class ContactStage:
         wp.launch(search.sort_lists, len(self.face), inputs=[self.face_count], outputs=[self.face_slave])
         wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[self.u_search])
 
-    def touch(self, X: wp.array, u: wp.array, v: wp.array, dt: float, force: wp.array, flag: wp.array) -> None:
+    def touch(
+        self, X: wp.array, u: wp.array, v: wp.array, dt: float, force: wp.array, flag: wp.array, split: Split = whole
+    ) -> None:
         """Contact forces of this pass, added to `force`."""
+
+        def launch(kernel: Any, lanes: int, inputs: Sequence[Any]) -> Launch:
+            def launch_part(part: slice) -> None:
+                threads, outputs = lanes * (part.stop - part.start), [force, flag]
+                wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)
+
+            return launch_part
+
+        slaves = [self.slave, self.stiffness]
         if self.on_plane:
-            inputs = [X, u, v, self.slave, self.stiffness, self.slave_scene, *self.planes]
-            inputs += [self.mu, self.deepest, dt, self.spring]
-            wp.launch(self.kernel, len(self.slave), inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
+            inputs = [X, u, v, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest, dt, self.spring]
+            split(len(self.slave), launch(self.kernel, 1, inputs), CONTACT)
             return
-        inputs = [X, u, v, self.u_search, self.slave, self.stiffness, self.face, self.count, self.candidate]
+        inputs = [X, u, v, self.u_search, *slaves, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
-        threads = self.lanes * len(self.slave)
-        wp.launch(self.kernel, threads, inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
+        split(len(self.slave), launch(self.kernel, 1, inputs), CONTACT)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
-        threads = self.master_lanes * len(self.master)
-        wp.launch(self.react, threads, inputs=inputs, outputs=[force, flag], block_dim=contact.BLOCK_DIM)
+        split(len(self.master), launch(self.react, self.lanes, inputs), CONTACT)
 
     def max_depth(self, scene: int) -> float:
         """Largest penetration so far of a slave of a scene [m]."""

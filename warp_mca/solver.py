@@ -11,7 +11,7 @@
 | 5 record of motion | `record_motion` | first step of each output interval |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
-between two searches raise a flag, which stops the run. On the CPU, stages 1 and 4 and the energies of stage 3 are cut
+between two searches raise a flag, which stops the run. On the CPU, stages 1, 2 and 4 and energies of stage 3 are cut
 in ranges, which threads compute side by side.
 """
 
@@ -143,7 +143,7 @@ class Solver:
             if before:
                 wp.wait_event(before)
             for contact in self.contacts:
-                contact.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag)
+                contact.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag, split)
             if beside:
                 beside()
         if side:

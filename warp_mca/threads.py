@@ -27,7 +27,8 @@ Task = Callable[[], object]
 Launch = Callable[[slice], None]  # of the elements or nodes of a range
 Split = Callable[[int, Launch, int], None]  # (count, launch, least length of a range)
 
-ELEMENTS, NODES = 1024, 4096  # least length of a range, about 0.1 ms: to pass one to a thread costs about 0.02 ms
+# Least length of a range, about 0.1 ms: to pass one to a thread costs about 0.02 ms.
+ELEMENTS, NODES, CONTACT = 1024, 4096, 512
 RANGES = 4  # for each thread: one that is held up, or meets more that yields, leaves ranges to the others
 
 
