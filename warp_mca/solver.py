@@ -200,10 +200,9 @@ class Solver:
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
         with wp.ScopedStream(self.sums):
-            for contact_stage in self.contacts:
-                slaves = int(np.diff(contact_stage.slaves).max())
-                springs = [contact_stage.column, contact_stage.first, contact_stage.spring]
-                self._sum(contact.sum_springs, slaves, springs)
+            for touching in self.contacts:
+                springs = [touching.column, touching.first, touching.spring]
+                self._sum(contact.sum_springs, int(np.diff(touching.slaves).max()), springs)
             self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
         self._advance(split, self.v_before)
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
