@@ -35,14 +35,17 @@ def gather_function(precision: str) -> Any:
         if pair[1] >= 0:
             total += second
         row = -2 - pair[1]
-        while row >= 0:
+        end = row
+        if row >= 0:
+            end += more[row][3]
+        while row < end:
             r = more[row]
             total += force_at(r[0], force)
             if r[1] >= 0:
                 total += force_at(r[1], force)
             if r[2] >= 0:
                 total += force_at(r[2], force)
-            row = r[3]
+            row += 1
         return total
 
     return gather

@@ -126,7 +126,7 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
 
     Returns:
         (The first slot of each node and its second, -1 where it has one, -2 - row where it has more than two, shape
-        (node_count, 2), int32; rows of three more slots, -1 where there are fewer, and the row that follows or -1,
+        (node_count, 2), int32; rows of three more slots, -1 where there are fewer, and the number of the node's rows,
         shape (row_count, 4), int32.)
     """
     first = 0
@@ -141,12 +141,11 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
     near[count == 2, 1] = slot[begin[count == 2] + 1]
     many = np.flatnonzero(count > 2)
     others = count[many] - 1
-    end = np.cumsum((others + 2) // 3)
-    first_row = end - (others + 2) // 3
+    rows = (others + 2) // 3
+    first_row = np.cumsum(rows) - rows
     near[many, 1] = -2 - first_row
-    more = np.full((int(end[-1]) if len(end) else 0, 4), -1, dtype=np.int32)
-    more[:, 3] = np.arange(1, len(more) + 1)
-    more[end - 1, 3] = -1
+    more = np.full((int(rows.sum()), 4), -1, dtype=np.int32)
+    more[:, 3] = np.repeat(rows, rows)
     k = np.arange(others.sum()) - np.repeat(np.cumsum(others) - others, others)
     row, column = np.divmod(k, 3)
     more[np.repeat(first_row, others) + row, column] = slot[np.repeat(begin[many], others) + 1 + k]
