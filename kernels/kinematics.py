@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.logarithm import log_function
 from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
@@ -24,23 +25,19 @@ SWEEPS = 4  # of Jacobi's method: quadratic, so that the fourth works on roundin
 def eigen_function(precision: str) -> Any:
     """The function C -> (N, d): directions as columns and eigenvalues of a symmetric matrix, by Jacobi's method.
 
+    Without a branch, so that a CPU computes several at once.
     Warp's eig3 leaves errors of up to 1e-3 of the largest entry in float32; this one 1e-6.
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
 
-    small = R(1e-16 if precision == "mixed" else 1e-33)  # square of what is lost beside 1
-
     @wp.func
     def turn(p: R, q: R, pq: R):
         """Cosine, sine and tangent of the rotation that takes the entry pq of a 2 x 2 matrix away."""
         one = R(1.0)
-        if pq == R(0.0):
-            return one, R(0.0), R(0.0)
-        tau = (q - p) / (R(2.0) * pq)
-        tangent = one / (wp.abs(tau) + wp.sqrt(one + tau * tau))
-        if tau < R(0.0):
-            tangent = -tangent
+        twice = R(2.0) * pq
+        size = wp.abs(q - p) + wp.sqrt((q - p) * (q - p) + twice * twice)
+        tangent = wp.where(q < p, -twice, twice) / wp.where(size > R(0.0), size, one)
         cosine = one / wp.sqrt(one + tangent * tangent)
         return cosine, cosine * tangent, tangent
 
@@ -56,9 +53,6 @@ def eigen_function(precision: str) -> Any:
         n1 = vec3(R(0.0), R(1.0), R(0.0))
         n2 = vec3(R(0.0), R(0.0), R(1.0))
         for _ in range(wp.static(SWEEPS)):
-            size = xx * xx + yy * yy + zz * zz
-            if xy * xy + yz * yz + xz * xz <= small * size:
-                break
             c, s, t = turn(xx, yy, xy)
             xx = xx - t * xy
             yy = yy + t * xy
@@ -160,16 +154,16 @@ def _small(precision: str) -> Kinematics:
 def _logarithmic(precision: str) -> Kinematics:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    principal = eigen_function(precision)
+    principal, natural_log = eigen_function(precision), log_function(precision)
 
     @wp.func
     def log_over(x: R):
         """ln(1 + x) / x, to rounding also where x is small (Kahan)."""
         one = R(1.0)
         y = one + x
-        if y == one:
-            return one
-        return wp.log(y) / (y - one)
+        exact = y - one
+        none = exact == R(0.0)
+        return wp.where(none, one, natural_log(y) / wp.where(none, one, exact))
 
     @wp.func
     def log_dilation(H: mat33):

@@ -57,9 +57,9 @@ class ElementStage:
         self.points = points
         self.history = wp.zeros((rows or points * j2.HISTORY_SIZE, kept), dtype=scalars(precision).real)
         kind = (precision, block.plastic, block.finite)
-        self.force_kernel = side_by_side(kernels.force_kernel(*kind))
-        self.energy_kernel = side_by_side(kernels.energy_kernel(*kind))
-        self.stress_kernel = side_by_side(kernels.stress_kernel(*kind))
+        self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
+        self.energy_kernel = side_by_side(kernels.energy_kernel(*kind), large=block.finite)
+        self.stress_kernel = side_by_side(kernels.stress_kernel(*kind), large=block.finite)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

@@ -1,0 +1,75 @@
+"""What logarithmic strain is made of: the logarithm without a call, and principal directions without a branch."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warp_mca.kernels.kinematics import eigen_function
+from warp_mca.kernels.lanes import side_by_side
+from warp_mca.kernels.logarithm import log_function
+from warp_mca.kernels.scalars import scalars
+
+PRECISIONS = ("mixed", "float64")
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_logarithm_to_three_units_in_the_last_place(precision):
+    R = scalars(precision).real
+    natural_log = log_function(precision)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def take_log(y: wp.array(dtype=R), log_out: wp.array(dtype=R)):
+        i = wp.tid()
+        log_out[i] = natural_log(y[i])
+
+    kind = np.float32 if precision == "mixed" else np.float64
+    far = np.logspace(-37, 37, 4001) if precision == "mixed" else np.logspace(-300, 300, 4001)
+    none = [0.0, -1.0, np.inf, np.nan]
+    y = np.concatenate([none, far, 1.0 + np.linspace(-0.6, 1.5, 4001), 1.0 + np.logspace(-15, -1, 500)]).astype(kind)
+    out = wp.full(len(y), np.nan, dtype=R, device="cpu")
+    wp.launch(side_by_side(take_log), len(y), inputs=[wp.array(y, dtype=R, device="cpu")], outputs=[out], device="cpu")
+    found, y = out.numpy(), y[len(none) :]
+    assert np.isnan(found[: len(none)]).all()
+    found, exact = found[len(none) :], np.log(y.astype(np.longdouble))
+    assert (found[y == 1.0] == 0.0).all()
+    assert (np.abs(found - exact) < 3.0 * np.spacing(np.abs(exact).astype(kind)))[y != 1.0].all()
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_principal_directions(precision):
+    """C = N d N^T with orthonormal N: any matrix, diagonal ones, equal eigenvalues, hardly anything off them."""
+    t = scalars(precision)
+    eigen = eigen_function(precision)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def decompose(C: wp.array(dtype=t.mat33), N_out: wp.array(dtype=t.mat33), d_out: wp.array(dtype=t.vec3)):
+        i = wp.tid()
+        N, d = eigen(C[i])
+        N_out[i] = N
+        d_out[i] = d
+
+    rng = np.random.default_rng(0)
+    free = rng.normal(size=(500, 3, 3))
+    equal = np.linalg.qr(free)[0]
+    sets = [
+        free + free.transpose(0, 2, 1),
+        np.eye(3) * rng.normal(size=(50, 1, 3)),
+        np.zeros((1, 3, 3)),
+        np.eye(3)[None],
+        np.ones((1, 3, 3)),
+        equal @ (np.array([2.0, 2.0, -1.0]) * np.eye(3)) @ equal.transpose(0, 2, 1),
+        np.eye(3) + 1e-9 * (free + free.transpose(0, 2, 1)),
+        1e-12 * (free + free.transpose(0, 2, 1)),
+    ]
+    C = np.concatenate(sets)
+    N, d = (wp.full(len(C), value=np.nan, dtype=kind, device="cpu") for kind in (t.mat33, t.vec3))
+    wp.launch(decompose, len(C), inputs=[wp.array(C, dtype=t.mat33, device="cpu")], outputs=[N, d], device="cpu")
+    N, d = N.numpy().astype(float), d.numpy().astype(float)
+    exact = C.astype(np.float32).astype(float) if precision == "mixed" else C
+    tolerance = 2e-6 if precision == "mixed" else 4e-15
+    made = np.einsum("nik,nk,njk->nij", N, d, N)
+    size = np.abs(exact).max(axis=(1, 2))
+    assert np.abs(N.transpose(0, 2, 1) @ N - np.eye(3)).max() < tolerance
+    assert (np.abs(made - exact).max(axis=(1, 2)) <= tolerance * size).all()
+    values = np.sort(d, axis=1) - np.linalg.eigvalsh(exact)
+    assert (np.abs(values).max(axis=1) <= tolerance * size).all()
