@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from warp_mca.kernels import contact, search
 from warp_mca.layout import offsets
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
-from warp_mca.threads import CONTACT, Launch, Split, whole
+from warp_mca.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
@@ -152,24 +153,21 @@ class ContactStage:
     ) -> None:
         """Contact forces of this pass, added to `force`."""
 
-        def launch(kernel: Any, lanes: int, inputs: Sequence[Any]) -> Launch:
-            def launch_part(part: slice) -> None:
-                threads, outputs = lanes * (part.stop - part.start), [force, flag]
-                wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)
-
-            return launch_part
+        def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
+            threads = lanes * (part.stop - part.start)
+            wp.launch(kernel, threads, [part.start, *inputs], [force, flag], block_dim=contact.BLOCK_DIM)
 
         slaves = [self.slave, self.stiffness]
         if self.on_plane:
             inputs = [X, u, v, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest, dt, self.spring]
-            split(len(self.slave), launch(self.kernel, 1, inputs), CONTACT)
+            split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         inputs = [X, u, v, self.u_search, *slaves, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
-        split(len(self.slave), launch(self.kernel, 1, inputs), CONTACT)
+        split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
-        split(len(self.master), launch(self.react, self.lanes, inputs), CONTACT)
+        split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
 
     def max_depth(self, scene: int) -> float:
         """Largest penetration so far of a slave of a scene [m]."""
