@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.node import gather_function, hold, take_contact
+from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
@@ -122,6 +123,8 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
         work_after_out: wp.array(dtype=wp.vec3d),
         clock_out: wp.array(dtype=wp.int32),
     ):
+        wait_for_previous()
+        let_next_begin()
         k = wp.tid()
         pairs = bonds.first.shape[0]
         i = int(-1)
@@ -159,4 +162,4 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
         u_out[i] = u
         v_out[i] = v
 
-    return advance_bound
+    return begins_early(advance_bound)

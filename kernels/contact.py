@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
+from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.projection import interpolate, project, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
@@ -134,6 +135,8 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
+        wait_for_previous()
+        let_next_begin()
         s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
@@ -185,7 +188,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
-    return touch_surface
+    return begins_early(touch_surface)
 
 
 @cache
@@ -214,6 +217,8 @@ def react_kernel(each: bool, lanes: int) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
+        wait_for_previous()
+        let_next_begin()
         lane = wp.tid() % wp.static(lanes)
         m = first + wp.tid() // wp.static(lanes)
         i = master[m]
@@ -243,7 +248,7 @@ def react_kernel(each: bool, lanes: int) -> Any:
             if moved_too_far(u[i], u_search[i], of(margin, k)):
                 flag_out[k, STALE] = 1
 
-    return react
+    return begins_early(react)
 
 
 react_kernel(False, 1)  # belongs to this module, so it is made before that is loaded; others have their own
@@ -275,6 +280,8 @@ def plane_kernel(friction: bool, each: bool) -> Any:
         contact_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
+        wait_for_previous()
+        let_next_begin()
         s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
@@ -295,7 +302,7 @@ def plane_kernel(friction: bool, each: bool) -> Any:
             half = wp.float64(0.5)
             spring.drive[s] = spring.drive[s] + half * dt * wp.dot(before + spring.tangential[s], velocity)
 
-    return touch_plane
+    return begins_early(touch_plane)
 
 
 @wp.kernel(enable_backward=False)

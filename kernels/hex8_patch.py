@@ -14,6 +14,7 @@ from warp_mca.kernels import j2
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
+from warp_mca.kernels.overlap import begins_early
 from warp_mca.kernels.patch import (
     POINT,
     RESIDENT,
@@ -335,4 +336,4 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             head = coming
             k += 1
 
-    return hex8_patch_force
+    return begins_early(hex8_patch_force)

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hex8r import element_functions
+from warp_mca.kernels.overlap import begins_early
 from warp_mca.kernels.patch import (
     POINT,
     RESIDENT,
@@ -101,4 +102,4 @@ def force_kernel(precision: str, plastic: bool) -> Any:
             head = coming
             k += 1
 
-    return hex8r_patch_force
+    return begins_early(hex8r_patch_force)

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
@@ -70,12 +71,15 @@ def hold(role: int, a: wp.vec3d):
 
 
 @cache
-def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = False, each: bool = False) -> Any:
+def integrate_kernel(
+    precision: str, contact: bool, fixed: bool, bound: bool = False, each: bool = False, early: bool = False
+) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
     where it is not empty. `fixed`: some axes are at rest; `bound`: some nodes are left to `constraint.bound_kernel`.
-    With `each`, gravity differs between the scenes of a batch, and nodes know their scene.
+    With `each`, gravity differs between the scenes of a batch, and nodes know their scene. `early`: the next kernel
+    takes its places as soon as nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
@@ -97,15 +101,20 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
         v_out: wp.array(dtype=wp.vec3d),
         v_before_out: wp.array(dtype=wp.vec3d),
     ):
+        if wp.static(early):
+            let_next_begin()
         i = wp.tid()
+        pair = near[i]
+        inverse = inverse_mass[i]
+        wait_for_previous()
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(near[i], more, force)
+        total = gather(pair, more, force)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)
-        a = inverse_mass[i] * total + of(gravity, of(scene, i))
+        a = inverse * total + of(gravity, of(scene, i))
         if wp.static(fixed):
             a = hold(int(role[i]), a)
         v = v_out[i] + kick * a
@@ -114,4 +123,4 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool = F
         v_out[i] = v
         u_out[i] = u_out[i] + drift * v
 
-    return integrate
+    return begins_early(integrate)

@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.overlap import let_next_begin, wait_for_previous
 from warp_mca.kernels.shared_memory import (
     HEADS,
     barrier,
@@ -208,6 +209,8 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any]:
         wait_for_copies()
         barrier()
         copy_points(points, ring_out[1], lane, wp.static(slots), point_out)
+        wait_for_previous()
+        let_next_begin()
         copy_nodes(X, u, point_out, head, lane, 0, vector_out)
         wait_for_copies()
         barrier()

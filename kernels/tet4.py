@@ -14,6 +14,7 @@ from warp_mca.kernels import j2
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hexahedron import history_functions, stress_function
 from warp_mca.kernels.kinematics import kinematics
+from warp_mca.kernels.overlap import begins_early, wait_for_previous
 from warp_mca.kernels.patterns import mean_frame
 from warp_mca.kernels.scalars import THIRD, scalars
 
@@ -70,11 +71,12 @@ def dilation_kernel(precision: str, finite: bool) -> Any:
         u: wp.array(dtype=wp.vec3d),
         growth_out: wp.array(dtype=R),
     ):
+        wait_for_previous()
         e = wp.tid()
         _W, H, _c, volume = tet_gradient(X, conn, u, e)
         growth_out[e] = volume * dilation_of(H)
 
-    return tet4_dilation
+    return begins_early(tet4_dilation)
 
 
 @cache
@@ -90,13 +92,14 @@ def average_kernel(precision: str) -> Any:
         growth: wp.array(dtype=R),
         dilation_out: wp.array(dtype=R),
     ):
+        wait_for_previous()
         i = wp.tid()
         total = R(0.0)
         for j in range(offset[i], offset[i + 1]):
             total += growth[element[j]]
         dilation_out[i] = inverse_volume[i] * total
 
-    return tet4_average
+    return begins_early(tet4_average)
 
 
 @cache
@@ -127,6 +130,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         history_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
+        wait_for_previous()
         e = wp.tid()
         W, H, c, _volume = tet_gradient(X, conn, u, e)
         m = material[e]
@@ -158,7 +162,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
             force_out[slot + 2 * count + e][i] = f1[i]
             force_out[slot + 3 * count + e][i] = f2[i]
 
-    return tet4_force
+    return begins_early(tet4_force)
 
 
 @cache

@@ -151,3 +151,24 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
         for a, b in zip(held.solver.elements, host.solver.elements, strict=True):
             scale = np.abs(b.history.numpy()).max(initial=1e-30)
             np.testing.assert_allclose(a.history.numpy(), b.history.numpy(), rtol=0, atol=10.0 * tolerance * scale)
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("name", ["flows", "everything"])
+def test_kernels_that_begin_early_change_no_bit(element, name, monkeypatch):
+    """Against the same graphs whose kernels begin when the one before them has ended."""
+    from benchmarks.blocks import FULL, Case, Held, assemble
+    from warp_mca import solver
+
+    monkeypatch.setattr(solver, "EARLY_ROUNDS", 1)
+    model, case = assemble(element, 90_000), {"flows": Case(0.3), "everything": FULL}[name]
+    overlap, changed, states = solver.overlap, [], []
+    for change in (lambda graph: changed.append(overlap(graph)), lambda graph: None):
+        monkeypatch.setattr(solver, "overlap", change)
+        held = Held(model, case, "cuda:0", "mixed")
+        for _ in range(10):
+            held.advance(20)
+        states.append([held.solver.u.numpy(), held.solver.v.numpy(), held.solver.partial.numpy()])
+    assert len(changed) == 1
+    assert changed[0] >= 38
+    assert all(np.array_equal(one, other) for one, other in zip(*states, strict=True))

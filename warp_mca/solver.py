@@ -35,12 +35,16 @@ from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
 from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
 from warp_mca.model import Model
+from warp_mca.overlap import overlap
 from warp_mca.threads import ELEMENTS as RANGE
 from warp_mca.threads import NODES, Pool, Split, Stages, flushing, whole
 
 if TYPE_CHECKING:
     from warp_mca.output import Output
 
+# Patches that a block of threads computes in turn, from which on blocks take their places while nodes are advanced:
+# they do not spread evenly then, and few rounds do not level that out.
+EARLY_ROUNDS = 8
 ROWS = 32  # records kept on the device before the host reads them
 
 
@@ -124,9 +128,10 @@ class Solver:
         each = bool((model.gravity != model.gravity[0]).any())
         self.node_gravity = self.gravity if each else wp.vec3d(*model.gravity[0])
         self.node_scene = per_scene(self.layout.nodes) if each else 0
-        touched, fixed = bool(self.contacts), bool(model.fixed_axes.any())
-        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, self.bonds.count > 0, each)
-        self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if self.bonds.count else None
+        touched, fixed, bound = bool(self.contacts), bool(model.fixed_axes.any()), self.bonds.count > 0
+        early = not touched and not bound and min(stage.rounds for stage in self.elements) >= EARLY_ROUNDS
+        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early)
+        self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if bound else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
     def _forces(self, split: Split = whole, beside: Callable[[], None] | None = None) -> None:
@@ -223,6 +228,7 @@ class Solver:
             if name not in self.graphs:
                 with wp.ScopedCapture() as capture:
                     body()
+                overlap(capture.graph)
                 self.graphs[name] = capture.graph
             with self._flush():
                 wp.capture_launch(self.graphs[name])

@@ -41,6 +41,7 @@ class PatchStage(ElementStage):
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
         self.most = wp.get_device().sm_count * patch.RESIDENT[precision]
         self.blocks = min(len(heads), self.most)
+        self.rounds = len(heads) // self.most
         self.point = wp.array(point, dtype=patch.POINT[precision])
         self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
@@ -60,10 +61,8 @@ class PatchStage(ElementStage):
 
         Contact then takes rounds too, but a quarter as many at most: it has two kernels, and other work to wait for.
         """
-        patches = len(self.patches.head)
-        rounds = max(1, patches // (4 * self.most))
-        room = -(-blocks // rounds)
-        self.blocks = min(patches, max(self.most // 2, self.most - room))
+        room = -(-blocks // max(1, self.rounds // 4))
+        self.blocks = min(len(self.patches.head), max(self.most // 2, self.most - room))
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""

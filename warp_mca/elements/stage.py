@@ -34,7 +34,10 @@ class ElementStage:
             `kernels.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
+        rounds: patches that a block of threads computes in turn.
     """
+
+    rounds = 0
 
     def __init__(self, block: Block, precision: str, kernels: Any, points: int, rows: int | None = None) -> None:
         """Allocate.

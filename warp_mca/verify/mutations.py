@@ -274,8 +274,8 @@ MUTATIONS: dict[str, Mutation] = {
     "gravity_reversed": Mutation(
         "gravity acts against its direction",
         "kernels/node.py",
-        "inverse_mass[i] * total + of(gravity",
-        "inverse_mass[i] * total - of(gravity",
+        "inverse * total + of(gravity",
+        "inverse * total - of(gravity",
     ),
     "finite_pressure_unscaled": Mutation(
         "the pressure of finite strain is K ln J in place of K ln J / J",
