@@ -154,14 +154,14 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
 
 
 @pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
-@pytest.mark.parametrize("name", ["flows", "everything"])
+@pytest.mark.parametrize("name", ["elastic", "flows", "everything"])
 def test_kernels_that_begin_early_change_no_bit(element, name, monkeypatch):
     """Against the same graphs whose kernels begin when the one before them has ended."""
     from benchmarks.blocks import FULL, Case, Held, assemble
     from warp_mca import solver
 
     monkeypatch.setattr(solver, "EARLY_ROUNDS", 1)
-    model, case = assemble(element, 90_000), {"flows": Case(0.3), "everything": FULL}[name]
+    model, case = assemble(element, 90_000), {"elastic": Case(), "flows": Case(0.3), "everything": FULL}[name]
     overlap, changed, states = solver.overlap, [], []
     for change in (lambda graph: changed.append(overlap(graph)), lambda graph: None):
         monkeypatch.setattr(solver, "overlap", change)

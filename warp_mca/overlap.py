@@ -81,6 +81,8 @@ def overlap(graph: Any) -> int:
     _call("cuGraphGetEdges_v2", graph.graph, begin, end, data, ctypes.byref(count))
     keys = {node: _key(node) for node in {*begin, *end}}
     chosen = [k for k in range(count.value) if keys[end[k]] in EARLY and keys[begin[k]] not in ("", keys[end[k]])]
+    if not chosen:
+        return 0
     edges = [_Edge(from_port=_PROGRAMMATIC, type=_PROGRAMMATIC) for _ in chosen]
     for name, kinds in (("Remove", [data[k] for k in chosen]), ("Add", edges)):
         nodes = [Nodes(*[side[k] for k in chosen]) for side in (begin, end)]

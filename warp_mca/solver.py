@@ -12,7 +12,7 @@
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
 between two searches raise a flag, which stops the run. On the CPU, stages 1, 2 and 4 and energies of stage 3 are cut
-in ranges, which threads compute side by side.
+in ranges, which threads compute side by side; on a GPU, kernels of a graph begin while the one before them ends.
 """
 
 from __future__ import annotations
@@ -129,7 +129,8 @@ class Solver:
         self.node_gravity = self.gravity if each else wp.vec3d(*model.gravity[0])
         self.node_scene = per_scene(self.layout.nodes) if each else 0
         touched, fixed, bound = bool(self.contacts), bool(model.fixed_axes.any()), self.bonds.count > 0
-        early = not touched and not bound and min(stage.rounds for stage in self.elements) >= EARLY_ROUNDS
+        rounds = min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
+        early = not touched and not bound and rounds >= EARLY_ROUNDS
         self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early)
         self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if bound else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
