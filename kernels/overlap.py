@@ -1,8 +1,8 @@
 """Owns how a kernel of a captured graph begins while the one before it ends: programmatic dependent launch.
 
 CUDA C++ Programming Guide, "Programmatic Dependent Launch and Synchronization". Such a kernel is launched when all
-blocks of threads of the one before it have said so, or have ended; what it reads then, as it begins, no step changes.
-It waits before it touches anything else, until all that the other wrote can be seen. Where a graph is not told of it
+blocks of threads of the one before it have said so, or have ended; no other such kernel writes what it reads then. It
+waits before it touches anything else, until all that the other wrote can be seen. Where a graph is not told of it
 (`warp_mca.overlap`), and on a CPU, both functions do nothing.
 """
 
@@ -14,12 +14,12 @@ wp.set_module_options({"enable_backward": False})
 
 LEAST_ARCH = 90  # compute capability, times ten, that knows of it
 
-EARLY: dict[str, Any] = {}  # kernels that wait, by key
+EARLY: set[str] = set()  # keys of kernels that wait
 
 
 def begins_early(kernel: Any) -> Any:
-    """The kernel, all of whose threads wait before they write, and before they read what a step changes."""
-    EARLY[kernel.key] = kernel
+    """The kernel, all of whose threads wait before they write, and before they read what such kernels write."""
+    EARLY.add(kernel.key)
     return kernel
 
 

@@ -1,45 +1,115 @@
-"""Kernels that begin while the one before them ends write nothing before they wait; see `kernels.overlap`."""
+"""Kernels that begin while the one before them ends touch nothing that changes before they wait; `kernels.overlap`."""
 
+import ctypes
 import re
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import warp as wp
 
-from warp_mca.kernels import constraint, contact, hex8_patch, hex8r_patch, node, tet4
+from warp_mca import overlap as module
+from warp_mca.kernels import constraint, contact, hex8_patch, hex8r_patch, node, patch, tet4
 from warp_mca.kernels.overlap import EARLY, LEAST_ARCH
 from warp_mca.overlap import overlap
 
-KERNELS = {
-    "integrate": lambda: node.integrate_kernel("mixed", True, True, True, early=True),
-    "advance_bound": lambda: constraint.bound_kernel("mixed", True),
-    "touch_surface": lambda: contact.surface_kernel(True, False),
-    "touch_plane": lambda: contact.plane_kernel(True, False),
-    "react": lambda: contact.react_kernel(False, contact.LANES),
-    "tet4_dilation": lambda: tet4.dilation_kernel("mixed", False),
-    "tet4_average": lambda: tet4.average_kernel("mixed"),
-    "tet4_force": lambda: tet4.force_kernel("mixed", True),
-    "hex8_patch_force": lambda: hex8_patch.force_kernel("mixed", True),
-    "hex8r_patch_force": lambda: hex8r_patch.force_kernel("mixed", True),
+KERNELS = Path(node.__file__).parent
+# As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
+TWO = (("mixed", False), ("float64", True))
+VARIANTS = {
+    "integrate": [node.integrate_kernel(p, not m, True, m, m, m) for p, m in TWO],
+    "advance_bound": [constraint.bound_kernel(p, m, m) for p, m in TWO],
+    "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
+    "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
+    "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
+    "tet4_dilation": [tet4.dilation_kernel(p, m) for p, m in TWO],
+    "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],
+    "tet4_force": [tet4.force_kernel(p, m, False) for p, m in TWO],
+    "hex8_patch_force": [hex8_patch.force_kernel(p, not m) for p, m in TWO],
+    "hex8r_patch_force": [hex8r_patch.force_kernel(p, not m) for p, m in TWO],
 }
+# Reads ahead of the wait: the first two slots and the mass of a node; head, corners and points of patches.
+READS = {"integrate": 3, "hex8_patch_force": 15, "hex8r_patch_force": 15}
 WAIT = "griddepcontrol.wait"
-WRITES = re.compile(r"^\s*(?:@\S+\s+)?(?:st\.(?!shared|local|param)|red\.|atom\.)", re.MULTILINE)
+READ = re.compile(r"\b(?:ld\.(?!param|shared|local|const)|cp\.async\.c)")
+WRITE = re.compile(r"\b(?:st\.(?!param|shared|local)|red\.|atom\.(?!shared))")
+BRANCH = re.compile(r"\bbra\b")
 
 
-@pytest.mark.parametrize("name", KERNELS)
-def test_kernel_writes_nothing_before_it_waits(name, tmp_path):
-    kernel = KERNELS[name]()
-    assert EARLY[kernel.key].key == kernel.key
+@pytest.mark.parametrize(("name", "k"), [(name, k) for name, kernels in VARIANTS.items() for k in range(len(kernels))])
+def test_kernel_touches_nothing_that_changes_before_it_waits(name, k, tmp_path):
+    kernel = VARIANTS[name][k]
+    assert kernel.key in EARLY
     wp.compile_aot_module(kernel.module, device=None, arch=LEAST_ARCH, module_dir=tmp_path, use_ptx=True)
     (source,) = tmp_path.glob("*.ptx")
     text = source.read_text(encoding="utf-8", errors="replace")
     assert text.count(WAIT) == 1
     before, after = text.split(WAIT)
-    assert not WRITES.search(before)
-    assert WRITES.search(after)
+    assert not WRITE.search(before)
+    assert WRITE.search(after)
+    assert len(READ.findall(before)) <= READS.get(name, 0)
+    if name not in READS:  # Warp asks whether there are so many threads, no more
+        assert len(BRANCH.findall(before)) == 1
 
 
 def test_every_kernel_that_begins_early_is_tried():
-    assert {key.rpartition("__")[2] for key in EARLY} == set(KERNELS)
+    found = [re.findall(r"begins_early\((\w+)\)", file.read_text(encoding="utf-8")) for file in KERNELS.glob("*.py")]
+    assert sorted(name for names in found for name in names) == sorted(VARIANTS)
+
+
+class Driver:
+    """A graph whose nodes are named by Warp's names of kernels, or None where they are something else."""
+
+    first = 0x7F0000000000  # as wide as a pointer
+
+    def __init__(self, names, edges):
+        self.names, self.changes = names, []
+        self.edges = edges
+
+    def name(self, node):
+        return self.names[node - self.first]
+
+    def __call__(self, what, *arguments):
+        if what == "cuGraphGetEdges_v2":
+            _, begin, end, _, count = arguments
+            count._obj.value = len(self.edges)
+            for k, (a, b) in enumerate(self.edges if begin else ()):
+                begin[k], end[k] = self.first + a, self.first + b
+        elif what == "cuGraphNodeGetType":
+            arguments[1]._obj.value = 0 if self.name(arguments[0].value) else 1
+        elif what == "cuGraphKernelNodeGetParams_v2":
+            arguments[1]._obj.func = arguments[0].value
+        elif what == "cuFuncGetName":
+            arguments[0]._obj.value = self.name(arguments[1].value).encode()
+        else:
+            _, begin, end, data, count = arguments
+            ports = {(e.from_port, e.to_port, e.type, bytes(e.reserved)) for e in data[: count.value]}
+            pairs = [(a - self.first, b - self.first) for a, b in zip(begin[: count.value], end, strict=False)]
+            self.changes.append((what, pairs, ports))
+
+
+def changed(monkeypatch, arch=LEAST_ARCH, driver=(13, 0)):
+    """Edges that `overlap` asks the driver to change, in a graph of two steps with a copy behind the first."""
+    patches = VARIANTS["hex8_patch_force"][0].key
+    keys = [patch.schedule.key, patches, patches, VARIANTS["integrate"][0].key, None, patches]
+    names = [key and f"{key}_1a2b3c4d_cuda_kernel_forward" for key in keys]
+    fake = Driver(names, [(0, 1), (1, 2), (2, 3), (3, 4), (3, 5), (4, 5)])
+    monkeypatch.setattr(module, "_call", fake)
+    monkeypatch.setattr(wp, "get_cuda_driver_version", lambda: driver)
+    device = SimpleNamespace(is_cuda=True, get_cuda_compile_arch=lambda: arch)
+    assert overlap(SimpleNamespace(device=device, graph=ctypes.c_void_p(1))) == (2 if fake.changes else 0)
+    return fake.changes
+
+
+def test_edges_between_kernels_of_two_kinds_that_begin_early_are_changed(monkeypatch):
+    remove, add = changed(monkeypatch)
+    assert remove == ("cuGraphRemoveDependencies_v2", [(2, 3), (3, 5)], {(0, 0, 0, bytes(5))})
+    assert add == ("cuGraphAddDependencies_v2", [(2, 3), (3, 5)], {(1, 0, 1, bytes(5))})
+
+
+@pytest.mark.parametrize(("arch", "driver"), [(80, (13, 0)), (90, (12, 2)), (90, None)])
+def test_code_or_driver_that_is_too_old_leaves_a_graph_as_it_is(arch, driver, monkeypatch):
+    assert changed(monkeypatch, arch, driver) == []
 
 
 def test_graph_of_a_cpu_stays_as_it_is():

@@ -49,7 +49,11 @@ def _call(name: str, *arguments: Any) -> None:
 
 
 def _key(node: int) -> str:
-    """Key of the Warp kernel of a node; empty where it is something else."""
+    """Key of the Warp kernel of a node; empty where it is something else.
+
+    Raises:
+        RuntimeError: the driver does not say.
+    """
     handle, kind, params, name = ctypes.c_void_p(node), ctypes.c_int(), _Node(), ctypes.c_char_p()
     _call("cuGraphNodeGetType", handle, ctypes.byref(kind))
     if kind.value != _KERNEL:
@@ -60,19 +64,25 @@ def _key(node: int) -> str:
 
 
 def overlap(graph: Any) -> int:
-    """Let kernels of a captured graph begin early that can, after kernels of another kind.
+    """Let kernels of a captured graph begin early that can, after others that can.
 
-    Two of one kind are elements of two blocks: a second one that finds some multiprocessors full and others not would
-    spread unevenly.
+    All others begin, and are followed, as before: what they write may be read ahead of a wait. So may two of one kind,
+    elements of two blocks: a second one that finds some multiprocessors full and others not would spread unevenly.
 
     Args:
         graph: of Warp, not launched yet.
 
     Returns:
-        The number of edges that say so; none on a CPU, on a GPU before Hopper or with a driver older than 12.3.
+        The number of edges that say so; none on a CPU, where code is compiled for GPUs before Hopper, or with a driver
+        older than 12.3.
+
+    Raises:
+        RuntimeError: the driver failed.
     """
     device = graph.device
-    if not device.is_cuda or device.arch < LEAST_ARCH or tuple(wp.get_cuda_driver_version() or ()) < LEAST_DRIVER:
+    if not device.is_cuda or tuple(wp.get_cuda_driver_version() or ()) < LEAST_DRIVER:
+        return 0
+    if device.get_cuda_compile_arch() < LEAST_ARCH:  # of the code, which may be older than the device's own
         return 0
     count = ctypes.c_size_t()
     _call("cuGraphGetEdges_v2", graph.graph, None, None, None, ctypes.byref(count))
@@ -80,7 +90,8 @@ def overlap(graph: Any) -> int:
     begin, end, data = Nodes(), Nodes(), Edges()
     _call("cuGraphGetEdges_v2", graph.graph, begin, end, data, ctypes.byref(count))
     keys = {node: _key(node) for node in {*begin, *end}}
-    chosen = [k for k in range(count.value) if keys[end[k]] in EARLY and keys[begin[k]] not in ("", keys[end[k]])]
+    pairs = [(keys[a], keys[b]) for a, b in zip(begin, end, strict=True)]
+    chosen = [k for k, (a, b) in enumerate(pairs) if a in EARLY and b in EARLY and a != b]
     if not chosen:
         return 0
     edges = [_Edge(from_port=_PROGRAMMATIC, type=_PROGRAMMATIC) for _ in chosen]
