@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -348,3 +349,67 @@ def test_a_recorder_that_cannot_write_is_refused(
 
 def test_view_without_a_recording(capsys: pytest.CaptureFixture[str]):
     assert "--rrd" in refused(capsys, "view", "nowhere")
+
+
+LONG = 300 * "a"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "landing.py", "--out", LONG],
+        ["run", f"{LONG}.py"],
+        ["run", f"{LONG}.mca"],
+        ["run", "landing.py", "--rrd", f"{LONG}.rrd"],
+        ["build", "landing.py", "-o", f"{LONG}.mca"],
+        ["view", LONG],
+    ],
+)
+def test_a_name_that_is_too_long_is_refused(capsys: pytest.CaptureFixture[str], arguments: list[str]):
+    assert "too long" in refused(capsys, *arguments)
+
+
+def test_verify_looks_at_its_folder_first(capsys: pytest.CaptureFixture[str]):
+    assert "out = 'landing.py'" in refused(capsys, "verify", "rod_on_wall", "--out", "landing.py")
+
+
+def test_a_model_that_is_too_large_is_refused(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    def run(*args: object, **options: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(mca, "run", run)
+    assert "memory" in refused(capsys, "run", "landing.py")
+
+
+def shell(command: str, **environment: str) -> tuple[int, str]:
+    """Exit status and standard error of a shell command, in which `mca` is the program."""
+    program = f'mca() {{ {sys.executable} -m warp_mca "$@"; }}; '
+    done = subprocess.run(
+        ["bash", "-c", program + command], capture_output=True, text=True, env=os.environ | environment
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "words"),
+    [
+        ("mca scenes >&-", 0, ""),
+        ("mca scenes 2>&- <&-", 0, ""),
+        ("mca scenes | true; exit ${PIPESTATUS[0]}", 141, ""),
+        ("mca | true; exit ${PIPESTATUS[0]}", 141, ""),
+        ("mca scenes > /dev/full", 2, "standard output: No space left"),
+        ("PYTHONIOENCODING=ascii mca run --help", 0, ""),
+        ("mkdir gone; cd gone; rmdir ../gone; mca run two_link", 2, "working directory is gone"),
+        ("WARP_CACHE_PATH=/proc/x mca run landing.py", 2, "WARP_CACHE_PATH = '/proc/x'"),
+    ],
+)
+def test_streams_and_folders_that_are_not_there(command: str, status: int, words: str):
+    found, error = shell(command)
+    assert (found, error.count("\n")) == (status, 1 if words else 0), error
+    assert words in error
+
+
+def test_a_matplotlib_backend_of_another_environment_is_left_alone(here: Path):
+    found, error = shell("mca run landing.py --out there", MPLBACKEND="module://of.a.notebook")
+    assert (found, error) == (0, "")
+    assert (here / "there" / "forces.png").is_file()

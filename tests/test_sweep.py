@@ -51,6 +51,13 @@ def test_every_combination_the_last_key_fastest():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("given", [["--set", "v=3"], ["--time-step-scale", "0.3"]])
+def test_what_is_swept_is_not_set_as_well(given: list[str], capsys: pytest.CaptureFixture[str]):
+    key = "v" if "--set" in given else "time_step_scale"
+    assert main(["run", "block.py", "--sweep", f"{key}=0.1,0.2", *given]) == 2
+    assert f"{key} is set for all scenes as well" in capsys.readouterr().err
+
+
 def test_each_scene_of_a_sweep_has_its_folder(here: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["run", "block.py", "--sweep", "v=1,2", "--sweep", "mu=0,0.3", "--out", "all"]) == 0
     printed = capsys.readouterr().out

@@ -1,6 +1,7 @@
 """Owns the command line: warp-mca run | build | scenes | view | verify.
 
-Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 130 interrupted, 143 terminated.
+Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 129 the terminal is gone, 130
+interrupted, 141 nobody reads what is printed, 143 terminated.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import argparse
 import atexit
 import dataclasses
 import gc
+import io
 import os
 import signal
 import sys
@@ -75,7 +77,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Terminated(KeyboardInterrupt):
-    """SIGTERM, as batch systems send it: what a key stops is closed and cleared away in the same way."""
+    """SIGTERM, as batch systems send it, or SIGHUP: what a key stops is closed and cleared away in the same way."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -89,31 +91,86 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is None:  # the process ends with this command: going through all that it made, to free it, takes 0.5 s
         atexit.register(gc.freeze)
+        os.environ["MPLBACKEND"] = "agg"  # that of a notebook may be of another environment; no figure needs it
+        _open_streams()
     collect = gc.get_threshold()
     gc.set_threshold(COLLECT)
     main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
-    terminate = signal.signal(signal.SIGTERM, _terminate) if main_thread else None
+    signals = (signal.SIGTERM, signal.SIGHUP) if main_thread else ()
+    before = {number: signal.getsignal(number) for number in signals}
+    for number in signals:
+        if before[number] is not signal.SIG_IGN:  # as nohup has it
+            signal.signal(number, _terminate)
+    try:
+        return _carry_out(argv)
+    except McaError as error:
+        return _fail(str(error), error.exit_status)
+    except BrokenPipeError:
+        _drop_output()
+        return 128 + signal.SIGPIPE
+    except OSError as error:
+        _drop_output()
+        return _fail(_what_failed(error), 2)
+    except MemoryError:
+        return _fail("the model does not fit into this machine's memory: take fewer elements", 2)
+    except KeyboardInterrupt as stop:
+        what, number = ("terminated", stop.args[0]) if isinstance(stop, _Terminated) else ("interrupted", signal.SIGINT)
+        print(f"warp-mca: {what} before it was done; recordings hold the frames until then", file=sys.stderr)
+        return 128 + number
+    finally:
+        gc.set_threshold(*collect)
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+
+
+def _carry_out(argv: Sequence[str] | None) -> int:
+    """Carry out one command; what it printed has left the process when it returns."""
+    status = 0
     try:
         args = _parser().parse_args(argv)
         args.command(args)
-    except McaError as error:
-        print("warp-mca: error:", " ".join(str(error).split()), file=sys.stderr)
-        return error.exit_status
-    except KeyboardInterrupt as stop:
-        what, status = ("terminated", 143) if isinstance(stop, _Terminated) else ("interrupted", 130)
-        print(f"warp-mca: {what} before it was done; recordings hold the frames until then", file=sys.stderr)
-        return status
     except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands
-        return stop.code if isinstance(stop.code, int) else 2
-    finally:
-        gc.set_threshold(*collect)
-        if main_thread:
-            signal.signal(signal.SIGTERM, terminate or signal.SIG_DFL)
-    return 0
+        status = stop.code if isinstance(stop.code, int) else 2
+    sys.stdout.flush()
+    return status
+
+
+def _fail(why: str, status: int) -> int:
+    print("warp-mca: error:", " ".join(why.split()), file=sys.stderr)
+    return status
+
+
+def _what_failed(error: OSError) -> str:
+    """One sentence of what the system refused."""
+    what = error.strerror or str(error)
+    if error.filename is None and isinstance(error, FileNotFoundError):
+        return "the working directory is gone: change to one that exists"
+    return f"{error.filename}: {what}; name another" if error.filename else f"standard output: {what}"
+
+
+def _open_streams() -> None:
+    """Files would take the numbers of standard streams that are closed; a name may hold what they cannot print."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _drop_output() -> None:
+    """Leave nothing that Python would try to print once more at its end."""
+    with suppress(OSError, ValueError, AttributeError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
 
 
 def _terminate(number: int, frame: object) -> NoReturn:
-    raise _Terminated
+    raise _Terminated(number)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -249,6 +306,11 @@ def _request(args: argparse.Namespace, more: Mapping[str, str] | None = None) ->
     return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
 
 
+def _given(args: argparse.Namespace) -> set[str]:
+    """Parameters that the command sets for all scenes of a sweep."""
+    return {*registry.parse_overrides(args.settings), *([SCALE] if args.time_step_scale is not None else ())}
+
+
 def _where_no_parameter(scale: float | None, names: Collection[str], overrides: dict[str, object]) -> float | None:
     """The share of the stable time step, or None where the scene has it among its parameters, which take it then."""
     if scale is not None and SCALE in names:
@@ -306,7 +368,7 @@ def _sweep(args: argparse.Namespace) -> None:
     from warp_mca.report.console import progress_bar
     from warp_mca.sweep import batches, parse_sweep, print_sweep
 
-    settings = parse_sweep(args.sweeps)
+    settings = parse_sweep(args.sweeps, _given(args))
     requests = [_request(args, more) for more in settings]
     out = args.out or Path(f"{requests[0].label}-sweep")
     if _recorders(args, out):
@@ -356,6 +418,9 @@ def _start_warp(*needed: str) -> None:
         os.dup2(null, 2)
         warp.config.log_level = warp.LOG_WARNING
         warp.init()
+    except OSError as error:
+        what = f"kernels cannot be kept there ({error.strerror or error}); set WARP_CACHE_PATH to another folder"
+        raise bad_value("WARP_CACHE_PATH", str(error.filename), what) from error
     finally:
         os.dup2(stderr, 2)
         os.close(stderr)

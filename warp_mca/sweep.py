@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from warp_mca.errors import bad_value
@@ -13,8 +13,12 @@ if TYPE_CHECKING:
     from warp_mca.scene import Scene
 
 
-def parse_sweep(texts: Iterable[str]) -> list[dict[str, str]]:
+def parse_sweep(texts: Iterable[str], given: Collection[str] = ()) -> list[dict[str, str]]:
     """Settings of each scene, from texts `KEY=VALUE,VALUE,…`: every combination, the last key's values fastest.
+
+    Args:
+        texts: as the command line has them.
+        given: keys that are set for all scenes.
 
     Raises:
         RequestError: a text is not of that form, or a key occurs twice.
@@ -25,6 +29,8 @@ def parse_sweep(texts: Iterable[str]) -> list[dict[str, str]]:
         found = [value.strip() for value in listed.split(",")]
         if not (key and equals and all(found)):
             raise bad_value("--sweep", text, "write it as KEY=VALUE,VALUE,… without spaces")
+        if key in given:
+            raise bad_value("--sweep", text, f"{key} is set for all scenes as well; leave one of the two out")
         if key in values:
             raise bad_value("--sweep", text, f"list all values of {key} at once")
         values[key] = found

@@ -18,9 +18,15 @@ if TYPE_CHECKING:
 PIPED_WIDTH = 120  # characters in a line when the output is not a terminal
 
 
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Leave it to the caller: rich would end the process as if a guard had stopped it."""
+        raise BrokenPipeError
+
+
 def console() -> Console:
     """Standard output, plain: names and paths are shown as they are."""
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False, emoji=False)
+    return _Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False, emoji=False)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import GuardError, McaError
+from warp_mca.files import check_folder
 from warp_mca.solver import check_device
 from warp_mca.verify import cases
 from warp_mca.verify.case import Case, Level, Setup
@@ -53,11 +54,13 @@ def verify(
         out: folder for verification.md and its figure.
 
     Raises:
-        RequestError: there is no such case or device.
+        RequestError: there is no such case or device, or `out` takes no file.
         GuardError: a case was not met.
     """
     chosen = cases(names)
     check_device(device)
+    if out is not None:
+        check_folder("out", out)
     elements = [element] if element else list(ELEMENTS)
     outcomes = []
     for case in chosen:
