@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -287,6 +288,28 @@ def test_bad_values_are_named(make, field: str):
         make()
 
 
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Box(size=(1.0, 1.0, 1.0), divisions=(100_000, 100_000, 1)), r"Box\.divisions = \(100000, 100000, 1\)"),
+        (lambda: rod(axial=10**9).build(), r"Rod\.axial = 1000000000"),
+        (lambda: plate(layers=10**9).build(), r"Plate\.layers = 1000000000"),
+        (lambda: Sphere(radius=R, section=10**6).build(), r"Sphere\.section = 1000000"),
+    ],
+)
+def test_more_elements_than_fit_any_machine_are_refused_before_memory_is_taken(make, words: str):
+    with pytest.raises(RequestError, match=f"^{words}: more than 200,000,000 elements"):
+        make()
+
+
+def test_many_cells_beyond_the_box():
+    """Powers of the factor by which they grow went beyond what a float holds."""
+    assert growth(400.0, 300, 1.0) == pytest.approx(1.0018, rel=1e-3)
+    mesh = plate(length=0.06, width=0.04, height=0.01, extension=400, part="quarter").build()
+    assert_sound(mesh)
+    assert len(np.unique(mesh.points[mesh.nodes("zmax")][:, 0].round(9))) > 400
+
+
 def read_back(path: Path, mesh, **options) -> Mesh:
     import meshio
 
@@ -357,6 +380,38 @@ def test_mesh_file_point_and_cell_sets(tmp_path: Path):
     assert mesh.cell_sets["left"].tolist() == [0]
 
 
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("*Part, name=a\n{}*End Part\n*PART, name=b\n{}", r"more than one \*PART"),
+        ("{}*Instance, name=a-1\n*End Instance\n *x\n* instance, name=a-2", r"more than one \*INSTANCE"),
+        ("{}*INSTANCE, name=a-1, part=a\n** moved\n0.1, 0., 0.\n*END INSTANCE\n", r"\*INSTANCE is moved"),
+        ("{}*node\n99, 0., 0., 0.\n", r"more than one \*NODE"),
+    ],
+)
+def test_abaqus_files_that_meshio_misreads_are_refused(tmp_path: Path, lines: str, words: str):
+    """It numbers nodes from the start in each part, and leaves instances where their parts are."""
+    file = tmp_path / "it.inp"
+    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
+    read_back(file, as_meshio(box))
+    part = "".join(file.read_text().partition("*NODE")[1:])
+    file.write_text(f"*Part, name=a\n{part}*End Part\n*Instance, name=a-1, part=a\n\n** *Part\n*End Instance\n")
+    assert np.array_equal(MeshFile(file).build().points, box.points)
+    file.write_text(lines.format(part, part))
+    with pytest.raises(RequestError, match=rf"it\.inp.*{words}.*NO PARTS ASSEMBLIES"):
+        MeshFile(file).build()
+
+
+def test_a_refusal_gives_the_reason_of_meshio(tmp_path: Path):
+    """Files of gmsh were told to become what they were; some readers print their reason and exit, others raise it."""
+    for line, reason in (("9.9 0 8", "Need mesh format in"), ("4.1 0 8\n$EndMeshFormat", "Element section not found")):
+        (tmp_path / "it.msh").write_text(f"$MeshFormat\n{line}\n")
+        with pytest.raises(
+            RequestError, match=rf"\(.*{reason}.*\); save it in gmsh's format 4.1 with Mesh.SaveAll off"
+        ):
+            MeshFile(tmp_path / "it.msh").build()
+
+
 def test_mesh_file_refusals(tmp_path: Path, capfd):
     import meshio
 
@@ -387,7 +442,7 @@ def test_growth():
 
 
 def test_blocks_must_agree_on_shared_edges():
-    blocks = Blocks()
+    blocks = Blocks("it", count=4)
     low = [blocks.point(p) for p in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))]
     middle, high = ([blocks.point((*blocks.position(p)[:2], z)) for p in low] for z in (1.0, 2.0))
     blocks.block(low + middle, (2, 3, 4), "a")
@@ -434,6 +489,31 @@ def test_gmsh_is_silent_and_works_off_the_main_thread(capfd):
     thread.join()
     assert len(meshes) == 1
     assert capfd.readouterr() == ("", "")
+
+
+SIGNALS = """
+import signal, sys, threading
+from warp_mca.geometry import Rod
+def masks():
+    return [line for line in open("/proc/self/status") if line.startswith(("SigIgn", "SigCgt"))]
+signal.signal(signal.SIGTERM, lambda number, frame: print("caught"))
+before = masks()
+task = threading.Thread(target=Rod(radius=0.01, length=0.1).build)
+if sys.argv[1] == "main":
+    task.run()
+else:
+    task.start()
+    task.join()
+assert masks() == before, (before, masks())
+signal.raise_signal(signal.SIGTERM)
+"""
+
+
+@pytest.mark.parametrize("thread", ["main", "other"])
+def test_gmsh_leaves_signals_to_their_handlers(thread: str):
+    """SIGTERM killed the process after its first mesh, though Python still named its handler."""
+    done = subprocess.run([sys.executable, "-c", SIGNALS, thread], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "caught\n"), done.stderr
 
 
 def test_gmsh_session_of_the_caller_is_left_alone():

@@ -1,4 +1,4 @@
-"""Tests what is refused of meshes that are made by hand, or given to a run beside its scene."""
+"""Tests what is refused of meshes that are made by hand, or given to a run beside its scene, and of their sets."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import warp_mca as mca
 from warp_mca.assembly import body_materials
 from warp_mca.errors import RequestError
 from warp_mca.geometry import Box, Mesh
+from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.quality import check
+from warp_mca.model import Model, build_model
 
 
 def broken(fault: str) -> Mesh:
@@ -32,6 +34,16 @@ def broken(fault: str) -> Mesh:
         "no cell": dataclasses.replace(whole, points=points[:0], hexahedra=cells[:0], node_sets={}),
         "set beyond": dataclasses.replace(whole, node_sets={"end": np.array([0, 12])}),
         "cell set beyond": dataclasses.replace(whole, cell_sets={"core": np.array([2])}),
+        "mask": dataclasses.replace(whole, node_sets={"end": points[:, 0] > 1.5}),
+        "node twice": dataclasses.replace(whole, node_sets={"end": np.array([3, 7, 3])}),
+        "flat list": dataclasses.replace(whole, node_sets={"end": [0, 1]}),
+        "table": dataclasses.replace(whole, node_sets={"end": np.array([[0, 1]])}),
+        "sets": dataclasses.replace(whole, node_sets=None),
+        "number as cell set": dataclasses.replace(whole, cell_sets={"core": 0.0}),
+        "short cell mask": dataclasses.replace(whole, cell_sets={"core": np.array([True])}),
+        "listed points": dataclasses.replace(whole, points=points.tolist()),
+        "half precision": dataclasses.replace(whole, points=points.astype(np.float16)),
+        "listed cells": dataclasses.replace(whole, hexahedra=cells.tolist()),
     }[fault]
 
 
@@ -44,11 +56,21 @@ def broken(fault: str) -> Mesh:
         ("floats as nodes", ["hexahedra", "float64", "int32"]),
         ("node beyond", ["hexahedra", "99", "12 nodes"]),
         ("node below", ["hexahedra", "-1", "12 nodes"]),
-        ("cell twice", ["hexahedra", "[0, 2]", "same corners"]),
+        ("cell twice", ["hexahedra", "[0, 2]", "same corners", "format 2.2"]),
         ("idle node", ["points", "12", "in no cell"]),
         ("no cell", ["hexahedra", "at least one"]),
         ("set beyond", ["node_sets['end']", "12"]),
         ("cell set beyond", ["cell_sets['core']", "2 cells"]),
+        ("mask", ["node_sets['end']", "bool, shape (12,)", "np.flatnonzero"]),
+        ("node twice", ["node_sets['end'] = 3", "twice", "np.unique"]),
+        ("flat list", ["node_sets['end']", "list", "array"]),
+        ("table", ["node_sets['end']", "shape (1, 2)", "flat"]),
+        ("sets", ["node_sets", "NoneType", "dict"]),
+        ("number as cell set", ["cell_sets['core']", "float", "cell indices"]),
+        ("short cell mask", ["cell_sets['core']", "shape (1,)"]),
+        ("listed points", ["points", "list", "float64"]),
+        ("half precision", ["points", "float16", "float64"]),
+        ("listed cells", ["hexahedra", "list", "int32"]),
     ],
 )
 def test_a_mesh_that_is_not_whole_is_refused(fault, words):
@@ -101,3 +123,32 @@ def test_a_cell_has_one_material():
     ):  # "*" is the rest wherever it stands
         found = {m.E: cells.tolist() for m, cells in body_materials(body(**material), mesh)}
         assert found == {1e6: [0], 1e9: [1]}
+
+
+def test_cells_by_mask():
+    """Cut to tetrahedra, such a set held those of the first two cells."""
+    whole = dataclasses.replace(broken("none"), cell_sets={"far": np.array([False, True])})
+    check(whole, "arm")
+    assert tetrahedral(whole).cell_sets["far"].tolist() == list(range(6, 12))
+
+
+def test_fixed_sets_of_a_moving_body_may_overlap():
+    """Nodes that two of them hold were refused as prescribed twice, but only where the body moved."""
+    mesh = broken("none")
+    body = mca.Body(name="arm", geometry=mesh, material=mca.Elastic(E=1e9, nu=0.3, rho=1e3))
+    velocity = np.tile([0.0, 1.0, 0.0], (len(mesh.points), 1))
+
+    def model(axes: str, **more) -> Model:
+        fixed = tuple(mca.Fixed(body="arm", nodes=nodes, axes=axes) for nodes in ("xmin", "zmin"))
+        scene = mca.Scene(name="s", bodies=(body,), fixed=fixed, impact=mca.ImpactPhase(duration=1e-6), **more)
+        return build_model(scene, {"arm": mesh}, {"arm": mesh.points}, {"arm": velocity})
+
+    found = model("yy")
+    held = np.union1d(mesh.nodes("xmin"), mesh.nodes("zmin"))
+    np.testing.assert_array_equal(np.sort(found.prescribed_node), held)
+    assert set(found.prescribed_axis) == {1}
+    assert set(found.table_value) == {1.0}
+    driven = mca.Prescribed(body="arm", nodes="xmin", axis="y", times=(0.0,), velocities=(1.0,))
+    with pytest.raises(RequestError, match=r"^Prescribed\.nodes = 'xmin': axis y of some .* body arm is bound twice"):
+        model("y", prescribed=(driven,))
+    assert len(model("x", prescribed=(driven,)).prescribed_node) == 4

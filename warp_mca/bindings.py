@@ -22,8 +22,13 @@ class Hinge:
 
 
 def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
-    """Axes at rest as bits; driven axes, fixed ones that move included, as tables, because they do work."""
+    """Axes at rest as bits; driven axes, fixed ones that move included, as tables, because they do work.
+
+    Raises:
+        RequestError: an axis of a node is driven twice, or fixed and driven: each stage would undo what the other set.
+    """
     fixed_axes = np.zeros(len(parts.X), dtype=np.int32)
+    bound = np.zeros((len(parts.X), 3), dtype=bool)
     node, axis, table = [], [], []
     offset, time, value = [0], [], []
 
@@ -40,11 +45,18 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
         for letter in item.axes:
             k = "xyz".index(letter)
             fixed_axes[nodes[V[nodes, k] == 0.0]] |= 1 << k
-            for speed in np.unique(V[nodes, k]):
+            new = nodes[~bound[nodes, k]]  # the others are fixed already, at the same speed
+            bound[nodes, k] = True
+            for speed in np.unique(V[new, k]):
                 if speed != 0.0:
-                    drive(nodes[V[nodes, k] == speed], k, (0.0,), (float(speed),))
+                    drive(new[V[new, k] == speed], k, (0.0,), (float(speed),))
     for item in parts.scene.prescribed:
-        drive(parts.nodes(item.body, item.nodes), "xyz".index(item.axis), item.times, item.velocities)
+        nodes, k = parts.nodes(item.body, item.nodes), "xyz".index(item.axis)
+        if bound[nodes, k].any():
+            what = f"axis {item.axis} of some of these nodes of body {item.body} is bound twice"
+            raise bad_value("Prescribed.nodes", item.nodes, f"{what}, by another Prescribed or Fixed; bind it once")
+        bound[nodes, k] = True
+        drive(nodes, k, item.times, item.velocities)
 
     def join(items: list[NDArray]) -> Index:
         return np.concatenate(items).astype(np.int32) if items else np.zeros(0, np.int32)
@@ -119,15 +131,12 @@ def join_bodies(parts: Assembly) -> tuple[Index, Index, tuple[Hinge, ...]]:
 
 
 def check_bindings(held: dict[str, NDArray], first: Index, second: Index) -> None:
-    """Refuse nodes that are bound twice: each stage would undo what the other set.
+    """Refuse nodes on hinges that are fixed or driven too: each stage would undo what the other set.
 
     Raises:
-        RequestError: an axis is driven twice, or fixed and driven; a hinge's node is fixed or driven.
+        RequestError: there is such a node.
     """
-    node, axis = held["prescribed_node"], held["prescribed_axis"]
-    if len(np.unique(3 * node + axis)) < len(node) or ((held["fixed_axes"][node] >> axis) & 1).any():
-        raise RequestError("Scene.prescribed: an axis of a node is bound twice; drive or fix it once")
     bound = held["fixed_axes"] != 0
-    bound[node] = True
+    bound[held["prescribed_node"]] = True
     if bound[first].any() or bound[second[second != GROUND]].any():
         raise RequestError("Scene.joints: a node on a hinge is also fixed or driven; bind other nodes of that body")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+import os
+import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from warp_mca.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.recipe import check_size
 
 # Faces and edges of a block by the position of their corners; edges are grouped by the direction they run in.
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -26,11 +30,21 @@ def growth(length: float, count: int, before: float) -> float:
 
     Solves sum(before * q**i, i = 1..count) = length; where the cells would have to shrink, q is 1.
     """
+    if before * count >= length:
+        return 1.0
     q, low, high = 1.0, 1.0, 1e3
     for _ in range(100):
         q = (low * high) ** 0.5
-        low, high = (q, high) if before * sum(q**i for i in range(1, count + 1)) < length else (low, q)
+        low, high = (q, high) if before * _powers(q, count) < length else (low, q)
     return q
+
+
+def _powers(q: float, count: int) -> float:
+    """q + q**2 + … + q**count, or infinity where no float holds it."""
+    try:
+        return sum(q**i for i in range(1, count + 1))
+    except OverflowError:
+        return math.inf
 
 
 class Blocks:
@@ -40,13 +54,20 @@ class Blocks:
     their edges unless `on_sphere` puts them on a sphere.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, owner: str, /, **counts: int | tuple[int, ...]) -> None:
+        """Begins without blocks.
+
+        Args:
+            owner: the recipe, for messages.
+            counts: its values that divisions follow from.
+        """
+        self._owner, self._counts = owner, counts
         self._points: list[tuple[float, float, float]] = []
         self._arcs: dict[frozenset[int], int] = {}
         self._growth: dict[tuple[int, int], float] = {}
         self._count: dict[tuple[int, int], int] = {}
         self._spheres: dict[frozenset[int], int] = {}
-        self._blocks: list[tuple[tuple[int, ...], int, str]] = []
+        self._blocks: list[tuple[tuple[int, ...], tuple[int, int, int], str]] = []
         self._faces: dict[str, list[frozenset[int]]] = {}
 
     def point(self, position: ArrayLike) -> int:
@@ -85,7 +106,7 @@ class Blocks:
             cells: name of the cell set.
 
         Raises:
-            RequestError: a neighbour divides a shared edge differently.
+            RequestError: a neighbour divides a shared edge differently, or there are too many cells by now.
         """
         for edges, count in zip(_EDGES, divisions, strict=True):
             for i, j in edges:
@@ -94,7 +115,8 @@ class Blocks:
                     raise RequestError(
                         f"blocks that share the edge {a}-{b} divide it differently: give equal divisions"
                     )
-        self._blocks.append((tuple(corners), math.prod(divisions), cells))
+        self._blocks.append((tuple(corners), divisions, cells))
+        check_size(self._owner, [counts for _, counts, _ in self._blocks], **self._counts)
 
     def mesh(self) -> Mesh:
         """Meshes all blocks.
@@ -152,7 +174,7 @@ class Blocks:
     def _read(self, meshed: ModuleType, surfaces: dict[frozenset[int], int], volumes: list[int]) -> Mesh:
         """Collects hexahedra and sets; nodes that no hexahedron uses (arc centres) are left out."""
         blocks = [meshed.getElementsByType(5, tag)[1].reshape(-1, 8) for tag in volumes]
-        if [len(block) for block in blocks] != [count for _, count, _ in self._blocks]:
+        if [len(block) for block in blocks] != [math.prod(counts) for _, counts, _ in self._blocks]:
             raise RequestError("gmsh left a block without its hexahedra: change the recipe's values")
         tags, hexahedra = np.unique(np.concatenate(blocks), return_inverse=True)
         all_tags, coordinates, _ = meshed.getNodes()
@@ -181,6 +203,26 @@ def _outwards(points: np.ndarray, hexahedra: np.ndarray) -> np.ndarray:
 
 
 @contextmanager
+def _signals_kept() -> Iterator[None]:
+    """Whoever handles signals still does afterwards: gmsh's start resets SIGTERM and others behind Python's back.
+
+    In C, because Python takes signals in the main thread only, and knows no handler of a library.
+    """
+    if os.name != "posix":
+        yield
+        return
+    sigaction = ctypes.CDLL(None).sigaction
+    kept = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # more than the struct
+    for number, action in kept.items():
+        sigaction(int(number), None, action)
+    try:
+        yield
+    finally:
+        for number, action in kept.items():
+            sigaction(int(number), action, None)
+
+
+@contextmanager
 def _gmsh() -> Iterator[ModuleType]:
     """A silent gmsh with an empty model of our own; a session that the caller had open is left as it was."""
     try:
@@ -194,7 +236,8 @@ def _gmsh() -> Iterator[ModuleType]:
     with _one_at_a_time:
         mine = not gmsh.isInitialized()
         if mine:
-            gmsh.initialize(readConfigFiles=False, interruptible=False)  # signal handlers need the main thread
+            with _signals_kept():
+                gmsh.initialize(readConfigFiles=False, interruptible=False)  # signal handlers need the main thread
         before = None if mine else gmsh.model.getCurrent()
         options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.ElementOrder": 1}
         saved = {name: gmsh.option.getNumber(name) for name in options}

@@ -8,6 +8,7 @@ import numpy as np
 
 from warp_mca import validate
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.recipe import check_size
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +31,7 @@ class Box:
             validate.positive("Box", size=value)
         for value in self.divisions:
             validate.counts("Box", divisions=value)
+        check_size("Box", [self.divisions], divisions=self.divisions)
         for value in self.origin:
             validate.finite("Box", origin=value)
 

@@ -69,7 +69,8 @@ def tetrahedral(mesh: Mesh) -> Mesh:
     owner = np.append(owner[used], len(mesh.hexahedra) + np.arange(len(mesh.tetrahedra)))
     order = np.argsort(owner, kind="stable")
     cell_sets = {
-        name: np.flatnonzero(np.isin(np.sort(owner), cells)).astype(np.int32) for name, cells in mesh.cell_sets.items()
+        name: np.flatnonzero(np.isin(np.sort(owner), np.arange(mesh.cell_count)[cells])).astype(np.int32)
+        for name, cells in mesh.cell_sets.items()
     }
     none = np.zeros((0, 8), dtype=np.int32)
     tetrahedra = np.concatenate([cut, mesh.tetrahedra])[order].astype(np.int32)

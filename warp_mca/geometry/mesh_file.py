@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,11 +70,37 @@ class MeshFile:
             import meshio
         except ImportError as error:
             raise RequestError(f"meshio cannot be imported ({error}): install it with pip install meshio") from error
+        suffix, said = Path(self.path).suffix.lower(), io.StringIO()
         try:
-            with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            if suffix == ".inp":
+                self._check_abaqus()
+            with redirect_stdout(said), redirect_stderr(io.StringIO()):
                 return meshio.read(self.path)
+        except RequestError:
+            raise
         except (Exception, SystemExit) as error:  # some of its readers exit, others raise whatever went wrong
-            raise self._bad("meshio cannot read it; save it as binary .msh or as .vtu") from error
+            reason = textwrap.shorten(said.getvalue() if isinstance(error, SystemExit) else str(error), 200).rstrip(".")
+            what = f"meshio cannot read it ({reason})" if reason else "meshio cannot read it"
+            remedy = "in gmsh's format 4.1 with Mesh.SaveAll off" if suffix == ".msh" else "as binary .msh"
+            raise self._bad(f"{what}; save it {remedy} or as .vtu") from error
+
+    def _check_abaqus(self) -> None:
+        """Refuses what meshio passes over: it keeps the last block of nodes only, and places no instance."""
+        keyword, seen = "", set()
+        remedy = (
+            "write it as a flat input file (Abaqus: model keyword NO PARTS ASSEMBLIES), one *NODE in it, or as .vtu"
+        )
+        with Path(self.path).open(errors="replace") as lines:
+            for line in lines:
+                if line.startswith("**"):
+                    continue
+                if line.startswith("*"):
+                    keyword = line[1:].partition(",")[0].strip().upper()
+                    if keyword in seen:
+                        raise self._bad(f"it has more than one *{keyword}, which meshio would misread; {remedy}")
+                    seen |= {keyword} & {"NODE", "PART", "INSTANCE"}
+                elif keyword == "INSTANCE" and line.strip():
+                    raise self._bad(f"its *INSTANCE is moved, which meshio would pass over; {remedy}")
 
     def _cells(self, read: meshio.Mesh) -> dict[str, NDArray[np.int32]]:
         """Nodes of the cells of each kind, in the order of KINDS."""

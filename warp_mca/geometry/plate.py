@@ -101,7 +101,14 @@ class Plate:
 
     def _quarter(self) -> Mesh:
         """The part with x >= 0 and z >= 0; corners are indexed by their place along x, down and along z."""
-        blocks = Blocks()
+        blocks = Blocks(
+            "Plate",
+            core=self.core,
+            core_depth=self.core_depth,
+            layers=self.layers,
+            extension=self.extension,
+            extension_z=self.extension_z,
+        )
         nx, nz = self.core[0] // 2, self.core[1] // 2
         ny, layers, half = self.core_depth, self.layers, self._half_box
         core = _grid(blocks, [nx * self.core_size], [ny * self.core_size], [nz * self.core_size])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +14,7 @@ from warp_mca.geometry.mesh import Mesh
 # The three neighbours of each corner, ordered so that the edges towards them are right-handed.
 _NEIGHBOURS = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
 _EDGES = np.array([[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3], [1, 2, 3, 0, 5, 6, 7, 4, 4, 5, 6, 7]])
-
+_KEEP_ONE = "keep one of them (gmsh's format 2.2 writes a cell once for each of its physical groups, 4.1 does not)"
 
 # The same of a tetrahedron.
 _TET_NEIGHBOURS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -100,31 +102,54 @@ def check_whole(mesh: Mesh, name: str) -> None:
 
     Raises:
         RequestError: an array has another shape or type than `Mesh` says, there is no cell, a cell or a set counts
-            beyond the end, a node is in no cell, or two cells have the same corners.
+            beyond the end, a node is in no cell or in a set twice, or two cells have the same corners.
     """
-    points, cells = np.asarray(mesh.points), {"hexahedra": (mesh.hexahedra, 8), "tetrahedra": (mesh.tetrahedra, 4)}
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or not np.isfinite(points).all():
-        what = f"{points.dtype}, shape {points.shape}"
-        raise bad_value(f"body {name}: Mesh.points", what, "give three finite coordinates for each node, as float64")
+    points, cells = mesh.points, {"hexahedra": (mesh.hexahedra, 8), "tetrahedra": (mesh.tetrahedra, 4)}
+    whole = _is_array(points, "f", 2) and points.shape[1] == 3 and points.itemsize in (4, 8)
+    if not whole or not np.isfinite(points).all():
+        remedy = "give three finite coordinates for each node, as float64"
+        raise bad_value(f"body {name}: Mesh.points", _what(points), remedy)
     used = np.zeros(len(points), dtype=bool)
     for field, (nodes, corners) in cells.items():
-        owner, nodes = f"body {name}: Mesh.{field}", np.asarray(nodes)
-        if nodes.ndim != 2 or nodes.shape[1] != corners or nodes.dtype.kind not in "iu":
-            what = f"{nodes.dtype}, shape {nodes.shape}"
-            raise bad_value(owner, what, f"give the {corners} nodes of each cell, as int32")
+        owner = f"body {name}: Mesh.{field}"
+        if not _is_array(nodes, "iu", 2) or nodes.shape[1] != corners:
+            raise bad_value(owner, _what(nodes), f"give the {corners} nodes of each cell, as int32")
         _check_indices(owner, nodes, len(points), "nodes")
         used[nodes] = True
         twice = _repeated(nodes)
         if twice:
-            raise bad_value(owner, list(twice), "these two cells have the same corners; keep one of them")
+            raise bad_value(owner, list(twice), f"these two cells have the same corners; {_KEEP_ONE}")
     if not mesh.cell_count:
         raise bad_value(f"body {name}: Mesh.hexahedra", 0, "give at least one cell")
     if not used.all():
         idle = int(np.argmin(used))
         raise bad_value(f"body {name}: Mesh.points", idle, "this node is in no cell; leave it out of the mesh")
     for kind, sets, count in (("node", mesh.node_sets, len(points)), ("cell", mesh.cell_sets, mesh.cell_count)):
+        owner = f"body {name}: Mesh.{kind}_sets"
+        if not isinstance(sets, Mapping):
+            raise bad_value(owner, _what(sets), f"give a dict of names and {kind} indices")
         for key, members in sets.items():
-            _check_indices(f"body {name}: Mesh.{kind}_sets[{key!r}]", np.asarray(members), count, f"{kind}s")
+            if not (kind == "cell" and _is_array(members, "b", 1) and len(members) == count):  # that is a mask
+                _check_set(f"{owner}[{key!r}]", members, count, kind)
+
+
+def _check_set(owner: str, members: NDArray, count: int, kind: str) -> None:
+    if not _is_array(members, "iu", 1):
+        remedy = f"give {kind} indices as a flat int32 array, np.flatnonzero(mask) for a mask"
+        raise bad_value(owner, _what(members), remedy)
+    _check_indices(owner, members, count, f"{kind}s")
+    ordered = np.sort(members)
+    twice = ordered[1:][ordered[1:] == ordered[:-1]]
+    if kind == "node" and len(twice):
+        raise bad_value(owner, int(twice[0]), "this node is in the set twice; give np.unique of it")
+
+
+def _is_array(value: object, kinds: str, dimensions: int) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in kinds and value.ndim == dimensions
+
+
+def _what(value: object) -> str:
+    return f"{value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
 
 
 def _check_indices(owner: str, indices: NDArray, count: int, what: str) -> None:

@@ -116,7 +116,14 @@ class Rod:
 
     def _half(self) -> Mesh:
         """The half with z >= 0, its focus turned to y >= 0."""
-        blocks = Blocks()
+        blocks = Blocks(
+            "Rod",
+            section=self.section,
+            ring=self.ring,
+            axial=self.axial,
+            tip_layers=self.tip_layers or 0,
+            focus_layers=self.focus_layers,
+        )
         start, _ = disc(blocks, 0.0, self.radius)
         end, centre = disc(blocks, self._cylinder, self.radius)
         join(blocks, start, end, (self.section, self.ring, self.axial), "body")

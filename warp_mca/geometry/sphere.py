@@ -88,7 +88,7 @@ class Sphere:
 
     def _half(self) -> Mesh:
         """The half with z >= 0."""
-        blocks = Blocks()
+        blocks = Blocks("Sphere", section=self.section, ring=self.ring, pole_layers=self.pole_layers)
         equator, centre = disc(blocks, 0.0, self.radius)
         Hemisphere(
             centre=blocks.position(centre),
