@@ -12,7 +12,6 @@ from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_prev
 from warp_mca.kernels.projection import interpolate, project, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
-from warp_mca.surfaces import LIST_LENGTH
 
 wp.set_module_options({"enable_backward": False})
 
@@ -21,6 +20,13 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 # A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
 _EDGE_REACH = 1.02
+# Where such neighbours rise, the node is deeper in the next face at once, by less than that reach; share of an edge.
+_FOLD = 0.01
+_SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
+_FAR = 1e30  # further than anything [m]
+
+# Depth before the first step: bodies may overlap from the start.
+ANY_DEPTH = _FAR
 
 
 @wp.struct
@@ -31,7 +37,8 @@ class Spring:
     weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
     far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
     force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
-    penetration so far [m].
+    penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
+    in front of all faces, ANY_DEPTH before the first step [m]; planes leave it alone.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -45,6 +52,7 @@ class Spring:
     normal_impulse: wp.array(dtype=wp.float64)
     stick_impulse: wp.array(dtype=wp.float64)
     depth: wp.array(dtype=wp.float64)
+    held: wp.array(dtype=wp.float64)
 
 
 @cache
@@ -104,12 +112,36 @@ def master_velocity(
     return interpolate(weight, v[face[f, 0]], v[face[f, 1]], v[face[f, 2]], v[face[f, 3]])
 
 
+@wp.func
+def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.float64, edge: wp.float64) -> bool:
+    """Whether a node can have come to this depth in a face; else it has not: it is beside the edge of a solid.
+
+    There a node in front of one face lies behind the next, which stands across, by up to a whole face. But depth grows
+    from nothing, and in a step by as much as the node moved along the normal.
+
+    Args:
+        depth: behind the face [m].
+        held: depth before this step, as `Spring` has it [m].
+        front: distance to the nearest face that has the node in front of it [m].
+        moved: along the face's normal in this step, as the face sees it [m].
+        edge: length of the face's edges [m].
+    """
+    before = held
+    slack = wp.float64(_SLACK) * edge
+    if depth < front:
+        if held > wp.float64(0.0):  # inside already, and maybe past a fold since
+            slack = held + wp.float64(_FOLD) * edge
+    elif held == wp.float64(ANY_DEPTH):
+        before = wp.float64(0.0)
+    return depth <= before + wp.float64(2.0) * wp.abs(moved) + slack
+
+
 @cache
 def surface_kernel(friction: bool, each: bool) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
 
     Slaves are those from `first` on. With `each`, scenes of a batch have values of their own, and slaves know their
-    scene.
+    scene. Of the faces that have a node behind them the shallowest counts, if it is `reachable`; no deeper one is then.
     """
     press = spring_function(friction)
     open_contact = open_function(friction)
@@ -147,6 +179,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         best_normal = wp.vec3d()
         best_at = wp.vec2d()
         best_triangle = bool(False)
+        front = wp.float64(_FAR)
         x = X[i] + u[i]
         for c in range(count[s]):
             i0 = face[f, 0]
@@ -172,19 +205,31 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                         best_at = at
                         best_triangle = i2 == i3
                         best_area = area
-            f = candidate[s, wp.min(c + 1, wp.static(LIST_LENGTH - 1))]
+                elif gap >= wp.float64(0.0):
+                    front = wp.min(front, gap)
+            f = candidate[s, wp.min(c + 1, candidate.shape[1] - 1)]
+        held = spring.held[s]
         if best >= 0:
-            if best_gap * best_gap > best_area:
-                flag_out[k, TOO_DEEP] = 1
             weight = weights_at(best_at, best_triangle)
             du = dt * (v[i] - master_velocity(v, face, best, weight))
-            force = press(s, best_gap, best_normal, du, stiffness[s], of(mu, k), spring)
-            spring.face[s] = best
+            edge = wp.float64(2.0) * wp.sqrt(best_area)
+            touches = reachable(-best_gap, held, front, wp.dot(du, best_normal), edge)
+            # a spring with neither gap nor normal has no force, and is released as an open one
+            gap_kept = wp.where(touches, best_gap, wp.float64(0.0))
+            normal_kept = wp.where(touches, best_normal, wp.vec3d())
+            force = press(s, gap_kept, normal_kept, du, stiffness[s], of(mu, k), spring)
+            spring.face[s] = wp.where(touches, best, -1)
             spring.weight[s] = weight
+            spring.held[s] = wp.where(touches or front < wp.float64(_FAR), -gap_kept, held)
             contact_force_out[i] = contact_force_out[i] + force
-        elif spring.face[s] >= 0:
-            du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
-            open_contact(s, du, stiffness[s], spring)
+            if gap_kept * gap_kept > best_area:
+                flag_out[k, TOO_DEEP] = 1
+        else:
+            if spring.face[s] >= 0:
+                du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
+                open_contact(s, du, stiffness[s], spring)
+            if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(_FAR)):
+                spring.held[s] = wp.float64(0.0)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 

@@ -278,3 +278,41 @@ def test_durations_that_differ_by_rounding_are_one():
 def test_one_duration_for_all():
     results = mca.run_batch([hinged(), hinged(duration=3e-5)], duration=2e-6)
     assert [len(result.time) for result in results] == [3, 3]
+
+
+@pytest.mark.parametrize(
+    ("scenes", "settings", "message"),
+    [
+        (hinged(), {}, r"scenes = 'Scene': give a list of scenes"),
+        ("two_link", {}, r"scenes = 'two_link': give a list of scenes"),
+        (["two_link"], {}, r"scenes\[0\] = 'two_link': give a warp_mca.Scene"),
+        ([hinged()], {"duration": "x"}, r"duration = 'x': give a finite time"),
+        ([hinged()], {"meshes": {"low": None}}, r"meshes = 'dict': give a list"),
+        ([hinged()], {"out": 5}, r"out = 5: name a folder"),
+    ],
+)
+def test_another_kind_of_argument_is_refused_by_name(scenes, settings, message):
+    with pytest.raises(mca.RequestError, match=message):
+        mca.run_batch(scenes, **settings)
+
+
+def test_scenes_may_come_one_by_one():
+    assert len(mca.run_batch(hinged(mu=mu) for mu in (0.1, 0.2, 0.3))) == 3
+
+
+def test_force_leaves_no_files_of_an_earlier_batch(tmp_path):
+    sound, stopped = hinged(duration=2e-6), hinged(duration=2e-6, energy_tolerance=1e-12)
+    mca.run_batch([sound] * 11, out=tmp_path)
+    for name in ("2024", "notes"):  # no results; not numbered
+        (tmp_path / name).mkdir()
+    (tmp_path / "2024" / "forces.png").touch()
+    (tmp_path / "notes" / "summary.json").touch()
+    (tmp_path / "10" / "mine.txt").touch()
+    mca.run_batch([sound, sound], out=tmp_path, force=True)
+    assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "10", "2024", "notes"}
+    assert [path.name for path in (tmp_path / "10").iterdir()] == ["mine.txt"]
+    results = mca.run_batch([sound, stopped], out=tmp_path, force=True)
+    assert results[1].stopped
+    assert {path.name for path in tmp_path.iterdir()} == {"0", "10", "2024", "notes"}
+    assert [path.name for path in (tmp_path / "notes").iterdir()] == ["summary.json"]
+    assert [path.name for path in (tmp_path / "2024").iterdir()] == ["forces.png"]

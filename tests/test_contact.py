@@ -1,5 +1,7 @@
 """Contact: closest points, stick-slip, momentum, sliding friction and the guards."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import warp as wp
@@ -10,6 +12,7 @@ from warp_mca import solver
 from warp_mca.kernels import search
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.projection import bilinear, closest_point, interpolate, shape
+from warp_mca.surfaces import contact_passes, make_faces
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)
 
@@ -233,6 +236,91 @@ def test_springs_are_empty_after_a_bounce(monkeypatch):
         assert np.abs(getattr(stage.spring, name).numpy()).max() == 0.0
     assert result["E_friction"][-1] > 0.0 == result["E_contact"][-1]
     assert np.abs(result.F_n[-5:]).max() == 0.0
+
+
+def bars(nodes, *, gap=1e-4, ratio=1, **contact):
+    """A bar of 10 x 10 mm meets one of 12 x 12 mm end to end at 2 m/s; the master is `nodes` of the latter."""
+    thin = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2 * ratio, ratio, ratio), origin=(-0.02 - gap, -0.005, -0.005))
+    thick = mca.Box(size=(0.024, 0.012, 0.012), divisions=(2, 1, 1), origin=(0.0, -0.006, -0.006))
+    return mca.Scene(
+        name="bars",
+        bodies=(
+            mca.Body(name="thin", geometry=thin, material=SOFT, velocity=(2.0, 0.0, 0.0)),
+            mca.Body(name="thick", geometry=thick, material=SOFT),
+        ),
+        contacts=(
+            mca.Contact(
+                slave=mca.Surface(body="thin", nodes="xmax"), master=mca.Surface(body="thick", nodes=nodes), **contact
+            ),
+        ),
+        impact=mca.ImpactPhase(duration=1e-4, output_interval=1e-6),
+    )
+
+
+@pytest.mark.parametrize("gap", [1e-4, 0.0])
+def test_closed_surface_pushes_as_the_face_that_is_touched(gap):
+    """Nodes in front of the end are 1 mm behind the sides, and count as in front of these until they come through."""
+    end, skin = (mca.run(bars(nodes, gap=gap, ratio=3), precision="float64") for nodes in ("xmin", "boundary"))
+    assert end["E_contact"].max() > 1e-4
+    for name in ("E_contact", "E_kinetic"):
+        assert skin[name] == pytest.approx(end[name], abs=1e-6 * end["E_kinetic"][0])
+
+
+def test_bodies_that_overlap_from_the_start_are_pushed_apart():
+    """So are those that begin deeper than any slack; later, nobody can be there."""
+    scene = bars("boundary", gap=-5e-4, ratio=3)
+    scene = mca.Scene(**{**vars(scene), "impact": mca.ImpactPhase(duration=2e-5, energy_tolerance=10.0)})
+    result = mca.run(scene)
+    assert result.summary["max_penetration"] == pytest.approx(5e-4, rel=0.2)
+    assert result["E_contact"][0] > 10.0 * result["E_contact"][-1]
+    assert result["E_kinetic"][-1] > 2.0 * result["E_kinetic"][0]
+
+
+def test_node_that_slides_through_a_fold_deep_down_stays_in_contact():
+    """Between two strips that rise it is behind neither for a while, then deep behind the next at once."""
+    block = mca.Box(size=(0.006, 0.01, 0.006), divisions=(1, 1, 1), origin=(0.003, 0.0, 0.007))
+    valley = mca.Box(size=(0.06, 0.01, 0.02), divisions=(6, 1, 1), origin=(0.0, -0.01, 0.0))
+    scene = mca.Scene(
+        name="valley",
+        bodies=(
+            mca.Body(name="block", geometry=block, material=SOFT, velocity=(6.0, 0.0, 0.0)),
+            mca.Body(name="valley", geometry=valley, material=mca.Elastic(E=1e12, nu=0.2, rho=1e9)),  # sets no step
+        ),
+        contacts=(
+            mca.Contact(
+                slave=mca.Surface(body="block", nodes="ymin"),
+                master=mca.Surface(body="valley", nodes="ymax"),
+                penalty=PENALTY,
+            ),
+        ),
+        fixed=(mca.Fixed(body="valley", nodes="ymin"), mca.Fixed(body="valley", nodes="ymax")),
+        gravity=(0.0, -1e4, 0.0),
+        impact=mca.ImpactPhase(duration=6e-3, output_interval=2e-5),
+    )
+    meshes = dict(mca.mesh(scene))
+    points = meshes["valley"].points.copy()
+    points[:, 1] += np.tan(0.3) * (np.abs(points[:, 0] - 0.03) - 0.027)
+    meshes["valley"] = replace(meshes["valley"], points=points)
+    result = mca.run(scene, meshes=meshes, precision="float64")
+    assert result.F_n[-50:].mean() == pytest.approx(3.6, rel=0.5)  # it rocks on its way up, and weighs as much
+
+
+def test_mesh_six_times_as_fine_touches():
+    """Lists of slaves follow from the meshes; those of like meshes stay as short as they were."""
+    coarse, fine = (mca.run(bars("xmin", ratio=ratio), precision="float64") for ratio in (3, 6))
+    assert fine["E_contact"].max() > 0.0
+    assert (fine.F_n * fine.time[1]).sum() == pytest.approx((coarse.F_n * coarse.time[1]).sum(), rel=0.03)
+
+
+@pytest.mark.parametrize(("ratio", "room"), [(1, 32), (2, 32), (6, 224), (100, 4096)])
+def test_room_of_lists_follows_from_the_meshes(ratio, room):
+    def faces(h):
+        X = h * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+        return make_faces(X, np.array([[0, 1, 2, 3]], np.int32), np.zeros(1, np.int32), np.ones(1), np.ones(1))
+
+    contact = bars("xmin").contacts[0]
+    (item,) = contact_passes(contact, 0, faces(1.0), faces(float(ratio)))
+    assert item.room == room
 
 
 def test_lists_of_slaves_are_sorted():

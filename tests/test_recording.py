@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from warp_mca.model import build_model
 from warp_mca.output import Output
 from warp_mca.paths import locate
 from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
-from warp_mca.recorders.frames import skins
+from warp_mca.recorders.frames import Recording, check_files, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
 from warp_mca.solver import Solver
 
@@ -199,6 +200,33 @@ def test_a_recorder_that_cannot_start_stops_the_run_before_it_begins(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_what_other_recorders_made_is_removed_when_one_cannot_start(tmp_path):
+    class Unwilling(Memory):
+        def start(self, info) -> None:
+            raise RequestError("no room")
+
+    (tmp_path / "old.vtkhdf").write_text("older")
+    files = RerunStream(tmp_path / "new" / "a.rrd"), UsdFile(tmp_path / "a.usdc"), VtkHdfFile(tmp_path / "old.vtkhdf")
+    with pytest.raises(RequestError, match="no room"):
+        mca.run(bar(), recorders=[*files, Unwilling(SURFACE)])
+    assert [path.name for path in tmp_path.iterdir()] == ["old.vtkhdf"]
+    assert (tmp_path / "old.vtkhdf").read_text() == "older"
+
+
+def test_a_recording_knows_which_recorders_failed(bars):
+    class Unable(Memory):
+        name = "unable"
+
+        def finish(self, ok: bool) -> None:
+            raise OSError("no space left")
+
+    silent, good = Memory(SURFACE), Memory(SURFACE)
+    silent.name, silent.failed = "silent", True
+    recording = Recording([Unable(SURFACE), silent, good], bars.info, 10, 1, None)
+    recording.finish(True)
+    assert recording.failed == ["unable", "silent"]
+
+
 @pytest.mark.parametrize("kind", [UsdFile, RerunStream, FinalState, VtkHdfFile])
 def test_a_file_that_cannot_be_made_is_refused_before_any_recorder_starts(kind):
     suffix = {UsdFile: "usdc", RerunStream: "rrd", FinalState: "vtu", VtkHdfFile: "vtkhdf"}[kind]
@@ -213,15 +241,45 @@ def test_two_recorders_of_one_file_are_refused(tmp_path, kind):
     """The second file of USD replaced the stage of the first, which broke off with a warning."""
     suffix = {UsdFile: "usdc", RerunStream: "rrd", FinalState: "vtu"}[kind]
     recorders = [kind(tmp_path / f"a.{suffix}"), kind(tmp_path / "." / f"a.{suffix}")]
-    with pytest.raises(RequestError, match="two of them write this file"):
+    with pytest.raises(RequestError, match="two outputs write this file"):
         mca.run(bar(), recorders=recorders)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("names", "out", "words"),
+    [
+        (["a.usdc"], "a.usdc", "cannot be there beside .*a.usdc/summary.json"),
+        (["a.rrd"], "a.rrd/o", "cannot be there beside"),
+        (["a.usdc", "a.usdc/b.rrd"], None, "cannot be there beside"),
+        (["a.usdc/b.rrd", "a.usdc"], None, "cannot be there beside"),
+        (["a.xdmf", "a.xmf"], None, "two outputs write this file"),  # both take a.h5
+        (["a.xdmf"], "a.h5", "cannot be there beside"),
+        (["o/forces.png"], "o", "two outputs write this file"),
+    ],
+)
+def test_outputs_that_cross_are_refused(tmp_path, monkeypatch, names: list[str], out: str | None, words: str):
+    monkeypatch.chdir(tmp_path)
+    kinds = {".usdc": UsdFile, ".rrd": RerunStream, ".png": partial(SnapshotFile, time=0.0)}
+    recorders = [kinds.get(Path(name).suffix, FinalState)(name) for name in names]
+    with pytest.raises(RequestError, match=f"^recorders = '.*': .*{words}[^\n]*$"):
+        check_files(recorders, out)
+
+
+def test_outputs_side_by_side_are_fine(tmp_path):
+    files = UsdFile(tmp_path / "o" / "a.usdc"), FinalState(tmp_path / "o" / "a.xdmf"), RerunStream(viewer=True)
+    check_files(files, tmp_path / "o")
+
+
 def test_a_snapshot_after_the_end_is_refused(tmp_path):
-    """It showed the last state, in a file that is named after the time that was asked for."""
+    """It showed the last state, in a file named after the time that was asked for, and other files were replaced."""
+    names = "a.rrd", "a.usdc"
+    for name in names:
+        (tmp_path / name).write_text("older")
+    files = RerunStream(tmp_path / "a.rrd"), UsdFile(tmp_path / "a.usdc")
     with pytest.raises(RequestError, match=r"snapshot = 0\.0001: the run ends at 4e-05 s"):
-        mca.run(bar(), recorders=[SnapshotFile(tmp_path / "a.png", time=1e-4)])
+        mca.run(bar(), recorders=[*files, SnapshotFile(tmp_path / "a.png", time=1e-4)])
+    assert [(tmp_path / name).read_text() for name in names] == ["older"] * 2
     mca.run(bar(), recorders=[SnapshotFile(tmp_path / "a.png", time=4e-5)])
     assert (tmp_path / "a.png").is_file()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import gc
 import math
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 
 from warp_mca.errors import RequestError
 from warp_mca.registry import Param, Parameter, SceneSource, load_source, make_scene, parse_overrides, scene_names
+from warp_mca.results import Result
 from warp_mca.scene import Scene
 
 SCENE = '''"""A block falls.
@@ -169,6 +172,10 @@ def test_moduli_that_contradict_each_other_are_refused():
         ("def build(*, x): ...", "default"),
         ("def build(*, x: tuple = ()): ...", "float, an int, a str or a bool"),
         ("def build(): ...\nPRESETS = ['quick']", "PRESETS"),
+        ("def build(): ...\nPRESETS = {5: {}}", "PRESETS"),
+        ("def build(): ...\ncheck = 'x'", r"bad\.check = 'x': make it a function"),
+        ("def build(*, x: 'float[' = 1.0): ...", "an annotation of build"),
+        ("import functools\ndef make(): ...\nbuild = functools.partial(make, 1)", "build"),
     ],
 )
 def test_a_file_that_is_no_scene_file_is_refused(tmp_path: Path, text: str, words: str):
@@ -208,3 +215,60 @@ def test_a_file_that_exits_is_no_run_that_succeeded(tmp_path: Path, text: str):
     path.write_text(text)
     with pytest.raises(RequestError, match=r"failed.*SystemExit"):
         make_scene(str(path))
+
+
+def test_build_may_be_a_partial_function(tmp_path: Path):
+    path = tmp_path / "part.py"
+    path.write_text(
+        SCENE.replace("def build(", "def make(") + "import functools\nbuild = functools.partial(make, edge=3.0)\n"
+    )
+    source = load_source(str(path))
+    assert source.resolve()["edge"] == 3.0
+    assert source.build(source.resolve("large")).parameters["edge"] == 2.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_async_functions_are_refused_without_warnings(tmp_path: Path):
+    path = tmp_path / "late.py"
+    path.write_text("async def build(): ...\nasync def check(result): return []")
+    source = load_source(str(path))
+    with pytest.raises(RequestError, match=r"late\.build\(\) = 'coroutine': return a warp_mca\.Scene"):
+        source.build({})
+    with pytest.raises(RequestError, match=r"late\.check\(\) = 'coroutine': return a list of sentences"):
+        source.findings(Result({}, {}))
+    gc.collect()
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("1 / 0", r"check\(\) failed with ZeroDivisionError: .*line 2"),
+        ("exit()", r"check\(\) failed with SystemExit"),
+        ("None", r"block\.check\(\) = None: return a list"),
+        ("'fine'", r"block\.check\(\) = 'fine': return a list"),
+        ("[1]", r"block\.check\(\) = 'list': return a list"),
+    ],
+)
+def test_a_check_that_fails_is_told_in_one_sentence(tmp_path: Path, body: str, words: str):
+    path = tmp_path / "block.py"
+    path.write_text(f"def check(result):\n    return {body}\ndef build(): ...\n")
+    with pytest.raises(RequestError, match=words):
+        load_source(str(path)).findings(Result({}, {}))
+
+
+def test_findings_are_what_check_says(source: SceneSource):
+    assert source.findings(Result({}, {})) == []
+    assert dataclasses.replace(source, check=lambda result: ["look"]).findings(Result({}, {})) == ["look"]
+    assert dataclasses.replace(source, check=None).findings(Result({}, {})) == []
+
+
+@pytest.mark.parametrize("name", [None, 5, [], ""])
+def test_what_names_no_scene_is_refused(name: object):
+    with pytest.raises(RequestError, match=r"scene = .*two_link"):
+        make_scene(name)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("preset", [5, ["quick"]])
+def test_what_names_no_preset_is_refused(preset: object):
+    with pytest.raises(RequestError, match=r"preset = .*quick"):
+        make_scene("two_link", preset=preset)  # type: ignore[arg-type]

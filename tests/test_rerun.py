@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -135,6 +136,38 @@ def test_a_full_disk_is_a_warning_and_what_was_recorded_stays(
     (warning,) = bars.said
     assert "are free on its disk" in warning
     assert len(list(rows(tmp_path / "full.rrd", "/world/lower", "Mesh3D:vertex_positions"))) >= rerun_stream.FLUSH_EVERY
+
+
+def test_a_file_without_its_end_is_removed_and_counts_as_failed(tmp_path: Path, bars: FlyingBars):
+    """rerun says nothing when its last write fails."""
+    recorder = RerunStream(tmp_path / "a.rrd")
+    recorder.start(bars.info)
+    recorder.frame(bars.frame(0))
+    stream = recorder._file_stream
+    disconnect = stream.disconnect
+    stream.disconnect = lambda: (disconnect(), os.truncate(tmp_path / "a.rrd", 2000))
+    recorder.finish(True)
+    assert recorder.failed
+    assert list(tmp_path.iterdir()) == []
+    (warning,) = bars.said
+    assert warning.endswith("recording stopped after 1 frames: it could not be written; the broken file is removed")
+
+
+def test_a_recorder_serves_a_second_run(tmp_path: Path, bars: FlyingBars):
+    recorder = record(tmp_path / "a.rrd", bars)
+    recorder.start(bars.info)
+    recorder.frame(bars.frame(0))
+    recorder.finish(True)
+    assert recorder.frame_count == 1
+    assert list(rows(tmp_path / "a.rrd", "/legend/ticks", "Points2D:labels"))  # they come with the first frame
+
+
+def test_names_stay_apart(tmp_path: Path, bars: FlyingBars):
+    surfaces = dict(zip(("rod 1", "rod_1", "contact points"), [*bars.info.surfaces.values()] * 2, strict=False))
+    bars.info = dataclasses.replace(bars.info, surfaces=surfaces)
+    record(tmp_path / "a.rrd", bars)
+    for entity in ("/world/rod_1", "/world/rod_1_", "/world/contact_points_"):
+        assert len(list(rows(tmp_path / "a.rrd", entity, "Mesh3D:vertex_positions"))) == FRAMES
 
 
 def test_a_viewer_that_cannot_open_is_a_warning(tmp_path: Path, bars: FlyingBars, monkeypatch: pytest.MonkeyPatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,59 @@ def test_load_says_what_is_wrong(tmp_path: Path, damage: str):
         (tmp_path / "history.csv").write_text("a,b\n1,x\n" if damage == "text" else "a,b\n1,2,3\n")
     with pytest.raises(RequestError, match=r"summary\.json" if damage == "missing" else "damaged"):
         load(tmp_path)
+
+
+def _cut(folder: Path) -> None:
+    """As where a copy ended in the middle of the last number."""
+    file = folder / "history.csv"
+    file.write_bytes(file.read_bytes()[:-2])
+
+
+def _compressed(folder: Path) -> None:
+    """A damaged byte where a packed array begins: there is no such kind of packing."""
+    np.savez_compressed(folder / "paths.npz", **{"p/position_m": TIME})
+    data = bytearray((folder / "paths.npz").read_bytes())
+    data[30 + data[26] + data[28]] = 0xFF  # behind the header, the name and the extra field
+    (folder / "paths.npz").write_bytes(data)
+
+
+def _history(change: Callable[[str], str]) -> Callable[[Path], None]:
+    def damage(folder: Path) -> None:
+        file = folder / "history.csv"
+        file.write_text(change(file.read_text()))
+
+    return damage
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda folder: (folder / "summary.json").write_text("[]"),
+        lambda folder: (folder / "summary.json").write_text('{"warnings": 5}'),
+        lambda folder: (folder / "summary.json").write_text("[" * 100_000),
+        lambda folder: (folder / "paths.npz").touch(),
+        lambda folder: np.save((folder / "paths.npz").open("wb"), TIME),
+        _compressed,
+        _cut,
+        _history(lambda text: ""),
+        _history(lambda text: text.partition("\n")[2]),
+        _history(lambda text: text.partition("\n")[0] + "\n"),
+        _history(lambda text: text.replace("F_n_N", "F_N", 1)),
+        _history(lambda text: text.replace("\n", "\n#", 1)),
+    ],
+    ids="list warnings nested no-paths npy zlib cut empty no-header no-rows columns comment".split(),
+)
+def test_damaged_files_are_refused_in_one_sentence(tmp_path: Path, damage: Callable[[Path], object]):
+    save(Result({}, history()), tmp_path)
+    damage(tmp_path)
+    with pytest.raises(RequestError, match="its files are damaged; run again"):
+        load(tmp_path)
+
+
+@pytest.mark.parametrize("name", [5, "", None, "a\0b"])
+def test_what_is_no_folder_is_refused(name: object):
+    with pytest.raises(RequestError, match=r"results = .*: name a folder"):
+        load(name)  # type: ignore[arg-type]
 
 
 def test_result_names_its_columns():

@@ -1,11 +1,19 @@
 """Whole runs: bar theory, precision, repetition, guards, and that a scene pays only for what it has."""
 
+import threading
+import time
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import warp as wp
 
 import warp_mca as mca
 from warp_mca.errors import RequestError
+from warp_mca.simulation import divide, prepare
 
 ALUMINIUM = {"E": 70e9, "nu": 0.0, "rho": 2700.0}
 C = np.sqrt(70e9 / 2700.0)
@@ -204,3 +212,101 @@ def test_what_no_number_or_history_holds_is_refused(changes, words):
 def test_a_duration_that_never_ends_is_refused():
     with pytest.raises(mca.RequestError, match=r"rows, a history holds"):
         mca.run(bar(), duration=1e30)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"duration": "1e-5"}, r"duration = '1e-5': give a finite time"),
+        ({"duration": True}, r"duration = True: give a finite time"),
+        ({"recorders": None}, r"recorders = None: give a list of recorders"),
+        ({"recorders": ["a.rrd"]}, r"recorders\[0\] = 'a.rrd': give a recorder"),
+        ({"meshes": {"bar": None}}, r"meshes\['bar'\] = None: give a finished Mesh"),
+        ({"meshes": {"b": None, 5: None}}, r"meshes = \['b', 5\]: give a mesh of body bar too"),
+        ({"meshes": 5}, r"meshes = 5: give a Mesh for each body"),
+        ({"out": 5}, r"out = 5: name a folder"),
+        ({"out": ""}, r"out = '': name a folder"),
+        ({"out": "x" * 300}, r"out = 'x+': .*name another"),
+        ({"threads": True}, r"threads = True: give a whole number"),
+        ({"threads": 1.0}, r"threads = 1.0: give a whole number"),
+        ({"progress": 5}, r"progress = 5: give a function"),
+    ],
+)
+def test_another_kind_of_argument_is_refused_by_name(settings, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RequestError, match=words):
+        mca.run(bar(), **settings)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("act", [mca.run, mca.mesh], ids=["run", "mesh"])
+def test_a_name_is_no_scene(act):
+    with pytest.raises(RequestError, match=r"scene = 'two_link': .*mca\.make_scene"):
+        act("two_link")
+
+
+def test_threads_may_be_a_number_of_numpy():
+    assert mca.run(bar(), duration=1e-6, threads=np.int64(1)).summary["threads"] == 1
+
+
+class Recipe:
+    """A user's recipe, which makes its mesh by what it is given."""
+
+    def __init__(self, build):
+        self.build = build
+
+
+@pytest.mark.parametrize(
+    ("geometry", "words"),
+    [
+        (Recipe(lambda: 1 / 0), r"'Recipe': build\(\) failed with ZeroDivisionError: .*test_run\.py, line \d+"),
+        (Recipe(lambda: None), r"build\(\) = None: return a warp_mca.Mesh"),
+        (Recipe(5), r"build\(\) failed with TypeError"),
+    ],
+)
+def test_a_recipe_that_fails_is_named_with_its_body(geometry, words):
+    scene = bar()
+    body = replace(scene.bodies[0], geometry=geometry)
+    with pytest.raises(RequestError, match=rf"Body bar\.geometry.*{words}"):
+        mca.mesh(replace(scene, bodies=(body,)))
+
+
+def test_runs_of_more_steps_than_anyone_waits_for_are_refused():
+    for scale in (1e-320, 1e-12):  # a step of 0 s, and one in which motion is lost in rounding besides
+        with pytest.raises(
+            RequestError, match=r"time step \[s\] = .*1e\+10 .*element \d+ of body bar .*time_step_scale"
+        ):
+            mca.run(bar(time_step_scale=scale))
+
+
+@pytest.mark.parametrize("speed", [1e30, 1e200])
+def test_bodies_too_fast_for_the_search_of_contact_are_refused_without_warnings(speed):
+    scene = bar()
+    ready = prepare(scene, None, mca.simulation.Clock(), lambda stage, done: None)
+    fast = replace(
+        ready.model,
+        V=np.full_like(ready.model.V, speed),
+        passes=(replace(ready.model.passes[0], plane=None, margin=1e-3),),
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(RequestError, match=r"speed of the bodies = 1e\+\d+: .*check the unit"):
+            divide(scene, fast, 1e-6)
+
+
+def test_runs_of_two_threads_wait_for_each_other():
+    """Warp captures graphs for the whole process: the second capture failed."""
+    order = []
+
+    def tell(stage, done):
+        order.append(threading.get_ident())
+        time.sleep(0.01)
+
+    def one(k):
+        run = [mca.run, lambda scene, **more: mca.run_batch([scene], **more)[0]][k]
+        return run(bar(), duration=2e-6, progress=tell)
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(one, range(2))
+    assert sum(a != b for a, b in pairwise(order)) == 1
+    assert np.array_equal(first.F_n, second.F_n)

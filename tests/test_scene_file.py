@@ -6,6 +6,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -154,7 +155,7 @@ def test_a_failed_write_keeps_the_older_file_and_nothing_else(tmp_path: Path):
     assert [path.name for path in tmp_path.iterdir()] == ["m.mca"]
 
 
-@pytest.mark.parametrize("damage", ["text", "cut", "foreign", "class", "mesh", "locked", "missing"])
+@pytest.mark.parametrize("damage", ["text", "cut", "foreign", "class", "mesh", "locked", "token", "shape", "missing"])
 def test_a_file_that_is_no_model_is_refused(tmp_path: Path, damage: str):
     path = tmp_path / "m.mca"
     if damage == "text":
@@ -178,6 +179,11 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path, damage: str):
             while (start := damaged.find(mark, start + 1)) >= 0:
                 damaged[start + flag] |= 1  # encrypted, it says
         path.write_bytes(damaged)
+    elif damage in ("token", "shape"):  # in the header of an array, which is read before its checksum
+        np.save(tmp_path / "a.npy", np.zeros(3, dtype=np.uint8))
+        old, new = {"token": (b"}", b" "), "shape": (b"(3,), }             ", b"(9999999999999999,)}")}[damage]
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("header.npy", (tmp_path / "a.npy").read_bytes().replace(old, new))
     elif damage == "cut":
         stored(path)
         path.write_bytes(path.read_bytes()[:-100])

@@ -13,6 +13,8 @@ from warp_mca.errors import RequestError
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 BOX = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
 SIDE = mca.Surface(body="a", nodes="xmax")
+BODY = mca.Body(name="a", geometry=BOX, material=STEEL)
+LINE = mca.Line(body="a", start=(0.0, 0.0, 0.0), end=(1.0, 0.0, 0.0))
 TIP = mca.Tip(body="a", centre=(0.0, 0.0, 0.0), radius=0.1)
 SOUND = {
     mca.Elastic: {"E": 210e9, "nu": 0.3, "rho": 7850.0},
@@ -27,6 +29,10 @@ SOUND = {
     mca.Prescribed: {"body": "a", "nodes": "xmin", "axis": "x", "times": (0.0, 1.0), "velocities": (0.0, 1.0)},
     mca.RigidPhase: {"theta": (1.0,), "theta_dot": (0.0,), "tip": TIP, "target": mca.RigidPlane()},
     mca.ImpactPhase: {"duration": 1e-3, "time_step_scale": 0.9},
+    mca.Surface: {"body": "a", "nodes": "xmin"},
+    mca.Tip: {"body": "a", "centre": (0.0, 0.0, 0.0), "radius": 0.1},
+    mca.Path: {"name": "p", "lines": (LINE,), "spacing": 0.1},
+    mca.Scene: {"name": "s", "bodies": (BODY,), "impact": mca.ImpactPhase(duration=1e-3)},
 }
 
 
@@ -59,12 +65,44 @@ SOUND = {
         (mca.RigidPhase, "theta_dot", 0.0),
         (mca.ImpactPhase, "duration", "1e-3"),
         (mca.ImpactPhase, "time_step_scale", None),
+        (mca.Body, "name", 5),
+        (mca.Point, "body", None),
+        (mca.Line, "body", 5),
+        (mca.Surface, "nodes", ["xmin"]),
+        (mca.Revolute, "other", 5),
+        (mca.Fixed, "nodes", 5),
+        (mca.Prescribed, "nodes", None),
+        (mca.Prescribed, "times", {0.0: 0.0, 1.0: 1.0}),
+        (mca.Prescribed, "times", {0.0, 1.0}),
+        (mca.Prescribed, "velocities", np.float64(1.0) + np.zeros(())),
+        (mca.Prescribed, "velocities", (x for x in (0.0, 1.0))),
+        (mca.RigidPhase, "tip", SIDE),
+        (mca.RigidPhase, "target", "a"),
+        (mca.Tip, "body", 5),
+        (mca.Path, "lines", LINE),
+        (mca.Path, "name", None),
+        (mca.Scene, "name", None),
+        (mca.Scene, "bodies", BODY),
+        (mca.Scene, "bodies", (body for body in [BODY])),
+        (mca.Scene, "contacts", mca.Contact(slave=SIDE, master=mca.RigidPlane())),
+        (mca.Scene, "impact", None),
+        (mca.Scene, "rigid", mca.ImpactPhase(duration=1.0)),
+        (mca.Scene, "tip", SIDE),
+        (mca.Scene, "target", "a"),
+        (mca.Scene, "parameters", None),
     ],
 )
 def test_another_kind_of_value_is_refused_by_name(kind, field, value):
     kind(**SOUND[kind])
-    with pytest.raises(RequestError, match=rf"\b{field} = .+: (give|must|use|the tangent|Poisson)"):
+    with pytest.raises(RequestError, match=rf"\b{field} = .+: (give|must|use|name|the tangent|Poisson)") as error:
         kind(**{**SOUND[kind], field: value})
+    assert "\n" not in str(error.value)
+
+
+def test_parts_of_another_kind_are_named_by_their_place():
+    with pytest.raises(RequestError, match=r"Scene\.joints\[1\] = 'Surface': give a Revolute"):
+        hinge = mca.Revolute(name="O", body="a", at=(0.0, 0.0, 0.0))
+        mca.Scene(**{**SOUND[mca.Scene], "joints": [hinge, SIDE]})
 
 
 def test_a_pair_of_surfaces_meets_once():

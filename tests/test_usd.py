@@ -5,12 +5,16 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
+import subprocess
+import sys
+import textwrap
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from flying_bars import DT, STEPS, FlyingBars
+from test_full_disk import files_up_to
 
 from warp_mca.errors import RequestError
 from warp_mca.recorders import UsdFile, usd_file
@@ -243,6 +247,58 @@ def test_names_become_identifiers_of_their_own(bars: FlyingBars, tmp_path: Path)
     stage = opened(tmp_path / "a.usdc")
     names = [prim.GetName() for prim in stage.GetPrimAtPath("/World").GetChildren()]
     assert sorted(names) == ["__", "a_b", "a_b_", "contact", "contact_"]
+
+
+def test_a_recorder_serves_a_second_run(bars: FlyingBars, tmp_path: Path):
+    recorder = UsdFile(tmp_path / "a.usdc")
+    for count in (3, 2):
+        recorder.start(bars.info)
+        for index in range(count):
+            recorder.frame(bars.frame(index))
+        recorder.finish(True)
+    stage = opened(tmp_path / "a.usdc")
+    assert stage.GetEndTimeCode() == 1.0
+    assert mesh(stage, "lower").GetPointsAttr().GetTimeSamples() == [0.0, 1.0]
+
+
+def test_a_file_that_broke_while_it_was_written_is_removed(bars: FlyingBars, tmp_path: Path):
+    recorder = UsdFile(tmp_path / "a.usdc")
+    recorder.start(bars.info)
+    with files_up_to(9000), pytest.raises(OSError, match="File too large; the broken file is removed"):
+        for index in range(100):
+            recorder.frame(bars.frame(index))
+    recorder.finish(False)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_waits_until_usd_is_imported(tmp_path: Path):
+    """It was lost in there: TypeError: No to_python converter."""
+    script = """
+        import os, signal, sys
+        from flying_bars import FlyingBars
+        from warp_mca.recorders import UsdFile
+
+        class Interrupt:
+            def find_spec(self, name, *args):
+                if name == "pxr.UsdGeom":
+                    os.kill(os.getpid(), signal.SIGINT)
+
+        bars = FlyingBars()
+        sys.meta_path.insert(0, Interrupt())
+        try:
+            UsdFile(sys.argv[1]).start(bars.info)
+        except KeyboardInterrupt:
+            print(hasattr(sys.modules.get("pxr.UsdGeom"), "Mesh"))
+    """
+    command = [sys.executable, "-c", textwrap.dedent(script), str(tmp_path / "a.usdc")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path(__file__).parent)
+    assert (done.stdout, done.stderr) == ("True\n", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_no_utf_8_is_refused(tmp_path: Path):
+    with pytest.raises(RequestError, match=r"^usd = .*caf.udce9\.usdc': USD takes names in UTF-8 only"):
+        UsdFile(tmp_path / os.fsdecode(b"caf\xe9.usdc"))
 
 
 @pytest.mark.parametrize(("name", "remedy"), [("file/a.usdc", "not a folder"), ("a.usdx", "suffix")])

@@ -16,7 +16,6 @@ from warp_mca.results import Result, RunFacts, summarise
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.handoff import HandOff
-    from warp_mca.layout import Layout
     from warp_mca.scene import Scene
     from warp_mca.simulation import Steps
     from warp_mca.solver import Solver
@@ -51,19 +50,20 @@ class Account:
         ledger: histories and guards.
     """
 
-    def __init__(self, ready: Prepared, steps: Steps, layout: Layout, index: int = 0, first_probe: int = 0) -> None:
+    def __init__(self, ready: Prepared, steps: Steps, solver: Solver, index: int = 0, first_probe: int = 0) -> None:
         """Begin with none.
 
         Args:
             ready: the scene.
             steps: of the run.
-            layout: of the solver.
-            index: number of the scene in it.
+            solver: that runs it.
+            index: number of the scene in the solver's layout.
             first_probe: number of the scene's first probe among the solver's.
         """
-        self.ready, self.steps, self.layout, self.index = ready, steps, layout, index
+        self.ready, self.steps, self.layout, self.index = ready, steps, solver.layout, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
-        self.ledger = Ledger(ready.model, steps.dt, steps.interval, ready.scene.impact.energy_tolerance)
+        tolerance = ready.scene.impact.energy_tolerance
+        self.ledger = Ledger(ready.model, steps.dt, steps.interval, tolerance, solver.precision)
         self.rings: list[NDArray] = []
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
@@ -147,7 +147,8 @@ class Account:
             found.append(
                 f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.exchanged:.3g} J that the bodies "
                 f"exchanged, though only {ledger.energy_error:.2g} of all they have: lower time_step_scale or a "
-                f"contact's penalty if that is above what energy_tolerance = {tolerance:g} should allow"
+                f"contact's penalty{ledger.other_remedy}, if that is above what energy_tolerance = {tolerance:g} "
+                "should allow"
             )
         stable = self.ready.model.stable
         if stable.shortened > SHORTENED:

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from numpy.typing import NDArray
 
+from warp_mca import validate
 from warp_mca.account import Account, Prepared
-from warp_mca.errors import GuardError, RequestError, bad_value
+from warp_mca.arguments import Progress, check_scene, one_at_a_time, span_of, teller
+from warp_mca.errors import GuardError, McaError, RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.join import join_models, join_probes
 from warp_mca.layout import offsets
 from warp_mca.paths import Found
-from warp_mca.results import Result, check_output, save
+from warp_mca.results import FILES, PATH_FILES, Result, check_output, folder_path, save
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.simulation import Clock, Progress, advance, divide_alike, prepare
+from warp_mca.simulation import Clock, advance, divide_alike, prepare
 
 Meshes = Mapping[str, Mesh]
 
 
+@one_at_a_time
 def run_batch(
-    scenes: Sequence[Scene],
+    scenes: Iterable[Scene],
     *,
     device: str = "cpu",
     precision: str = "mixed",
@@ -39,13 +43,15 @@ def run_batch(
 
     The scenes take the same steps: the smallest that one of them needs, so that the result of each is that of the scene
     alone with this step. They must have the same duration and output interval, and contacts of the same kinds, in the
-    same order; all else may differ. Parts that scenes have in common are meshed once.
+    same order; all else may differ. Parts that scenes have in common are meshed once. Runs of several threads wait for
+    each other.
 
     Args:
         scenes: what to run.
         device, precision, threads, force: as in `warp_mca.run`.
         duration: of the impact phase [s]; the scenes' own if None.
-        out: folder that gets a folder for each scene, named by its number from 0, with the files of `warp_mca.run`.
+        out: folder that gets a folder for each scene, named by its number from 0, with the files of `warp_mca.run`;
+            with `force`, results of a larger batch before it are removed.
         meshes: finished meshes by body, for each scene, to save making them again.
         progress: called with a stage and the share of it that is done.
 
@@ -60,7 +66,10 @@ def run_batch(
     from warp_mca.solver import Solver, check_device
     from warp_mca.threads import thread_count
 
-    tell = progress or (lambda stage, done: None)
+    if isinstance(scenes, str) or not isinstance(scenes, Iterable):
+        raise bad_value("scenes", validate.brief(scenes), "give a list of scenes; mca.run runs a single one")
+    scenes = list(scenes)
+    tell = teller(progress)
     span = check_alike(scenes, duration)
     check_device(device)
     threads = thread_count(threads)
@@ -77,7 +86,7 @@ def run_batch(
     solver.compile()
     clock.lap("compile")
     first = offsets([len(item.probes.corner) for item in ready])
-    accounts = [Account(item, steps, solver.layout, k, int(first[k])) for k, item in enumerate(ready)]
+    accounts = [Account(item, steps, solver, k, int(first[k])) for k, item in enumerate(ready)]
     stopped: list[str | None] = [None] * len(scenes)
     solver.start()
     with suppress(GuardError):  # that of the last scene
@@ -89,11 +98,44 @@ def run_batch(
 
 
 def save_scenes(results: Sequence[Result], folders: Sequence[Path | None], force: bool) -> list[Result]:
-    """Results, those that no guard stopped written to the folders of `scene_folders`."""
+    """Results, those that no guard stopped written to the folders of `scene_folders`.
+
+    With `force`, old files go: those of scenes that were stopped now, and of a larger batch's other scenes.
+
+    Raises:
+        McaError: as in `save`; or old files cannot be removed.
+    """
+    written = {folder for folder, result in zip(folders, results, strict=True) if folder and not result.stopped}
+    if force:
+        own = {folder for folder in folders if folder}
+        beside = {path for out in {folder.parent for folder in own} for path in out.glob("[0-9]*")}
+        _remove(own - written)
+        _remove(path for path in beside - own if _of_batch(path))
     return [
-        result if folder is None or result.stopped else save(result, folder, force=force)
+        save(result, folder, force=force) if folder in written else result
         for result, folder in zip(results, folders, strict=True)
     ]
+
+
+def _of_batch(folder: Path) -> bool:
+    """Whether it holds a scene of a batch, under the number that it had there."""
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return summary["batch"]["scene"] == int(folder.name)
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return False
+
+
+def _remove(folders: Iterable[Path]) -> None:
+    """Remove the files of results from folders, and these if nothing else is in them."""
+    for folder in folders:
+        try:
+            for name in FILES + PATH_FILES:
+                (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise McaError(f"old results in {folder} could not be removed: {error.strerror or error}") from error
+        with suppress(OSError):  # it is not there, or other files are in it
+            folder.rmdir()
 
 
 def _reader(
@@ -123,10 +165,10 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
     """
     if not scenes:
         raise bad_value("scenes", [], "give at least one scene")
+    for k, scene in enumerate(scenes):
+        check_scene(f"scenes[{k}]", scene)
     first = scenes[0]
-    span = first.impact.duration if duration is None else duration
-    if not (math.isfinite(span) and span > 0.0):
-        raise bad_value("duration", span, "give a finite time above 0 s")
+    span = span_of(first, duration)
     for k, scene in enumerate(scenes[1:], 1):
         for name in ("duration", "output_interval"):
             value, wanted = getattr(scene.impact, name), getattr(first.impact, name)
@@ -158,12 +200,14 @@ def scene_folders(out: str | os.PathLike[str] | None, count: int, force: bool) -
     """
     if out is None:
         return [None] * count
-    digits = len(str(count - 1))
-    return [check_output(Path(out) / f"{k:0{digits}d}", force=force) for k in range(count)]
+    path, digits = folder_path("out", out), len(str(count - 1))
+    return [check_output(path / f"{k:0{digits}d}", force=force) for k in range(count)]
 
 
 def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Clock, tell: Progress) -> list[Prepared]:
     """Every scene at the start of its impact phase."""
+    if meshes is not None:
+        validate.kind_of("meshes", meshes, (tuple, list), "give a list with the meshes by body of each scene")
     if meshes is not None and len(meshes) != len(scenes):
         raise bad_value("number of meshes", len(meshes), f"give the meshes of each of the {len(scenes)} scenes")
     made: dict[object, Mesh] = {}

@@ -355,12 +355,14 @@ def _run(args: argparse.Namespace) -> None:
             progress=progress,
         )
     written = [*FILES, *(PATH_FILES if result.paths else ())]
-    recorded = [recorder.name for recorder in recorders if Path(recorder.name).exists()]
+    recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
     print_summary(result, [*(str(out / name) for name in written), *recorded])
     as_designed = not args.settings and args.duration is None and args.time_step_scale is None
-    if request.source and request.source.check and as_designed:
-        for message in request.source.check(result):
+    if request.source and as_designed:
+        for message in request.source.findings(result):
             print(f"check: {message}")
+    if result.failed:
+        raise McaError(f"{', '.join(result.failed)}: not written whole, as the warnings say; all else is")
 
 
 def _sweep(args: argparse.Namespace) -> None:

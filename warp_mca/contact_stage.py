@@ -78,6 +78,7 @@ class ContactStage:
             setattr(self.spring, name, wp.zeros(count, dtype=wp.vec3d))
         for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth"):
             setattr(self.spring, name, wp.zeros(count, dtype=wp.float64))
+        self.spring.held = wp.full(count, contact.ANY_DEPTH, dtype=wp.float64)
         self.spring.face = wp.full(count, -1, dtype=wp.int32)
         self.spring.weight = wp.zeros(count, dtype=wp.vec4d)
 
@@ -105,7 +106,7 @@ class ContactStage:
         self.count = wp.zeros(slaves, dtype=wp.int32)
         self.candidate = wp.zeros((slaves, LIST_LENGTH), dtype=wp.int32)
         self.face_count = wp.zeros(len(self.face), dtype=wp.int32)
-        self.face_slave = wp.zeros((len(self.face), LIST_LENGTH), dtype=wp.int32)
+        self.face_slave = wp.zeros((len(self.face), max(item.room for item in self.items)), dtype=wp.int32)
         self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)

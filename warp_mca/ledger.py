@@ -21,8 +21,8 @@ PASS_COLUMNS = 8
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
-    "contact lists overflowed: more faces near a node, or nodes near a face, than they hold; mesh both sides alike, "
-    "or choose a smaller output_interval if they are fast",
+    "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh both "
+    "sides more alike, or choose a smaller output_interval if they are fast",
     "a node outran the contact search; choose a smaller output_interval",
     "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or, if penalty is high, "
     "lower time_step_scale",
@@ -39,8 +39,9 @@ class Ledger:
         max_strain: largest deviatoric strain so far [-].
     """
 
-    def __init__(self, model: Model, dt: float, interval: float, tolerance: float) -> None:
+    def __init__(self, model: Model, dt: float, interval: float, tolerance: float, precision: str) -> None:
         self.model, self.dt, self.interval, self.tolerance = model, dt, interval, tolerance
+        self.precision = precision
         self.columns: list[Array] = []
         self.velocities: list[Array] = []
         self.count = 0
@@ -80,8 +81,8 @@ class Ledger:
         if over.any():
             raise GuardError(
                 f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
-                f"{self.tolerance:g}: lower time_step_scale or a contact's penalty, or raise the tolerance if that "
-                "much is acceptable"
+                f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
+                "tolerance if that much is acceptable"
             )
         if good < written and not np.isfinite(sums[good]).all():
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
@@ -131,6 +132,11 @@ class Ledger:
         return share
 
     @property
+    def other_remedy(self) -> str:
+        """What else helps against an imbalance: float32 heats what turns for long."""
+        return ", choose --precision float64 if bodies turn for long" if self.precision == "mixed" else ""
+
+    @property
     def exchange_error(self) -> float:
         """Largest imbalance as a share of `exchanged` [-]: the same for all who watch, however fast bodies move along.
 
@@ -161,7 +167,7 @@ class Ledger:
         for k, item in enumerate(self.model.passes):
             force = share * item.sign * springs[:, k, 3:6]
             normal, tangent = self.model.contact_axes[item.contact]
-            F_n += force @ normal
+            F_n += force @ normal if normal.any() else share * springs[:, k, 6]  # see `Model.contact_axes`
             F_t += force @ tangent
         pressed, stuck = springs[:, :, 6].sum(axis=1), springs[:, :, 7].sum(axis=1)
         stick: Array = np.zeros(len(table))

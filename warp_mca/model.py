@@ -13,13 +13,16 @@ from warp_mca.bindings import Hinge, check_bindings, constraints, join_bodies
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.layout import Layout
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.surfaces import ContactPass, contact_eigenvalues, contact_passes, face_geometry
+from warp_mca.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes, face_geometry
 from warp_mca.timestep import StableStep
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 __all__ = ["GROUND", "Block", "Model", "body_cells", "body_materials", "build_model", "nodal_masses"]
+
+CLOSED = 1e-6  # share of a surface's area below which its normals cancel
+_SAMPLES = np.array([0.125, 0.375, 0.625, 0.875])  # along both edges of a face, where its distance is taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +42,8 @@ class Model:
         joint_first, joint_second: tied nodes, shape (pair_count,), int32; GROUND has no second node.
         hinges: the joints that own the pairs.
         passes: contact passes; those of each scene in turn.
-        contact_axes: normal and tangent of each contact [-], shape (contact_count, 2, 3), float64.
+        contact_axes: normal and tangent of each contact [-], shape (contact_count, 2, 3), float64; a closed master has
+            no normal, which is zero then: normal forces add up as they are.
         gravity: of each scene [m/s^2], shape (scene_count, 3), float64.
         points: nodes whose velocity is recorded (tip, target; those of each scene in turn), shape (2 scene_count,),
             int32; GROUND where there is none.
@@ -106,16 +110,53 @@ def _contacts(parts: Assembly) -> tuple[tuple[ContactPass, ...], Array, Array]:
             passes.append(item)
         if isinstance(contact.master, RigidPlane):
             normal = np.asarray(contact.master.normal, dtype=float)
+            axes[index] = normal / np.linalg.norm(normal), _tangent(normal)
         else:
             assert master is not None
-            normal = face_geometry(parts.X, master.node)[1].sum(axis=0)
-            closed = np.linalg.norm(normal) < 1e-6 * master.area.sum()
-            normal = np.array([0.0, 1.0, 0.0]) if closed else normal
-        normal = normal / np.linalg.norm(normal)
-        tangent = np.cross(normal, [0.0, 0.0, 1.0])
-        size = np.linalg.norm(tangent)
-        axes[index] = normal, tangent / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
+            axes[index] = _surface_axes(parts.X, slave, master)
     return tuple(passes), axes, added
+
+
+def _tangent(normal: Array) -> Array:
+    """Unit vector along n x z, or +x where n is along z."""
+    tangent = np.cross(normal / np.linalg.norm(normal), [0.0, 0.0, 1.0])
+    size = np.linalg.norm(tangent)
+    return tangent / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
+
+
+def _mean_normal(X: Array, faces: Faces) -> Array | None:
+    """Normals of a surface's faces, added up by their area [m^2], or None where it is closed: then they cancel."""
+    normal = face_geometry(X, faces.node)[1].sum(axis=0)
+    return None if np.linalg.norm(normal) < CLOSED * faces.area.sum() else normal
+
+
+def _surface_axes(X: Array, slave: Faces, master: Faces) -> tuple[Array, Array]:
+    """Normal and tangent of a contact, as `Model.contact_axes`.
+
+    A closed master has no one normal, but where it is touched it faces the slave: its tangent is that of the slave's
+    surface turned round or, where that is closed too, of its own faces where the bodies are nearest to each other.
+    """
+    normal = _mean_normal(X, master)
+    if normal is not None:
+        return normal / np.linalg.norm(normal), _tangent(normal)
+    other = _mean_normal(X, slave)
+    return np.zeros(3), _tangent(_nearest_normal(X, slave, master) if other is None else -other)
+
+
+def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
+    """Normals of the master's faces nearest to the slave, added up by area [m^2]; y where they surround it."""
+    from scipy.spatial import KDTree
+
+    a, b = (part.ravel() for part in np.meshgrid(_SAMPLES, _SAMPLES))
+    weight = np.stack([(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b])
+    samples = KDTree(np.einsum("kp,fkc->fpc", weight, X[master.node]).reshape(-1, 3))
+    nodes = X[slave.nodes]
+    distance, _ = samples.query(nodes)
+    reach = distance.min() + 0.25 * np.sqrt(np.median(master.area))
+    near = np.concatenate(samples.query_ball_point(nodes[distance <= reach], reach)).astype(np.int32)
+    area, normal = face_geometry(X, master.node[np.unique(near // len(a))])
+    mean = normal.sum(axis=0)
+    return mean if np.linalg.norm(mean) > CLOSED * area.sum() else np.array([0.0, 1.0, 0.0])
 
 
 def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array], V: Mapping[str, Array]) -> Model:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
+import os
 import pkgutil
 import sys
-import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -21,6 +21,7 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
+from warp_mca import validate
 from warp_mca.errors import McaError, RequestError, bad_value
 from warp_mca.scene import Scene
 
@@ -159,7 +160,7 @@ class SceneSource:
             RequestError: the preset or a parameter is unknown, or a value is not allowed.
         """
         values = {name: parameter.default for name, parameter in self.parameters.items()}
-        if preset is not None and preset not in self.presets:
+        if preset is not None and not (isinstance(preset, str) and preset in self.presets):
             raise bad_value("preset", preset, f"scene {self.name} has {_known(preset, self.presets, 'no presets')}")
         chosen = preset if preset is not None else self.default_preset
         layers = [self.presets[chosen] if chosen is not None else {}, overrides or {}]
@@ -176,19 +177,25 @@ class SceneSource:
         Raises:
             RequestError: the values contradict each other, or `build` failed or returned something else than a scene.
         """
-        try:
-            scene = self.builder(**values)
-        except McaError:
-            raise
-        except (Exception, SystemExit) as error:  # whatever a user's code raises; not status 0
-            line = traceback.extract_tb(error.__traceback__)[-1]
-            where = f"{Path(line.filename).name}, line {line.lineno}"
-            raise bad_value(
-                "scene", self.name, f"build() failed with {type(error).__name__}: {error} ({where})"
-            ) from error
+        scene = validate.call("scene", self.name, "build()", self.builder, **values)
         if not isinstance(scene, Scene):
             raise bad_value(f"{self.name}.build()", type(scene).__name__, "return a warp_mca.Scene")
         return dataclasses.replace(scene, parameters=dict(values))
+
+    def findings(self, result: Result) -> list[str]:
+        """What the scene file's `check` says of a result; nothing where it has none.
+
+        Raises:
+            RequestError: `check` failed or returned something else than sentences.
+        """
+        if self.check is None:
+            return []
+        found = validate.call("scene", self.name, "check()", self.check, result)
+        if not (isinstance(found, list | tuple) and all(isinstance(item, str) for item in found)):
+            raise bad_value(
+                f"{self.name}.check()", validate.brief(found), "return a list of sentences, empty if all is well"
+            )
+        return list(found)
 
 
 def scene_names() -> list[str]:
@@ -197,22 +204,25 @@ def scene_names() -> list[str]:
     return sorted(module.name for module in pkgutil.iter_modules(package.__path__) if not module.name.startswith("_"))
 
 
-def load_source(name: str) -> SceneSource:
+def load_source(name: str | os.PathLike[str]) -> SceneSource:
     """The built-in scene of that name, or the scene in the Python file of that path (suffix .py).
 
     Raises:
         RequestError: there is no such scene, or the file is no scene file.
     """
-    if Path(name).suffix == ".py":
+    name = str(name) if isinstance(name, os.PathLike) else name
+    if isinstance(name, str) and Path(name).suffix == ".py":
         return _source(_imported(Path(name)), Path(name).stem, builtin=False)
     names = scene_names()
     if name not in names:
         known = _known(name, names, "none")
-        raise bad_value("scene", name, f"the scenes are {known}; or give a Python file (.py) or a model file (.mca)")
+        raise bad_value(
+            "scene", validate.brief(name), f"the scenes are {known}; or give a Python file (.py) or a model file (.mca)"
+        )
     return _source(import_module(f"warp_mca.scenes.{name}"), name, builtin=True)
 
 
-def make_scene(name: str, *, preset: str | None = None, **parameters: object) -> Scene:
+def make_scene(name: str | os.PathLike[str], *, preset: str | None = None, **parameters: object) -> Scene:
     """Build a built-in scene, or the one in a Python file, e.g. `make_scene("two_link", preset="quick", mu=0.3)`.
 
     Raises:
@@ -258,8 +268,12 @@ def _source(module: ModuleType, name: str, *, builtin: bool) -> SceneSource:
     builder: Callable[..., Scene] | None = getattr(module, "build", None)
     if not callable(builder):
         raise bad_value("scene", name, "the file must define build() that returns a warp_mca.Scene")
+    check: Callable[[Result], list[str]] | None = getattr(module, "check", None)
+    if not (check is None or callable(check)):
+        raise bad_value(f"{name}.check", validate.brief(check), "make it a function check(result), or leave it out")
     presets = getattr(module, "PRESETS", {})
-    if not (isinstance(presets, Mapping) and all(isinstance(values, Mapping) for values in presets.values())):
+    named = isinstance(presets, Mapping) and all(isinstance(key, str) for key in presets)
+    if not (named and all(isinstance(values, Mapping) for values in presets.values())):
         raise bad_value("scene", name, "PRESETS must map preset names to dicts of parameter values")
     return SceneSource(
         name,
@@ -267,32 +281,32 @@ def _source(module: ModuleType, name: str, *, builtin: bool) -> SceneSource:
         _parameters(builder, module, name),
         presets,
         builder,
-        getattr(module, "check", None),
+        check,
         builtin=builtin,
     )
 
 
 def _parameters(builder: Callable[..., Scene], module: ModuleType, scene: str) -> dict[str, Parameter]:
-    # Not the return type: a scene file may import it for type checkers only.
-    arguments = {name: hint for name, hint in builder.__annotations__.items() if name != "return"}
-    try:
-        hints = get_type_hints(SimpleNamespace(__annotations__=arguments), vars(module), include_extras=True)
-    except (NameError, TypeError) as error:
+    try:  # not the return type: a scene file may import it for type checkers only
+        signature = inspect.signature(builder).parameters
+        written = {name: item.annotation for name, item in signature.items() if item.annotation is not item.empty}
+        hints = get_type_hints(SimpleNamespace(__annotations__=written), vars(module), include_extras=True)
+    except Exception as error:  # whatever reading a user's annotation raises
         raise bad_value("scene", scene, f"an annotation of build() cannot be read: {error}") from error
     parameters = {}
-    for name, argument in inspect.signature(builder).parameters.items():
+    for name, argument in signature.items():
         if argument.default is inspect.Parameter.empty:
             raise bad_value("scene", scene, f"give parameter {name} of build() a default")
         kind, *metadata = get_args(hints.get(name)) or (hints.get(name, type(argument.default)),)
-        if kind not in _KIND_WORDS:
+        if not (isinstance(kind, type) and kind in _KIND_WORDS):
             raise bad_value("scene", scene, f"parameter {name} of build() must be a float, an int, a str or a bool")
         param = next((item for item in metadata if isinstance(item, Param)), Param())
         parameters[name] = Parameter(name, kind, argument.default, param)
     return parameters
 
 
-def _known(wrong: str, names: Iterable[str], nothing: str) -> str:
+def _known(wrong: object, names: Iterable[str], nothing: str) -> str:
     """The names that come close to `wrong`, then all of them."""
     listed = list(names)
-    close = get_close_matches(wrong, listed, n=1, cutoff=0.6)
+    close = get_close_matches(str(wrong), listed, n=1, cutoff=0.6)
     return ", ".join(listed or [nothing]) + (f" (did you mean {close[0]}?)" if close else "")

@@ -8,9 +8,9 @@ import os
 import shutil
 import tempfile
 import time
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from warp_mca.errors import McaError, RequestError, bad_value
 from warp_mca.files import check_folder, nearest
 from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
 from warp_mca.paths import PathHistory, load_paths, save_paths
+from warp_mca.validate import DAMAGE, brief
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -51,6 +52,7 @@ class Result:
         warnings: what the run noticed without stopping, one sentence each.
         paths: stress along the scene's paths, with one row for each row of the history.
         stopped: which guard stopped this scene of a batch, in one sentence; None if none did. Rows end before it.
+        failed: names of recorders that failed: what they write is missing or ends too early.
     """
 
     summary: dict[str, Any]
@@ -59,6 +61,7 @@ class Result:
     warnings: tuple[str, ...] = ()
     paths: tuple[PathHistory, ...] = ()
     stopped: str | None = None
+    failed: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -168,9 +171,15 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
     Raises:
         RequestError: it is a file, cannot be written to, or holds results and `force` is off.
     """
-    path = Path(directory)
-    check_folder("out", path)
-    if not force and any((path / name).exists() for name in FILES + PATH_FILES):
+    path = folder_path("out", directory)
+    try:
+        check_folder("out", path)
+        taken = any((path / name).exists() for name in FILES + PATH_FILES)
+    except FileNotFoundError:  # the working directory is gone, which is no fault of the name
+        raise
+    except OSError as error:  # as of a name that is too long
+        raise bad_value("out", str(path), f"{error.strerror or error}; name another folder") from error
+    if taken and not force:
         raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
     return path
 
@@ -229,19 +238,47 @@ def load(directory: str | os.PathLike[str]) -> Result:
     Raises:
         RequestError: there is none, or its files cannot be read.
     """
-    path = Path(directory)
+    path = folder_path("results", directory)
     try:
         summary = json.loads((path / "summary.json").read_text(encoding="utf-8"))
         warnings = tuple(summary.pop("warnings", ()))
-        with (path / "history.csv").open(encoding="utf-8") as file:
-            names = file.readline().strip().split(",")
-            rows = np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2).reshape(-1, len(names))
+        history = _read_history(path / "history.csv")
         paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
     except FileNotFoundError as error:
         raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
-    except (OSError, ValueError, AttributeError, KeyError, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise bad_value("results", str(path), "its files are damaged; run again") from error
-    return Result(summary, dict(zip(names, rows.T.copy(), strict=True)), path, warnings, paths)
+    return Result(summary, history, path, warnings, paths)
+
+
+def folder_path(field: str, directory: object) -> Path:
+    """What the user named `field` as a path; an empty name would be the folder that one is in."""
+    text = os.fspath(directory) if isinstance(directory, str | os.PathLike) else None
+    if not (isinstance(text, str) and text and "\0" not in text):
+        raise bad_value(field, brief(directory), "name a folder, or . for this one")
+    return Path(text)
+
+
+def _read_history(path: Path) -> dict[str, Array]:
+    """The columns of history.csv.
+
+    Raises:
+        ValueError: it has other columns than a run writes, no rows, or no end.
+        OSError: it cannot be read, or is empty.
+    """
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        whole = file.read() == b"\n"
+    with path.open(encoding="utf-8") as file:
+        names = file.readline().strip().split(",")
+        if not (whole and tuple(names[: len(HISTORY_COLUMNS)]) == HISTORY_COLUMNS and len(set(names)) == len(names)):
+            raise ValueError(names)
+        first = file.readline()
+        if not first:
+            raise ValueError("no rows")
+        rows = np.loadtxt(chain([first], file), delimiter=",", dtype=np.float64, comments=None, ndmin=2)
+        rows = rows.reshape(-1, len(names))
+    return dict(zip(names, rows.T.copy(), strict=True))
 
 
 def _with_output_time(result: Result, path: Path, seconds: float) -> Result:

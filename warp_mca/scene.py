@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import NoneType
 from typing import TYPE_CHECKING, Literal
 
 from warp_mca import validate
@@ -52,6 +53,7 @@ class Body:
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        validate.texts("Body", name=self.name)
         if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
             raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
         materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
@@ -79,6 +81,7 @@ class Point:
     at: Vec3
 
     def __post_init__(self) -> None:
+        validate.texts("Point", body=self.body)
         validate.vectors(f"Point of {self.body}", at=self.at)
 
 
@@ -98,6 +101,7 @@ class Line:
     position: float = 0.0
 
     def __post_init__(self) -> None:
+        validate.texts("Line", body=self.body)
         validate.vectors(f"Line in {self.body}", start=self.start, end=self.end)
         if not validate.is_number(self.position):
             raise bad_value(f"Line in {self.body}.position", self.position, "give a finite number")
@@ -125,7 +129,9 @@ class Path:
     spacing: float
 
     def __post_init__(self) -> None:
+        validate.texts("Path", name=self.name)
         validate.positive(f"Path {self.name}", spacing=self.spacing)
+        validate.members(f"Path {self.name}", Line, lines=self.lines)
         if not self.lines:
             raise bad_value(f"Path {self.name}.lines", self.lines, "give at least one line")
 
@@ -136,6 +142,9 @@ class Surface:
 
     body: str
     nodes: str
+
+    def __post_init__(self) -> None:
+        validate.texts("Surface", body=self.body, nodes=self.nodes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,10 +196,8 @@ class Contact:
     two_way: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.slave, Surface):
-            raise bad_value("Contact.slave", self.slave, "give a Surface")
-        if not isinstance(self.master, Surface | RigidPlane):
-            raise bad_value("Contact.master", self.master, "give a Surface or a RigidPlane")
+        validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
+        validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
         validate.positive("Contact", penalty=self.penalty)
         if not (validate.is_number(self.mu) and self.mu >= 0.0):
             raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
@@ -223,6 +230,10 @@ class Revolute:
     nodes: Literal["axis", "ends"] = "axis"
 
     def __post_init__(self) -> None:
+        validate.texts("Revolute", name=self.name, body=self.body)
+        validate.kinds(
+            f"Revolute {self.name}", (str, NoneType), "name a body, or None for the ground", other=self.other
+        )
         validate.vectors(f"Revolute {self.name}", at=self.at, other_at=self.other_at, axis=self.axis)
         if not any(self.axis):
             raise bad_value(f"Revolute {self.name}.axis", self.axis, "give a direction other than zero")
@@ -245,6 +256,7 @@ class Fixed:
     axes: str = "xyz"
 
     def __post_init__(self) -> None:
+        validate.texts("Fixed", body=self.body, nodes=self.nodes)
         if not isinstance(self.axes, str) or not self.axes or set(self.axes) - set("xyz"):
             raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
 
@@ -268,6 +280,7 @@ class Prescribed:
     velocities: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        validate.texts("Prescribed", body=self.body, nodes=self.nodes)
         if self.axis not in ("x", "y", "z"):
             raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
         for name, values in (("times", self.times), ("velocities", self.velocities)):
@@ -294,6 +307,7 @@ class Tip:
     radius: float
 
     def __post_init__(self) -> None:
+        validate.texts("Tip", body=self.body)
         validate.vectors("Tip", centre=self.centre)
         validate.positive("Tip", radius=self.radius)
 
@@ -331,6 +345,8 @@ class RigidPhase:
                 raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, one for each link")
         if len(self.theta) != len(self.theta_dot) or not len(self.theta):
             raise bad_value("RigidPhase.theta_dot", self.theta_dot, "give one angle and one rate for each link")
+        validate.kinds("RigidPhase", Tip, "give a Tip", tip=self.tip)
+        validate.kinds("RigidPhase", (Surface, RigidPlane), "give a Surface or a RigidPlane", target=self.target)
         if self.inertia not in ("mesh", "slender"):
             raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
         validate.positive("RigidPhase", t_max=self.t_max)
@@ -361,6 +377,16 @@ class ImpactPhase:
             )
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
+
+
+_PARTS = {
+    "bodies": Body,
+    "joints": Revolute,
+    "contacts": Contact,
+    "fixed": Fixed,
+    "prescribed": Prescribed,
+    "paths": Path,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -395,6 +421,13 @@ class Scene:
     parameters: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        validate.texts("Scene", name=self.name)
+        for name, kind in _PARTS.items():
+            validate.members("Scene", kind, **{name: getattr(self, name)})
+        validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
+        validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
+        validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
+        validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
         names = [body.name for body in self.bodies]
         if not names:
             raise bad_value("Scene.bodies", (), "give at least one body")

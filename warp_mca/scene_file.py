@@ -10,8 +10,6 @@ import dataclasses
 import json
 import os
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,23 +26,10 @@ from warp_mca.files import check_folder
 from warp_mca.geometry import Mesh
 from warp_mca.registry import load_source
 from warp_mca.scene import Scene
+from warp_mca.validate import DAMAGE
 
 SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
-
-# What reading a file that is no model file can raise, from the archive down to the classes' own checks.
-# `zipfile` raises RuntimeError where a damaged byte says encrypted, or packed in a way that it does not know.
-_DAMAGE = (
-    OSError,
-    EOFError,
-    ValueError,
-    KeyError,
-    TypeError,
-    AttributeError,
-    RuntimeError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 
 
 @dataclass(frozen=True)
@@ -140,7 +125,7 @@ def load(path: str | os.PathLike[str]) -> StoredModel:
             raise ValueError("scene")
         if not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
             raise ValueError("meshes")
-    except _DAMAGE as error:
+    except DAMAGE as error:
         remedy = "it is damaged or of another version; make it again with warp-mca build"
         raise bad_value("model file", str(path), remedy) from error
     return StoredModel(scene, meshes, origin)

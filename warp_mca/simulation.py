@@ -6,13 +6,15 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca import validate
 from warp_mca.account import Account, Prepared
+from warp_mca.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
 from warp_mca.geometry.degenerate import tetrahedral
@@ -22,19 +24,19 @@ from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.paths import Found, locate
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results import Result, check_output, save
-from warp_mca.scene import Scene
+from warp_mca.scene import Body, Scene
 
 if TYPE_CHECKING:
     from warp_mca.recorders.frames import Recording
     from warp_mca.solver import Solver
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 Read = Callable[[int, Mapping[str, NDArray]], None]
 
 # Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
 MOST_ROWS = 10_000_000  # of a history: some 5 GB
+MOST_STEPS = 10_000_000_000  # of a run: more than a week of the smallest model
 
 
 @dataclass(frozen=True)
@@ -85,15 +87,20 @@ def mesh(
     """
     from warp_mca.geometry.quality import check
 
+    check_scene("scene", scene)
+    if given is not None:
+        validate.kind_of("meshes", given, Mapping, "give a Mesh for each body by its name, as mca.mesh makes them")
     meshes = {}
     made = {} if made is None else made
     for body in scene.bodies:
         if given is not None and body.name not in given:
-            raise bad_value("meshes", sorted(given), f"give a mesh of body {body.name} too")
+            raise bad_value("meshes", list(given), f"give a mesh of body {body.name} too")
         geometry = body.geometry if given is None else given[body.name]
+        if given is not None:
+            validate.kind_of(f"meshes[{body.name!r}]", geometry, Mesh, "give a finished Mesh, as mca.mesh makes it")
         key = _key(geometry)
         if key not in made:
-            made[key] = geometry if isinstance(geometry, Mesh) else geometry.build()
+            made[key] = geometry if isinstance(geometry, Mesh) else _build(body)
             check(made[key], body.name)
         meshes[body.name] = made[key]
     cut = _cut(scene, meshes)
@@ -101,6 +108,18 @@ def mesh(
         if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
             check(item, name)
     return cut
+
+
+def _build(body: Body) -> Mesh:
+    """The mesh of a recipe, which may be the user's own.
+
+    Raises:
+        RequestError: its `build` failed or returned something else than a mesh.
+    """
+    field, recipe = f"Body {body.name}.geometry", type(body.geometry).__name__
+    made = validate.call(field, recipe, "build()", lambda: getattr(body.geometry, "build")())  # noqa: B009
+    validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
+    return made
 
 
 def _key(geometry: object) -> object:
@@ -123,7 +142,7 @@ def divide(scene: Scene, model: Model, duration: float) -> Steps:
 
     Raises:
         RequestError: motion in one step would be lost in the rounding of positions, or the history would have too many
-            rows.
+            rows, or the run too many steps.
     """
     return divide_alike([(scene, model)], duration)
 
@@ -140,16 +159,30 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps
         raise bad_value("ImpactPhase.output_interval", parts[0][0].impact.output_interval, remedy)
     intervals = max(1, round(wanted))
     interval = duration / intervals
-    limits = [_limits(scene, model, interval) for scene, model in parts]
+    limits = [_limits(scene, model, interval, intervals) for scene, model in parts]
     stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
     per_search = math.ceil(interval / searches / stable)
     return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
 
 
-def _limits(scene: Scene, model: Model, interval: float) -> tuple[float, int]:
-    """Longest step [s] of a scene, and how often it must search for contact in an output interval [s]."""
+def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, int]:
+    """Longest step [s] of a scene, and how often it must search for contact in an output interval [s].
+
+    Raises:
+        RequestError: as in `divide`.
+    """
     stable = scene.impact.time_step_scale * model.stable.dt
-    speed = float(np.linalg.norm(model.V, axis=1).max())
+    if not interval * intervals <= MOST_STEPS * stable:
+        (body, element), share = model.owner(model.stable.element), model.stable.contact_share
+        raise bad_value(
+            "time step [s]",
+            float(stable),
+            f"{interval * intervals:g} s would take more than {MOST_STEPS:.0e} of them; it is time_step_scale = "
+            f"{scene.impact.time_step_scale:g} of what element {element} of body {body} allows, {share:.0%} of it by "
+            "contact springs; raise time_step_scale, enlarge that element, lower penalty or duration",
+        )
+    with np.errstate(over="ignore"):
+        speed = float(np.linalg.norm(model.V, axis=1).max())
     spacing = float(np.spacing(np.abs(model.X).max()))
     if 0.0 < speed * stable < 4.0 * spacing:
         raise bad_value(
@@ -159,8 +192,11 @@ def _limits(scene: Scene, model: Model, interval: float) -> tuple[float, int]:
             f"{speed * stable:.2g} m is lost; move the scene closer to the origin",
         )
     margins = [item.margin for item in model.passes if item.plane is None]
-    searches = math.ceil(SPEED_RESERVE * speed * interval / (0.5 * min(margins))) if margins else 1
-    return stable, max(1, searches)
+    searches = SPEED_RESERVE * speed * interval / (0.5 * min(margins)) if margins else 1.0
+    if not searches * intervals <= MOST_STEPS:
+        remedy = f"so fast, a run would search for contact more than {MOST_STEPS:.0e} times; check the unit [m/s]"
+        raise bad_value("speed of the bodies", float(np.abs(model.V).max()), remedy)
+    return stable, max(1, math.ceil(searches))
 
 
 @dataclass
@@ -179,6 +215,7 @@ class Clock:
         self.last = now
 
 
+@one_at_a_time
 def run(
     scene: Scene,
     *,
@@ -193,6 +230,8 @@ def run(
     progress: Progress | None = None,
 ) -> Result:
     """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
+
+    Runs of several threads wait for each other: Warp captures graphs for the whole process.
 
     Args:
         scene: what to run.
@@ -214,18 +253,19 @@ def run(
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
     from warp_mca.output import Output
-    from warp_mca.recorders.frames import Recording, skins
+    from warp_mca.recorders.frames import Recording, check_files, skins
     from warp_mca.solver import Solver, check_device
     from warp_mca.threads import thread_count
 
-    tell = progress or (lambda stage, done: None)
-    span = scene.impact.duration if duration is None else duration
-    if not (math.isfinite(span) and span > 0.0):
-        raise bad_value("duration", span, "give a finite time above 0 s")
+    check_scene("scene", scene)
+    tell = teller(progress)
+    span = span_of(scene, duration)
+    check_recorders(recorders)
     check_device(device)
     threads = thread_count(threads)
     if out is not None:
         check_output(out, force=force)
+    check_files(recorders, out)
     clock = Clock()
     ready = prepare(scene, meshes, clock, tell)
     steps = divide(scene, ready.model, span)
@@ -239,7 +279,7 @@ def run(
         solver.output = Output(solver, surfaces, ready.probes, frozenset().union(*(r.needs for r in recorders)))
     solver.compile()
     clock.lap("compile")
-    account = Account(ready, steps, solver.layout)
+    account = Account(ready, steps, solver)
     recording = Recording(recorders, info, steps.intervals, steps.per_interval, solver.output)
     solver.start()
 
@@ -258,7 +298,7 @@ def run(
     recording.finish(True)
     clock.lap("output")
     tell("impact", 1.0)
-    result = account.result(solver, clock.wall, said)
+    result = replace(account.result(solver, clock.wall, said), failed=tuple(recording.failed))
     return result if out is None else save(result, out, force=force)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 SEARCH_MARGIN = 0.25  # of the smallest face: how far a slave looks for faces beyond those that it touches
-LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face; a full list stops the run
+LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
+LONGEST_LIST = 4096  # slave nodes near a face at most
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class ContactPass:
         master: their nodes, shape (master_count,), int32.
         face_offset, face_of_node: faces around each master node, compressed rows, int32.
         margin: that the search looks ahead [m].
+        room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
     """
 
@@ -68,6 +71,7 @@ class ContactPass:
     face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
     face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32))
     margin: float = 0.0
+    room: int = LIST_LENGTH
     deepest: float = 0.0
 
 
@@ -99,6 +103,19 @@ def _node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
     return total[nodes] / count[nodes]
 
 
+def _room(slave: Faces, master: Faces, margin: float) -> int:
+    """Slave nodes that the list of a face has to hold: as many as lie within `margin` around the largest, and as many
+    again where that face lies aslant to its box or an edge of the slave reaches in; a multiple of LIST_LENGTH."""
+
+    def cell(faces: Faces) -> Array:  # area for each node of a grid; the box around a triangle has twice its area
+        return np.where(faces.node[:, 2] == faces.node[:, 3], 2.0, 1.0) * faces.area
+
+    side = float(np.sqrt(cell(master).max())) + 2.0 * margin
+    spacing = float(np.sqrt(_node_mean(slave.nodes, slave, cell(slave)).min()))
+    most = 2.0 * (side / spacing + 1.0) ** 2
+    return min(LIST_LENGTH * math.ceil(most / LIST_LENGTH), LONGEST_LIST)
+
+
 def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sign: float) -> ContactPass:
     penalty = 0.5 * contact.penalty if contact.two_way else contact.penalty
     nodes, masters = slave.nodes, master.nodes
@@ -107,6 +124,7 @@ def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sig
     order = np.argsort(corner, kind="stable")
     again = np.zeros(master.node.shape, dtype=bool)
     again[:, 3] = master.node[:, 2] == master.node[:, 3]
+    margin = SEARCH_MARGIN * float(np.sqrt(master.area.min()))
     order = order[~again.ravel()[order]]  # a triangle's last corner gathers once
     return ContactPass(
         slave=nodes,
@@ -118,7 +136,8 @@ def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sig
         master=masters,
         face_offset=np.searchsorted(corner[order], np.append(masters, masters[-1] + 1)).astype(np.int32),
         face_of_node=(order // 4).astype(np.int32),
-        margin=SEARCH_MARGIN * float(np.sqrt(master.area.min())),
+        margin=margin,
+        room=_room(slave, master, margin),
     )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from itertools import pairwise
+from numbers import Integral
 from queue import SimpleQueue
 from typing import Any
 
@@ -40,9 +41,9 @@ def thread_count(threads: int | None) -> int:
     """
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+    if isinstance(threads, bool) or not isinstance(threads, Integral) or threads < 1:
         raise bad_value("threads", threads, "give a whole number of threads above 0, or leave it out for all cores")
-    return threads
+    return int(threads)
 
 
 def whole(count: int, launch: Launch, least: int) -> None:

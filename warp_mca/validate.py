@@ -1,14 +1,43 @@
-"""Owns the checks that scenes and recipes make on their values."""
+"""Owns the checks of what users give: values of scenes, recipes and runs, code of their own, damaged files."""
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Iterable, Sequence
+import struct
+import tokenize
+import traceback
+import zipfile
+import zlib
+from collections.abc import Callable, Sequence
 from numbers import Real
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from warp_mca.errors import bad_value
+from warp_mca.errors import McaError, bad_value
+
+# What reading a damaged file can raise, from the archive down to the checks of the classes that are made from it.
+# `zipfile` raises RuntimeError where a damaged byte says encrypted, or packed in a way that it does not know; NumPy's
+# reader of headers raises TokenError and SyntaxError, and MemoryError where the shape is damaged; JSON RecursionError.
+DAMAGE = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+    RuntimeError,
+    SyntaxError,
+    tokenize.TokenError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def positive(owner: str, /, **values: float) -> None:
@@ -53,6 +82,61 @@ def vectors(owner: str, /, **values: Sequence[float]) -> None:
             raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
 
 
+def kinds(owner: str, kind: type | tuple[type, ...], remedy: str, /, **values: object) -> None:
+    """Each value must be an instance of `kind`."""
+    for name, value in values.items():
+        kind_of(f"{owner}.{name}", value, kind, remedy)
+
+
+def texts(owner: str, /, **values: str) -> None:
+    """Each value must be a text."""
+    kinds(owner, str, "give a text", **values)
+
+
+def members(owner: str, kind: type, /, **values: Sequence[object]) -> None:
+    """Each value must be a tuple or list of instances of `kind`."""
+    for name, value in values.items():
+        kind_of(f"{owner}.{name}", value, (tuple, list), f"give a tuple of {kind.__name__}")
+        for k, item in enumerate(value):
+            kind_of(f"{owner}.{name}[{k}]", item, kind, f"give a {kind.__name__}")
+
+
+def kind_of(field: str, value: object, kind: type | tuple[type, ...], remedy: str) -> None:
+    """The value of that field must be an instance of `kind`."""
+    if not isinstance(value, kind):
+        raise bad_value(field, brief(value), remedy)
+
+
+def brief(value: object) -> object:
+    """The value for a message, or the name of its class where it may be long."""
+    return value if value is None or isinstance(value, str | Real) else type(value).__name__
+
+
+def call(field: str, value: object, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """What a user's function returns.
+
+    Args:
+        field, value: that the function belongs to, for the message.
+        what: name of the function, for the message.
+        function, args, kwargs: what to call.
+
+    Raises:
+        RequestError: it raised something else than an McaError.
+    """
+    try:
+        found = function(*args, **kwargs)
+    except McaError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a user's code raises; not status 0
+        line = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(line.filename).name}, line {line.lineno}"
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        raise bad_value(field, value, f"{what} failed with {words} ({where})") from error
+    if inspect.iscoroutine(found):
+        found.close()  # or Python warns that nobody awaited it
+    return found
+
+
 def is_number(value: object) -> bool:
     """Whether it is a finite real number; text, None, sequences and truth values are none."""
     try:
@@ -62,8 +146,10 @@ def is_number(value: object) -> bool:
 
 
 def is_list(value: object) -> bool:
-    """Whether it is a sequence of finite numbers."""
-    return isinstance(value, Iterable) and not isinstance(value, str) and all(map(is_number, value))
+    """Whether it is a sequence of finite numbers; sets, mappings and generators have no places."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1 and all(map(is_number, value))
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes) and all(map(is_number, value))
 
 
 def _is_count(value: object) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.errors import bad_value
 from warp_mca.kernels.output import OPEN, STICK
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame, Recorder, RunInfo, SurfaceMesh, Volume
+from warp_mca.results import FILES, PATH_FILES
 from warp_mca.transfer import Transfer
 
 if TYPE_CHECKING:
@@ -32,18 +34,33 @@ def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
     return found
 
 
-def _check_files(recorders: Sequence[Recorder]) -> None:
-    """Refuse two recorders of one file: each would write over what the other does."""
-    known = set()
-    for path in (getattr(recorder, "path", None) for recorder in recorders):
-        if path is not None and Path(path).resolve() in known:
-            raise bad_value("recorders", str(path), "two of them write this file; give each a file of its own")
-        if path is not None:
-            known.add(Path(path).resolve())
+def _files(recorders: Sequence[Recorder]) -> list[Path]:
+    return [Path(file) for recorder in recorders for file in getattr(recorder, "files", ())]
+
+
+def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None = None) -> None:
+    """Refuse outputs that cross, of which one would write over the other or be a folder above it.
+
+    Raises:
+        RequestError: so it is, for files of the recorders, or one of them and the results in `out`.
+    """
+    known = [Path(out, name).resolve() for name in FILES + PATH_FILES] if out is not None else []
+    for file in _files(recorders):
+        path = file.resolve()
+        for other in known:
+            if path == other:
+                raise bad_value("recorders", str(file), "two outputs write this file; give each a file of its own")
+            if path in other.parents or other in path.parents:
+                raise bad_value("recorders", str(file), f"it cannot be there beside {other}; name another file")
+        known.append(path)
 
 
 class Recording:
-    """The recorders of one run."""
+    """The recorders of one run.
+
+    Attributes:
+        failed: names of the recorders that failed; what they write, mostly a file, is missing or ends too early.
+    """
 
     def __init__(
         self, recorders: Sequence[Recorder], info: RunInfo, intervals: int, steps: int, output: Output | None
@@ -51,19 +68,25 @@ class Recording:
         """Start the recorders of a run of `intervals` output intervals of `steps` steps each.
 
         Raises:
-            RequestError: two write the same file, or one cannot be opened; those before it are closed again.
+            RequestError: an output cannot be made; what the others had made by then is removed.
         """
-        _check_files(recorders)
+        for recorder in recorders:
+            getattr(recorder, "check", lambda info: None)(info)
+        self.failed: list[str] = []
         self.info, self.steps, self.output = info, steps, output
         self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = []
         self.taken: dict[int, int] = {}
         self.transfer: Transfer[tuple[str, str]] | None = None
+        missing = {folder for file in _files(recorders) for folder in file.parents if not folder.exists()}
         try:
             for recorder in recorders:
-                recorder.start(info)
                 self.rows.append((recorder, recorder.cadence.rows(intervals, info.output_interval)))
+                recorder.start(info)
         except BaseException:
             self.finish(False)
+            for folder in sorted(missing, reverse=True):  # the inner ones first
+                with suppress(OSError):
+                    folder.rmdir()
             raise
         if output and self.rows:
             arrays = {(need, name): a for need, group in output.arrays.items() for name, a in group.items()}
@@ -96,6 +119,8 @@ class Recording:
             self._deliver(self.transfer)
         for recorder, _ in list(self.rows):
             self._call(recorder, lambda recorder=recorder: recorder.finish(ok))
+            if getattr(recorder, "failed", False):
+                self.failed.append(recorder.name)
         self.rows = []
 
     def _deliver(self, transfer: Transfer[tuple[str, str]]) -> None:
@@ -115,6 +140,7 @@ class Recording:
             count = self.taken.get(id(recorder), 0)
             reason = " ".join(str(error).split()) or type(error).__name__
             self.info.warn(f"{recorder.name}: recording stopped at frame {count}: {reason}")
+            self.failed.append(recorder.name)
             self.rows = [item for item in self.rows if item[0] is not recorder]
             with suppress(Exception):
                 recorder.finish(False)

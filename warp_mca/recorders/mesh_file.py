@@ -51,7 +51,8 @@ class FinalState:
         self.name = str(self.path)
         self.needs = frozenset((VOLUME,))
         self.cadence = Cadence(frames=2)
-        self.left_out = _left_out(self.path)
+        self.left_out, parts = _try(self.path)
+        self.files = tuple(check_file("final", self.path.with_name(part), Path(part).suffix) for part in parts)
         self._fields: dict[str, NDArray] | None = None
 
     def start(self, info: RunInfo) -> None:
@@ -150,8 +151,8 @@ def _write(path: Path, mesh: meshio.Mesh) -> None:
         _load_meshio().write(path, mesh, file_format=_format(path))
 
 
-def _left_out(path: Path) -> list[str]:
-    """Names of the fields that a format drops, found by writing one element and reading it again.
+def _try(path: Path) -> tuple[list[str], list[str]]:
+    """Names of the fields that a format drops, and of the files that it takes: one element is written and read again.
 
     Raises:
         RequestError: the element does not come back.
@@ -169,13 +170,15 @@ def _left_out(path: Path) -> list[str]:
                 read = _load_meshio().read(trial)
             if [block.type for block in read.cells] != ["hexahedron"] or (read.cells[0].data != nodes).any():
                 raise ValueError("they do not come back")
+            parts = [part.name for part in trial.parent.iterdir()]
         except (Exception, SystemExit) as error:  # its writers and readers raise whatever went wrong, or exit
             why = " ".join(str(error).split())
             raise bad_value(
                 "final", str(path), f"meshio cannot write 8-node hexahedra in this format ({why}); {USUAL}"
             ) from error
     wanted = [(name, read.point_data) for name in fields] + [(name, read.cell_data) for name in mesh.cell_data]
-    return [name for name, kept in wanted if not any(key.startswith(name) for key in kept)]  # some split fields
+    # some split fields
+    return [name for name, kept in wanted if not any(key.startswith(name) for key in kept)], parts
 
 
 def _save(path: Path, mesh: meshio.Mesh) -> None:

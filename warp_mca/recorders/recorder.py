@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -174,12 +174,16 @@ class Frame:
 class Recorder(Protocol):
     """Writes or shows a run while it goes on.
 
-    A recorder that raises is dropped with a warning, and the run goes on without it; what it has written stays.
+    A recorder that raises is dropped with a warning, and the run goes on without it; what it has written stays as far
+    as it can be opened.
 
     Attributes:
         name: for warnings, such as the file that it writes.
         needs: what its frames must hold, out of SURFACE, CONTACT, PATHS and VOLUME.
         cadence: when it wants a frame.
+
+    It may have besides: `files`, the paths that it writes; `check(info)`, which refuses what it can before any recorder
+    of the run opens a file; `failed`, whether it went on after a failure that it warned of itself.
     """
 
     @property
@@ -206,8 +210,18 @@ class Recorder(Protocol):
         ...
 
     def finish(self, ok: bool) -> None:
-        """Close what is open; `ok` tells that the run ended as it should. Called once, also after an error."""
+        """Close what is open; `ok` tells that the run ended as it should. Called once, also if `start` failed."""
         ...
+
+
+def apart(names: Iterable[str]) -> list[str]:
+    """The names, each with as many underscores behind it as keep it apart from those before."""
+    found: list[str] = []
+    for name in names:
+        while name in found:
+            name += "_"
+        found.append(name)
+    return found
 
 
 def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path:

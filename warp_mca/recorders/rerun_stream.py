@@ -6,9 +6,13 @@ vertices takes 3 ms of the run's thread for one of them, rerun's own threads do 
 
 from __future__ import annotations
 
+import atexit
 import os
 import shutil
+import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
@@ -17,7 +21,7 @@ from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
 from warp_mca.recorders.colours import SLIP, STICK, ColourScale, packed
-from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, check_file
+from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -26,7 +30,8 @@ if TYPE_CHECKING:
     from warp_mca.recorders.rerun_viewer import Viewer
 
 FLUSH_EVERY = 4  # frames: what a killed run may lack
-FLUSH_TIMEOUT = 10.0  # of the file at the end [s]
+CLOSE_TIMEOUT = 10.0  # of the file at the end [s]
+END = b"RRF2FOOT"  # 12 bytes before the end of a whole file
 FRAMES = Cadence(frames=100)
 TO_MPA, TO_MM = 1e-6, 1e3
 
@@ -63,14 +68,27 @@ class RerunStream:
             raise bad_value("RerunStream.file", file, "name a file, or set viewer=True")
         self.path = None if file is None else check_file("rrd", file, ".rrd")
         self.name = str(self.path or "rerun viewer")
+        self.files = () if self.path is None else (self.path,)
         self.needs = frozenset((SURFACE, CONTACT, PATHS))
         self.cadence = cadence
         self.with_viewer, self.viewer_options, self.limit = viewer, tuple(viewer_options), limit
+        self._reset()
+
+    def _reset(self) -> None:
         self.streams: list[rr.RecordingStream] = []
         self.viewer: Viewer | None = None
         self.frame_count = 0
+        self.failed = False
         self._file_stream: rr.RecordingStream | None = None
         self._viewer_stream: rr.RecordingStream | None = None
+
+    def check(self, info: RunInfo) -> None:
+        """Refuse a limit that is none.
+
+        Raises:
+            RequestError: so it is.
+        """
+        ColourScale(info.scene, self.limit)
 
     def start(self, info: RunInfo) -> None:
         """Open the streams and log what never changes.
@@ -83,17 +101,24 @@ class RerunStream:
         rr = load_rerun()
         from warp_mca.recorders.rerun_blueprint import blueprint, log_legend, log_styles
 
+        self._reset()
         self.info = info
         self.scale = ColourScale(info.scene, self.limit)
-        layout = blueprint(self.scale, *_framing(info), with_paths=bool(info.paths))
+        names = apart(["contact_points", *map(_plain, info.surfaces)])[1:]
+        self.bodies = {body: entity("world", name) for body, name in zip(info.surfaces, names, strict=True)}
+        names = apart(map(_plain, info.paths))
+        self.paths = {path: entity("paths", name) for path, name in zip(info.paths, names, strict=True)}
+        struck = [self.bodies[body] for body in info.surfaces if body not in info.striking]
+        layout = blueprint(self.scale, *_framing(info), struck, with_paths=bool(info.paths))
         recording = uuid4()
         if self.path is not None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            stream = self._file_stream = rr.RecordingStream("warp_mca", recording_id=recording)
+            stream = rr.RecordingStream("warp_mca", recording_id=recording)
             try:
                 stream.set_sinks(rr.FileSink(str(self.path)), default_blueprint=layout)
             except RuntimeError as error:
                 raise bad_value("rrd", str(self.path), f"it cannot be written ({error}); name another file") from error
+            self._file_stream = stream
         if self.with_viewer:
             stream = self._viewer_stream = rr.RecordingStream("warp_mca", recording_id=recording)
             self.viewer = Viewer(stream, layout, self.viewer_options)
@@ -102,7 +127,7 @@ class RerunStream:
             log_legend(stream)
             log_styles(stream)
             for body, surface in info.surfaces.items():
-                stream.log(entity("world", body), _topology(info, surface.nodes, surface.triangles), static=True)
+                stream.log(self.bodies[body], _topology(info, surface.nodes, surface.triangles), static=True)
         self._warm_up()
 
     def frame(self, frame: Frame) -> None:
@@ -119,7 +144,7 @@ class RerunStream:
         if self.viewer:
             self.viewer.sent(sum(points.nbytes for points in frame.points.values()) * 4 // 3)
         if self._file_stream and self.frame_count % FLUSH_EVERY == 0:
-            self._flush_file(timeout=0.0)
+            self._flush_file()
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
         """Log rows of the history as curves."""
@@ -142,9 +167,9 @@ class RerunStream:
         """Write and send what is left; a recording that lacks something is a warning."""
         self._drop_failed()
         if self._file_stream:
-            self._flush_file(timeout=FLUSH_TIMEOUT)
-        if self._file_stream:
-            self._file_stream.disconnect()  # writes the file's table of contents
+            self._close_file()
+            if not ok and not self.frame_count and self.path:
+                self.path.unlink(missing_ok=True)
         if self.viewer:
             self.viewer.finish()
         self._drop_failed()
@@ -161,7 +186,7 @@ class RerunStream:
         stream.set_time("step", sequence=int(frame.step))
         for body, points in frame.points.items():
             mesh = rr.Mesh3D.from_fields(vertex_positions=points, vertex_colors=colours[body])
-            stream.log(entity("world", body), mesh)
+            stream.log(self.bodies[body], mesh)
         sticks = np.where(frame.contact_stick, np.uint32(STICK), np.uint32(SLIP))
         dots = rr.Points3D.from_fields(positions=frame.contact_points, colors=sticks, radii=[-3.0])
         stream.log("world/contact_points", dots)
@@ -169,7 +194,7 @@ class RerunStream:
             at, width = _bars(self.info.paths[name], k, len(frame.path_stress))
             colour = PATH_COLOURS[k % len(PATH_COLOURS)]
             bars = rr.BarChart(TO_MPA * stress, abscissa=at, widths=width, color=colour)
-            stream.log(entity("paths", name), bars)
+            stream.log(self.paths[name], bars)
         if rescaled:
             log_ticks(stream, self.scale)
 
@@ -185,22 +210,36 @@ class RerunStream:
         idle.log("mesh", mesh)
         sink.drain_as_bytes()
 
-    def _flush_file(self, timeout: float) -> None:
-        """Start writing what was logged, and wait for it at most `timeout` [s]; 0 does not wait."""
+    def _flush_file(self) -> None:
+        """Start writing what was logged, without waiting for it."""
         assert self._file_stream is not None and self.path is not None
-        # Once a write has failed, rerun 0.41 can hang in the next flush: so stop while there is room.
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
-            self._give_up_file(f"less than {DISK_RESERVE >> 20} MiB are free on its disk")
+            self._close_file(f"less than {DISK_RESERVE >> 20} MiB are free on its disk")
             return
         try:
-            self._file_stream.flush(timeout_sec=timeout)
+            self._file_stream.flush(timeout_sec=0.0)
         except RuntimeError as error:
-            self._give_up_file(str(error))
+            self._close_file(str(error))
 
-    def _give_up_file(self, reason: str) -> None:
-        self.info.warn(f"{self.path}: recording stopped after {self.frame_count} frames: {reason}")
+    def _close_file(self, reason: str = "") -> None:
+        """Write the file's table of contents, and remove a file that takes none; `reason` says why it ends early."""
+        import rerun as rr
+
+        assert self._file_stream is not None and self.path is not None
+        # Once a write has failed, rerun 0.41 may never come back: not from this, nor when Python exits.
+        closing = threading.Thread(target=self._file_stream.disconnect, daemon=True)
+        closing.start()
+        closing.join(CLOSE_TIMEOUT)
+        if closing.is_alive():
+            atexit.unregister(rr.rerun_shutdown)
         self.streams = [stream for stream in self.streams if stream is not self._file_stream]
         self._file_stream = None
+        if closing.is_alive() or not _whole(self.path):
+            self.path.unlink(missing_ok=True)
+            reason = f"{reason or 'it could not be written'}; the broken file is removed"
+        if reason:
+            self.failed = True
+            self.info.warn(f"{self.path}: recording stopped after {self.frame_count} frames: {reason}")
 
     def _drop_failed(self) -> None:
         """Stop sending to a viewer that was given up, and say so once."""
@@ -224,18 +263,14 @@ def _topology(info: RunInfo, nodes: NDArray[np.int32], triangles: NDArray[np.int
     return rr.Mesh3D.from_fields(triangle_indices=triangles, vertex_normals=normals.astype(np.float32))
 
 
-def _framing(info: RunInfo) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, list[str]]:
-    """What the first views show: a box [m], shape (2, 3); where contact is expected [m], or None; what is struck.
+def _framing(info: RunInfo) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """What the first views show: a box [m], shape (2, 3); where contact is expected [m], or None.
 
     The box leaves out bodies that are only struck, such as a plate much larger than what strikes it.
     """
     points = np.concatenate([info.model.X[info.surfaces[body].nodes] for body in info.striking])
     focus = info.model.X[info.model.points[0]] if info.model.points[0] >= 0 else None
-    return (
-        np.array([points.min(axis=0), points.max(axis=0)]),
-        focus,
-        [entity("world", body) for body in info.surfaces if body not in info.striking],
-    )
+    return np.array([points.min(axis=0), points.max(axis=0)]), focus
 
 
 def _bars(position: NDArray[np.floating], index: int, count: int) -> tuple[NDArray, NDArray]:
@@ -245,8 +280,20 @@ def _bars(position: NDArray[np.floating], index: int, count: int) -> tuple[NDArr
     return position + (index - 0.5 * (count - 1)) * width, np.full(len(position), width, dtype=np.float32)
 
 
+def _plain(name: str) -> str:
+    return name.replace(" ", "_")
+
+
 def entity(*parts: str) -> str:
-    """Path of an entity; parts may hold any characters, spaces turn into underscores."""
+    """Path of an entity; parts may hold any characters."""
     import rerun as rr
 
-    return rr.new_entity_path([part.replace(" ", "_") for part in parts])
+    return rr.new_entity_path(list(parts))
+
+
+def _whole(path: Path) -> bool:
+    """Whether a recording ends with its table of contents."""
+    with suppress(OSError), path.open("rb") as file:
+        file.seek(-12, os.SEEK_END)
+        return file.read(len(END)) == END
+    return False

@@ -25,18 +25,21 @@ class SnapshotFile:
         if not (math.isfinite(time) and time >= 0.0):
             raise bad_value("snapshot", time, "give a finite time from 0 s on")
         self.path = check_file("snapshot", file, ".png")
-        self.name = str(self.path)
+        self.name, self.files = str(self.path), (self.path,)
         self.needs = frozenset((SURFACE,))
         self.time, self.cadence = time, Cadence(times=(time,))
 
-    def start(self, info: RunInfo) -> None:
-        """Keep the faces.
+    def check(self, info: RunInfo) -> None:
+        """Refuse a time that the run does not reach.
 
         Raises:
-            RequestError: the run ends before that time.
+            RequestError: so it is.
         """
         if self.time > info.duration + 0.5 * info.output_interval:
             raise bad_value("snapshot", self.time, f"the run ends at {info.duration:g} s; give a time until then")
+
+    def start(self, info: RunInfo) -> None:
+        """Keep the faces."""
         self.info = info
 
     def frame(self, frame: Frame) -> None:

@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
-from collections.abc import Mapping
+import signal
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
+from warp_mca.files import nearest
 from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, levels
-from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, check_file
+from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, apart, check_file
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo, SurfaceMesh
@@ -22,6 +28,7 @@ if TYPE_CHECKING:
 FRAMES = Cadence(frames=100)
 SAVE_EVERY = 5  # frames: what a killed run may lack; a save costs more than a frame
 PLAYBACK = 24.0  # frames shown in a second
+FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
 POINT_SIZE = 0.004  # of contact points, as a share of the scene
 
 
@@ -45,14 +52,32 @@ class UsdFile:
             RequestError: `file` cannot be written.
         """
         self.path = check_file("usd", file, ".usdc", ".usd", ".usda")
-        self.name = str(self.path)
+        self.name, self.files = str(self.path), (self.path,)
+        if not _is_utf8(self.name):
+            raise bad_value("usd", self.name, "USD takes names in UTF-8 only; name another file")
         self.needs = frozenset((SURFACE, CONTACT))
         self.cadence, self.limit = cadence, limit
+        self._reset()
+
+    def _reset(self) -> None:
         self.times: list[float] = []
         self.limits: list[float] = []
         self.bodies: dict[str, _Body] = {}
         self.stage: Any = None
         self.contact: Any = None
+        self.saved_count = 0  # frames that the file holds
+
+    def check(self, info: RunInfo) -> None:
+        """Load USD; refuse a limit that is none, and a disk that is full.
+
+        Raises:
+            RequestError: so it is.
+        """
+        with _signals_held():
+            from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401
+        ColourScale(info.scene, self.limit)
+        if shutil.disk_usage(nearest(self.path).absolute()).free < DISK_RESERVE:
+            raise bad_value("usd", str(self.path), f"it cannot be written ({FULL}); name another file")
 
     def start(self, info: RunInfo) -> None:
         """Write what never changes.
@@ -60,6 +85,8 @@ class UsdFile:
         Raises:
             RequestError: the file cannot be made.
         """
+        self._reset()
+        self.check(info)
         from pxr import Tf, UsdGeom
 
         self.info = info
@@ -75,21 +102,15 @@ class UsdFile:
         self.stage.SetFramesPerSecond(PLAYBACK)
         world = UsdGeom.Xform.Define(self.stage, "/World")
         self.stage.SetDefaultPrim(world.GetPrim())
-        for body, surface in info.surfaces.items():
-            name = Tf.MakeValidIdentifier(body)
-            while self.stage.GetPrimAtPath(f"/World/{name}"):
-                name += "_"
+        contact, *names = apart(["contact", *map(Tf.MakeValidIdentifier, info.surfaces)])
+        for name, (body, surface) in zip(names, info.surfaces.items(), strict=True):
             self.bodies[body] = _Body(UsdGeom.Mesh.Define(self.stage, f"/World/{name}"), body, surface)
-        name = "contact"
-        while self.stage.GetPrimAtPath(f"/World/{name}"):
-            name += "_"
         size = float(np.ptp(np.concatenate([info.model.X[s.nodes] for s in info.surfaces.values()]), axis=0).max())
-        self.contact = _Contact(UsdGeom.Points.Define(self.stage, f"/World/{name}"), POINT_SIZE * size)
+        self.contact = _Contact(UsdGeom.Points.Define(self.stage, f"/World/{contact}"), POINT_SIZE * size)
         try:
             self._save()
         except OSError as error:
-            self.stage = None
-            self.path.unlink(missing_ok=True)
+            self.finish(False)
             raise bad_value("usd", str(self.path), f"it cannot be written ({error}); name another file") from error
 
     def frame(self, frame: Frame) -> None:
@@ -117,7 +138,7 @@ class UsdFile:
         """Has no place in this file."""
 
     def finish(self, ok: bool) -> None:
-        """Save what is left.
+        """Save what is left; a file without a frame is removed.
 
         Raises:
             OSError: the disk is full or fails.
@@ -128,12 +149,14 @@ class UsdFile:
                     self._save()
             finally:
                 self.stage, self.bodies, self.contact = None, {}, None
+                if not self.saved_count:
+                    self.path.unlink(missing_ok=True)
 
     def _save(self) -> None:
         from pxr import Tf, Vt
 
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
-            raise OSError(f"less than {DISK_RESERVE >> 20} MiB are free on its disk")
+            raise OSError(FULL)
         self.stage.SetStartTimeCode(0.0)
         self.stage.SetEndTimeCode(max(0.0, len(self.times) - 1.0))
         times, limits = (Vt.DoubleArray.FromNumpy(np.array(v, dtype=float)) for v in (self.times, self.limits))
@@ -148,7 +171,11 @@ class UsdFile:
         try:
             self.stage.Save()
         except Tf.ErrorException as error:
-            raise OSError(_reason(error)) from error
+            if _opens(self.path):
+                raise OSError(_reason(error)) from error
+            self.path.unlink(missing_ok=True)
+            raise OSError(f"{_reason(error)}; the broken file is removed") from error
+        self.saved_count = len(self.times)
 
 
 class _Body:
@@ -217,6 +244,37 @@ def _new_stage(path: str) -> Any:
     return Usd.Stage.Open(layer)
 
 
+def _opens(path: Path) -> bool:
+    from pxr import Sdf, Tf
+
+    try:
+        return Sdf.Layer.OpenAsAnonymous(str(path)) is not None
+    except Tf.ErrorException:
+        return False
+
+
+def _is_utf8(name: str) -> bool:
+    try:
+        return bool(name.encode())
+    except UnicodeEncodeError:
+        return False
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Let SIGINT and SIGTERM act only afterwards: what they raise is lost while pxr is imported, and breaks it."""
+    held: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    handlers = {number: signal.signal(number, lambda number, frame: held.append(number)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+        for number in held[:1]:
+            signal.raise_signal(number)
+
+
 def _place(item: _Body | _Contact, code: Any, points: NDArray) -> None:
     """Set points and their extent."""
     from pxr import Vt
@@ -253,4 +311,5 @@ def _vertical(info: RunInfo) -> int:
 
 
 def _reason(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+    found = re.search(r": '([^']*)'", str(error))  # the message, without the place in USD's sources
+    return " ".join((found[1] if found else str(error)).split())[:200]

@@ -53,7 +53,7 @@ class VtkHdfFile:
             RequestError: `file` cannot be written.
         """
         self.path = check_file("vtkhdf", file, ".vtkhdf", ".hdf")
-        self.name = str(self.path)
+        self.name, self.files = str(self.path), (self.path,)
         self.needs = frozenset((VOLUME,))
         self.cadence = cadence
         self.frame_count = 0

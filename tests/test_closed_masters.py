@@ -1,0 +1,114 @@
+"""Forces on masters that are closed surfaces, which have no normal of their own, from any side."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.simulation import mesh
+from warp_mca.solver import Solver
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+R, V = 0.01, 2.0
+BALL = mca.Sphere(radius=R, section=4, ring=2, pole_layers=3)
+QUARTER = np.pi / 2.0
+TOWARDS = {
+    "x": (0.0, 0.0, 0.0),
+    "y": (0.0, 0.0, QUARTER),
+    "z": (0.0, -QUARTER, 0.0),
+}  # where the first ball's pole looks
+AWAY = {"x": (0.0, 0.0, np.pi), "y": (0.0, 0.0, -QUARTER), "z": (0.0, QUARTER, 0.0)}
+
+
+def balls(axis: str = "x", slave: str = "pole", master: str = "surface", gap: float = 0.0, **contact) -> mca.Scene:
+    """A ball flies along an axis, pole first, into the pole of another at the origin."""
+    n = np.eye(3)["xyz".index(axis)]
+    at, velocity = tuple(-(2.0 * R + gap) * n), tuple(V * n)
+    first = mca.Body(name="a", geometry=BALL, material=STEEL, position=at, velocity=velocity, rotation=TOWARDS[axis])
+    second = mca.Body(name="b", geometry=BALL, material=STEEL, rotation=AWAY[axis])
+    meet = mca.Contact(
+        slave=mca.Surface(body="a", nodes=slave), master=mca.Surface(body="b", nodes=master), penalty=3.0, **contact
+    )
+    impact = mca.ImpactPhase(duration=7e-5 + gap / V, energy_tolerance=0.05)
+    return mca.Scene(name="balls", bodies=(first, second), contacts=(meet,), impact=impact)
+
+
+def impulse(result: mca.Result, column: str = "F_n_N") -> float:
+    """Sum of a force over time [N s]."""
+    return float(result[column].sum() * (result.time[1] - result.time[0]))
+
+
+@pytest.fixture
+def momentum(monkeypatch):
+    """Gives the momentum [kg m/s] that the last run left in a range of its nodes."""
+    last = {}
+    monkeypatch.setattr(
+        Solver,
+        "max_plastic_strain",
+        lambda self, scene: last.update(p=self.model.mass[:, None] * self.v.numpy()) or 0.0,
+    )
+    return lambda start, end: last["p"][start:end].sum(axis=0)
+
+
+NODES = len(mesh(balls())["b"].points)
+
+
+@pytest.fixture(scope="module")
+def pole() -> mca.Result:
+    """The same impact on a master that is open."""
+    return mca.run(balls(master="pole"))
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize(("slave", "master"), [("pole", "surface"), ("boundary", "boundary"), ("boundary", "pole")])
+def test_forces_of_a_closed_master_are_those_of_its_pole_from_any_side(axis, slave, master, pole, momentum):
+    result = mca.run(balls(axis, slave, master))
+    gained = momentum(NODES, 2 * NODES)
+    assert gained["xyz".index(axis)] == pytest.approx(np.linalg.norm(gained), rel=1e-3)
+    assert impulse(result) == pytest.approx(np.linalg.norm(gained), rel=2e-3)
+    assert result.F_n == pytest.approx(pole.F_n, abs=0.01 * pole.F_n.max())
+    for key in ("contact_duration", "F_n_first_peak", "F_n_max"):
+        assert result.summary[key] == pytest.approx(pole.summary[key], rel=0.01)
+    assert np.abs(result["F_t_N"]).max() < 0.03 * result.F_n.max()
+
+
+def test_the_normal_force_of_two_closed_surfaces_does_not_ask_where_they_meet(momentum):
+    """The second ball lies 30 degrees beside the way of the first, which begins 3 mm away from it."""
+    scene = balls(slave="boundary", gap=3e-3)
+    aside = replace(scene.bodies[0], position=(-np.sqrt(3.0) * R - 3e-3, R, 0.0))
+    longer = replace(scene.impact, duration=1.6e-3)
+    result = mca.run(replace(scene, bodies=(aside, scene.bodies[1]), impact=longer))
+    gained = np.linalg.norm(momentum(NODES, 2 * NODES))
+    assert gained > 0.03
+    assert impulse(result) == pytest.approx(gained, rel=1e-3)
+
+
+@pytest.mark.parametrize("nodes", ["pole", "boundary"])
+def test_friction_and_two_ways_on_a_closed_master(nodes):
+    def rubbing(slave: str, master: str) -> mca.Scene:
+        scene = balls(slave=slave, master=master, mu=0.2, two_way=True)
+        aside = replace(scene.bodies[0], velocity=(V, 1.0, 0.0))
+        return replace(scene, bodies=(aside, scene.bodies[1]))
+
+    open_one, closed = mca.run(rubbing("pole", "pole")), mca.run(rubbing(nodes, "boundary"))
+    assert impulse(open_one, "F_t_N") < -0.05 * impulse(open_one)
+    for column in ("F_n_N", "F_t_N"):
+        assert closed[column] == pytest.approx(open_one[column], abs=0.01 * open_one.F_n.max())
+
+
+def test_each_contact_of_each_scene_of_a_batch_counts_by_itself(momentum):
+    """A ball catches up with one that meets a third: both closed, in one scene open."""
+
+    def row(axis: str, master: str) -> mca.Scene:
+        scene = balls(axis, "boundary", master)
+        (first, second), (meet,) = scene.bodies, scene.contacts
+        twice = {key: tuple(2.0 * np.array(getattr(first, key))) for key in ("position", "velocity")}
+        behind = replace(meet, master=mca.Surface(body="c", nodes=master))
+        return replace(scene, bodies=(first, second, replace(first, name="c", **twice)), contacts=(meet, behind))
+
+    results = mca.run_batch([row("x", "surface"), row("y", "pole"), row("z", "boundary")])
+    for k, result in enumerate(results):
+        a, b, c = (momentum(NODES * (3 * k + i), NODES * (3 * k + i + 1))[k] for i in range(3))
+        before = 2.0 / 3.0 * (a + b + c)  # of the ball behind
+        assert impulse(result) == pytest.approx(b + before - c, rel=5e-3)
