@@ -21,8 +21,8 @@ PASS_COLUMNS = 8
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
-    "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh both "
-    "sides more alike, or choose a smaller output_interval if they are fast",
+    "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh "
+    "both sides more alike, or choose a smaller output_interval if they are fast",
     "a node outran the contact search; choose a smaller output_interval",
     "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or, if penalty is high, "
     "lower time_step_scale",
