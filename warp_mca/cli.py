@@ -10,7 +10,6 @@ import argparse
 import atexit
 import dataclasses
 import gc
-import io
 import os
 import signal
 import sys
@@ -28,6 +27,7 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.errors import GuardError, McaError, bad_value
 from warp_mca.scene import Scene
 from warp_mca.scene_file import SUFFIX, Origin
+from warp_mca.streams import drop_output, open_streams, what_failed
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
@@ -92,7 +92,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:  # the process ends with this command: going through all that it made, to free it, takes 0.5 s
         atexit.register(gc.freeze)
         os.environ["MPLBACKEND"] = "agg"  # that of a notebook may be of another environment; no figure needs it
-        _open_streams()
+        open_streams()
     collect = gc.get_threshold()
     gc.set_threshold(COLLECT)
     main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
@@ -106,11 +106,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except McaError as error:
         return _fail(str(error), error.exit_status)
     except BrokenPipeError:
-        _drop_output()
+        drop_output()
         return 128 + signal.SIGPIPE
     except OSError as error:
-        _drop_output()
-        return _fail(_what_failed(error), 2)
+        drop_output()
+        return _fail(what_failed(error), 2)
     except MemoryError:
         return _fail("the model does not fit into this machine's memory: take fewer elements", 2)
     except KeyboardInterrupt as stop:
@@ -138,35 +138,6 @@ def _carry_out(argv: Sequence[str] | None) -> int:
 def _fail(why: str, status: int) -> int:
     print("warp-mca: error:", " ".join(why.split()), file=sys.stderr)
     return status
-
-
-def _what_failed(error: OSError) -> str:
-    """One sentence of what the system refused."""
-    what = error.strerror or str(error)
-    if error.filename is None and isinstance(error, FileNotFoundError):
-        return "the working directory is gone: change to one that exists"
-    return f"{error.filename}: {what}; name another" if error.filename else f"standard output: {what}"
-
-
-def _open_streams() -> None:
-    """Files would take the numbers of standard streams that are closed; a name may hold what they cannot print."""
-    for number, name in enumerate(("stdin", "stdout", "stderr")):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
-            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
-
-
-def _drop_output() -> None:
-    """Leave nothing that Python would try to print once more at its end."""
-    with suppress(OSError, ValueError, AttributeError):
-        null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, sys.stdout.fileno())
-        os.close(null)
 
 
 def _terminate(number: int, frame: object) -> NoReturn:

@@ -55,12 +55,14 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
         meshes: of every body, by its name.
 
     Raises:
-        RequestError: the bodies cannot be put together, e.g. a joint's nodes do not coincide.
+        RequestError: the bodies cannot be put together, e.g. a joint's nodes do not coincide; or it is no scene.
     """
+    from warp_mca.arguments import check_scene
     from warp_mca.geometry.quality import edge_lengths, scaled_jacobian
     from warp_mca.handoff import hand_off
     from warp_mca.model import build_model, nodal_masses
 
+    check_scene("scene", scene)
     bodies = tuple(
         BodyQuality(
             body=name,
