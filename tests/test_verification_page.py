@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.verification import key, measure, tasks, write_page
 from warp_mca.elements import ELEMENTS
 from warp_mca.verify import cases
 from warp_mca.verify.mutations import MUTATIONS
@@ -42,3 +43,20 @@ def test_every_case_was_seen_to_fail():
 def test_page_says_at_its_head_whether_every_row_is_met():
     missed = any(line.endswith(("| NOT MET |", "| OPEN |")) for line in PAGE.splitlines())
     assert ("Every row is met." in PAGE) != missed
+
+
+def test_page_is_written_from_what_was_stored(tmp_path):
+    stored = json.loads((DOCS / "verification.json").read_text(encoding="utf-8"))
+    write_page(stored, tmp_path)
+    assert (tmp_path / "verification.md").read_text(encoding="utf-8") == PAGE
+    assert {key(found) for found in stored} == {task[:3] for task in tasks((), "", "")}
+
+
+def test_an_outcome_is_stored_as_it_is_read(tmp_path, capsys):
+    found = measure(("patch_test", "tet4", "mixed", "cpu", "quick"))
+    assert found is not None
+    write_page(json.loads(json.dumps([found])), tmp_path)
+    page = (tmp_path / "verification.md").read_text(encoding="utf-8")
+    assert page.count("| tet4 | mixed | ") == len(found["rows"]) > 1
+    assert "| NOT MET |" not in page
+    assert "patch_test (tet4, mixed)" in capsys.readouterr().out
