@@ -40,4 +40,6 @@ def cases(names: Sequence[str] = ()) -> list[Case]:
     for name in names:
         if name not in CASES and name not in GROUPS:
             raise bad_value("case", name, f"choose among {', '.join(CASES)}, or a group: {', '.join(GROUPS)}")
-    return [item for item in CASES.values() if not names or item.name in names or item.group in names]
+    order = {f"warp_mca.verify.{file}": k for k, file in enumerate(FILES)}  # whichever was imported first
+    found = sorted(CASES.values(), key=lambda item: order.get(item.measure.__module__, len(FILES)))
+    return [item for item in found if not names or item.name in names or item.group in names]
