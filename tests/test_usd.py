@@ -286,7 +286,7 @@ def test_an_interrupt_waits_until_usd_is_imported(tmp_path: Path):
         bars = FlyingBars()
         sys.meta_path.insert(0, Interrupt())
         try:
-            UsdFile(sys.argv[1]).start(bars.info)
+            UsdFile(sys.argv[1]).check(bars.info)
         except KeyboardInterrupt:
             print(hasattr(sys.modules.get("pxr.UsdGeom"), "Mesh"))
     """

@@ -66,6 +66,11 @@ def span_of(scene: Scene, duration: float | None) -> float:
 
 
 def check_recorders(recorders: Sequence[Recorder]) -> None:
+    """What the user gave as recorders must be a list of them, made and not their classes.
+
+    Raises:
+        RequestError: it is none.
+    """
     remedy = "give a list of recorders, as mca.run(scene, recorders=[RerunStream(FILE)]), or leave it out"
     validate.kind_of("recorders", recorders, (tuple, list), remedy)
     for k, item in enumerate(recorders):

@@ -19,7 +19,12 @@ def check_folder(field: str, path: Path) -> None:
     Raises:
         RequestError: so it is, of what the user named `field`.
     """
-    existing = nearest(path)
+    try:
+        existing = nearest(path)
+    except FileNotFoundError:  # the working directory is gone, which is no fault of the name
+        raise
+    except OSError as error:  # as of a name that is too long
+        raise bad_value(field, str(path), f"{error.strerror or error}; name another") from error
     if not existing.is_dir():
         raise bad_value(field, str(path), f"{existing} is not a folder; name another")
     try:  # root may write to folders that take no file all the same

@@ -172,14 +172,8 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
         RequestError: it is a file, cannot be written to, or holds results and `force` is off.
     """
     path = folder_path("out", directory)
-    try:
-        check_folder("out", path)
-        taken = any((path / name).exists() for name in FILES + PATH_FILES)
-    except FileNotFoundError:  # the working directory is gone, which is no fault of the name
-        raise
-    except OSError as error:  # as of a name that is too long
-        raise bad_value("out", str(path), f"{error.strerror or error}; name another folder") from error
-    if taken and not force:
+    check_folder("out", path)
+    if not force and any((path / name).exists() for name in FILES + PATH_FILES):
         raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
     return path
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
@@ -208,9 +207,6 @@ def _signals_kept() -> Iterator[None]:
 
     In C, because Python takes signals in the main thread only, and knows no handler of a library.
     """
-    if os.name != "posix":
-        yield
-        return
     sigaction = ctypes.CDLL(None).sigaction
     kept = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # more than the struct
     for number, action in kept.items():

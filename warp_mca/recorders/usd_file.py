@@ -86,7 +86,6 @@ class UsdFile:
             RequestError: the file cannot be made.
         """
         self._reset()
-        self.check(info)
         from pxr import Tf, UsdGeom
 
         self.info = info
