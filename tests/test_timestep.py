@@ -112,7 +112,7 @@ CASES = {
     "plane, rough": (scene(shaken(box(2, 1, 2), 2e-4), mu=1e3), 0.75),
     "plane, stiff": (scene(box(2, 1, 2), penalty=10.0), 0.6),
     "alike": (scene(box(2, 1, 2), box(2, 1, 2), penalty=1.0), 0.7),
-    "alike, rough": (scene(box(2, 1, 2), box(2, 1, 2), mu=1e3, penalty=3.0), 0.7),
+    "alike, rough": (scene(box(2, 1, 2), box(2, 1, 2), mu=1e3, penalty=3.0), 0.6),
     "alike, two-way": (scene(box(2, 1, 2), box(2, 1, 2), mu=1e3, two_way=True), 0.7),
     "fine on coarse": (scene(box(1, 1, 1), box(4, 1, 4, size=(2 * H, H / 2, 2 * H)), penalty=10.0), 0.35),
     "coarse on fine": (scene(box(4, 1, 4, size=(2 * H, H / 2, 2 * H)), box(2, 1, 2), two_way=True, penalty=10.0), 0.4),
@@ -145,6 +145,24 @@ def test_nodes_that_bounce_on_stiff_springs_gain_no_energy(penalty: float):
     """Steps as long as linear springs allow would throw the nodes through the plane within a tenth of this time."""
     sphere = mca.make_scene("hertz_sphere", section=4, penalty=penalty)
     assert mca.run(sphere).summary["energy_error"] < 1e-3
+
+
+@pytest.mark.parametrize(("element", "axial"), [("hex8", 10), ("hex8r", 10), ("tet4", 20)])
+def test_bars_that_strike_end_on_gain_no_energy(element: str, axial: int):
+    """All nodes of a face close and open at once; steps a tenth longer gave 1.2 to 2.2 %."""
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    box = mca.Box(size=(0.1, 0.02, 0.02), divisions=(axial, 2, 2))
+    flying = {"position": (-0.1, 0.0, 0.0), "velocity": (5.0, 0.0, 0.0)}
+    bodies = [
+        mca.Body(name=name, geometry=box, material=steel, element=element, **start)
+        for name, start in (("one", flying), ("other", {}))
+    ]
+    contact = mca.Contact(
+        slave=mca.Surface(body="one", nodes="xmax"), master=mca.Surface(body="other", nodes="xmin"), mu=0.0
+    )
+    impact = mca.ImpactPhase(duration=1.2e-4, output_interval=6e-6)
+    made = mca.Scene(name="end on", bodies=tuple(bodies), contacts=(contact,), impact=impact)
+    assert mca.run(made, precision="float64").summary["energy_error"] < 0.006
 
 
 def test_worst_of_many_elements_is_found_wherever_it_lies():

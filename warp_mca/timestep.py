@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ BATCH = 256  # elements whose exact eigenvalues are found at a time
 MOST = 100 * BATCH  # of them: 24 x 24 problems cost 50 us each
 # Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring alone
 # holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
-BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 4.0, 0.9
+BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9
 KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
 
 
@@ -106,10 +107,10 @@ def stable_step(
         if value[most] > worst:
             worst, element, own = float(value[most]), int(stiff[most]), float(bound[most])
     return StableStep(
-        dt=2.0 / np.sqrt(worst),
+        dt=2.0 / math.sqrt(worst),
         element=int(index[element]),
         contact_share=1.0 - own / worst,
-        shortened=float(np.sqrt(own / usual)),
+        shortened=math.sqrt(own / usual),
     )
 
 
