@@ -4,39 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import subprocess
-import sys
-import threading
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import pytest
+from recipes import FOCUS, LENGTH, R, area, plate, rod
 
 from warp_mca.errors import RequestError
-from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
+from warp_mca.geometry import Box, Mesh, MeshFile, Sphere
 from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.quality import check, edge_lengths, gauss_jacobians, scaled_jacobian, volumes
 from warp_mca.verify.elements import patch
-
-R, LENGTH, FOCUS = 0.013, 0.21, math.radians(36.43)
-
-
-def rod(**changes) -> Rod:
-    return Rod(**{"radius": R, "length": LENGTH, "focus_angle": FOCUS, "axial": 4, **changes})
-
-
-def plate(**changes) -> Plate:
-    return Plate(**{"length": 1.2, "width": 0.1, "height": 0.05, **changes})
-
-
-def area(mesh: Mesh, name: str) -> float:
-    """Area of the faces in a node set, each as two triangles [m^2]."""
-    p = mesh.points[mesh.surface(name)[0]]
-    normals = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0])
-    return sum(0.5 * np.linalg.norm(normal, axis=1).sum() for normal in normals)
 
 
 def has_node(mesh: Mesh, place: tuple[float, float, float], tolerance: float = 0.0) -> bool:
@@ -310,131 +290,6 @@ def test_many_cells_beyond_the_box():
     assert len(np.unique(mesh.points[mesh.nodes("zmax")][:, 0].round(9))) > 400
 
 
-def read_back(path: Path, mesh, **options) -> Mesh:
-    import meshio
-
-    meshio.write(path, mesh, **options)
-    return MeshFile(path=path).build()
-
-
-def as_meshio(mesh: Mesh, **extra):
-    import meshio
-
-    return meshio.Mesh(mesh.points, [("quad", mesh.surface("xmin")[0]), ("hexahedron", mesh.hexahedra)], **extra)
-
-
-def test_mesh_file_binary_msh_with_physical_groups(tmp_path: Path):
-    box = Box(size=(1.0, 2.0, 3.0), divisions=(2, 3, 4)).build()
-    tags = [np.full(3 * 4, 7), np.where(np.arange(24) < 10, 1, 2)]
-    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    names = {"wall": np.array([7, 2]), "soft": np.array([1, 3])}
-    written = as_meshio(box, cell_data=data, field_data=names)
-    mesh = read_back(tmp_path / "box.msh", written, file_format="gmsh22", binary=True)
-    assert np.array_equal(mesh.points, box.points)
-    assert np.array_equal(mesh.hexahedra, box.hexahedra)
-    assert np.array_equal(mesh.nodes("wall"), np.sort(box.nodes("xmin")))
-    assert np.array_equal(mesh.cell_sets["soft"], np.arange(10))
-    assert np.array_equal(mesh.cell_sets["physical_2"], np.arange(10, 24))
-
-
-def test_mesh_file_written_by_gmsh_itself(tmp_path: Path):
-    import gmsh
-
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("Mesh.Binary", 1)
-        square = gmsh.model.occ.addRectangle(0.0, 0.0, 0.0, 1.0, 1.0)
-        swept = gmsh.model.occ.extrude([(2, square)], 0.0, 0.0, 2.0, numElements=[3], recombine=True)
-        gmsh.model.occ.synchronize()
-        for _, curve in gmsh.model.getEntities(1):
-            gmsh.model.mesh.setTransfiniteCurve(curve, 3)
-        gmsh.model.mesh.setTransfiniteSurface(square)
-        gmsh.model.mesh.setRecombine(2, square)
-        gmsh.model.addPhysicalGroup(2, [square], name="floor")
-        gmsh.model.addPhysicalGroup(3, [swept[1][1]], name="column")
-        gmsh.model.mesh.generate(3)
-        gmsh.write(str(tmp_path / "column.msh"))
-    finally:
-        gmsh.finalize()
-    mesh = MeshFile(path=str(tmp_path / "column.msh")).build()
-    check(mesh, "column")
-    assert volumes(mesh).sum() == pytest.approx(2.0)
-    assert area(mesh, "floor") == pytest.approx(1.0)
-    assert np.array_equal(mesh.cell_sets["column"], np.arange(len(mesh.hexahedra)))
-
-
-def test_mesh_file_vtu(tmp_path: Path, capfd):
-    box = Box(size=(1.0, 2.0, 3.0), divisions=(2, 3, 4)).build()
-    mesh = read_back(tmp_path / "box.vtu", as_meshio(box))
-    assert np.array_equal(mesh.points, box.points)
-    assert np.array_equal(mesh.hexahedra, box.hexahedra)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_mesh_file_point_and_cell_sets(tmp_path: Path):
-    box = Box(size=(1.0, 1.0, 1.0), divisions=(2, 1, 1)).build()
-    sets = {"point_sets": {"pins": np.array([0, 4])}, "cell_sets": {"left": [np.array([], int), np.array([0])]}}
-    mesh = read_back(tmp_path / "box.inp", as_meshio(box, **sets))
-    assert mesh.nodes("pins").tolist() == [0, 4]
-    assert mesh.cell_sets["left"].tolist() == [0]
-
-
-@pytest.mark.parametrize(
-    ("lines", "words"),
-    [
-        ("*Part, name=a\n{}*End Part\n*PART, name=b\n{}", r"more than one \*PART"),
-        ("{}*Instance, name=a-1\n*End Instance\n *x\n* instance, name=a-2", r"more than one \*INSTANCE"),
-        ("{}*INSTANCE, name=a-1, part=a\n** moved\n0.1, 0., 0.\n*END INSTANCE\n", r"\*INSTANCE is moved"),
-        ("{}*node\n99, 0., 0., 0.\n", r"more than one \*NODE"),
-    ],
-)
-def test_abaqus_files_that_meshio_misreads_are_refused(tmp_path: Path, lines: str, words: str):
-    """It numbers nodes from the start in each part, and leaves instances where their parts are."""
-    file = tmp_path / "it.inp"
-    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
-    read_back(file, as_meshio(box))
-    part = "".join(file.read_text().partition("*NODE")[1:])
-    file.write_text(f"*Part, name=a\n{part}*End Part\n*Instance, name=a-1, part=a\n\n** *Part\n*End Instance\n")
-    assert np.array_equal(MeshFile(file).build().points, box.points)
-    file.write_text(lines.format(part, part))
-    with pytest.raises(RequestError, match=rf"it\.inp.*{words}.*NO PARTS ASSEMBLIES"):
-        MeshFile(file).build()
-
-
-def test_a_refusal_gives_the_reason_of_meshio(tmp_path: Path):
-    """Files of gmsh were told to become what they were; some readers print their reason and exit, others raise it."""
-    for line, reason in (("9.9 0 8", "Need mesh format in"), ("4.1 0 8\n$EndMeshFormat", "Element section not found")):
-        (tmp_path / "it.msh").write_text(f"$MeshFormat\n{line}\n")
-        with pytest.raises(
-            RequestError, match=rf"\(.*{reason}.*\); save it in gmsh's format 4.1 with Mesh.SaveAll off"
-        ):
-            MeshFile(tmp_path / "it.msh").build()
-
-
-def test_mesh_file_refusals(tmp_path: Path, capfd):
-    import meshio
-
-    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
-    cases = {
-        "tetra10": [("hexahedron", box.hexahedra), ("tetra10", [[0, 1, 2, 4, 3, 5, 6, 7, 0, 1]])],
-        "no volume cells": [("quad", box.surface("xmin")[0])],
-        "nodes beyond its 8 points": [("hexahedron", box.hexahedra + 1)],
-    }
-    for message, cells in cases.items():
-        with pytest.raises(RequestError, match=message):
-            read_back(tmp_path / "case.vtu", meshio.Mesh(box.points, cells))
-    with pytest.raises(RequestError, match="not finite"):
-        read_back(tmp_path / "case.vtu", meshio.Mesh(box.points * math.nan, [("hexahedron", box.hexahedra)]))
-    with pytest.raises(RequestError, match="no such file"):
-        MeshFile(path=tmp_path / "none.vtu").build()
-    for name in ("broken.vtu", "broken.msh", "broken.unknown"):
-        (tmp_path / name).write_text("nonsense")
-        with pytest.raises(RequestError, match="cannot read it"):
-            MeshFile(path=tmp_path / name).build()
-    assert capfd.readouterr() == ("", "")
-
-
 def test_growth():
     q = growth(10.0, 5, 0.7)
     assert sum(0.7 * q**i for i in range(1, 6)) == pytest.approx(10.0)
@@ -480,60 +335,3 @@ def test_compact_drops_unused_nodes():
     assert np.array_equal(mesh.points, box.points)
     assert np.array_equal(mesh.hexahedra, box.hexahedra)
     assert mesh.node_sets["some"].tolist() == [2]
-
-
-def test_gmsh_is_silent_and_works_off_the_main_thread(capfd):
-    meshes = []
-    thread = threading.Thread(target=lambda: meshes.append(rod().build()))
-    thread.start()
-    thread.join()
-    assert len(meshes) == 1
-    assert capfd.readouterr() == ("", "")
-
-
-SIGNALS = """
-import signal, sys, threading
-from warp_mca.geometry import Rod
-def masks():
-    return [line for line in open("/proc/self/status") if line.startswith(("SigIgn", "SigCgt"))]
-signal.signal(signal.SIGTERM, lambda number, frame: print("caught"))
-before = masks()
-task = threading.Thread(target=Rod(radius=0.01, length=0.1).build)
-if sys.argv[1] == "main":
-    task.run()
-else:
-    task.start()
-    task.join()
-assert masks() == before, (before, masks())
-signal.raise_signal(signal.SIGTERM)
-"""
-
-
-@pytest.mark.parametrize("thread", ["main", "other"])
-def test_gmsh_leaves_signals_to_their_handlers(thread: str):
-    """SIGTERM killed the process after its first mesh, though Python still named its handler."""
-    done = subprocess.run([sys.executable, "-c", SIGNALS, thread], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (0, "caught\n"), done.stderr
-
-
-def test_gmsh_session_of_the_caller_is_left_alone():
-    import gmsh
-
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
-        gmsh.model.add("mine")
-        plate().build()
-        assert gmsh.isInitialized()
-        assert gmsh.model.getCurrent() == "mine"
-        assert "warp_mca" not in gmsh.model.list()
-    finally:
-        gmsh.finalize()
-
-
-def test_missing_system_library_is_explained(tmp_path: Path, monkeypatch):
-    (tmp_path / "gmsh.py").write_text("raise OSError('libGLU.so.1: cannot open shared object file')")
-    monkeypatch.delitem(sys.modules, "gmsh", raising=False)
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(RequestError, match=r"libGLU\.so\.1.*apt-get install libglu1-mesa"):
-        rod().build()
-    sys.modules.pop("gmsh", None)

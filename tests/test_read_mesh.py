@@ -1,0 +1,139 @@
+"""Meshes from files of other programs: what is read, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recipes import area
+
+from warp_mca.errors import RequestError
+from warp_mca.geometry import Box, Mesh, MeshFile
+from warp_mca.geometry.quality import check, volumes
+
+
+def read_back(path: Path, mesh, **options) -> Mesh:
+    import meshio
+
+    meshio.write(path, mesh, **options)
+    return MeshFile(path=path).build()
+
+
+def as_meshio(mesh: Mesh, **extra):
+    import meshio
+
+    return meshio.Mesh(mesh.points, [("quad", mesh.surface("xmin")[0]), ("hexahedron", mesh.hexahedra)], **extra)
+
+
+def test_mesh_file_binary_msh_with_physical_groups(tmp_path: Path):
+    box = Box(size=(1.0, 2.0, 3.0), divisions=(2, 3, 4)).build()
+    tags = [np.full(3 * 4, 7), np.where(np.arange(24) < 10, 1, 2)]
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    names = {"wall": np.array([7, 2]), "soft": np.array([1, 3])}
+    written = as_meshio(box, cell_data=data, field_data=names)
+    mesh = read_back(tmp_path / "box.msh", written, file_format="gmsh22", binary=True)
+    assert np.array_equal(mesh.points, box.points)
+    assert np.array_equal(mesh.hexahedra, box.hexahedra)
+    assert np.array_equal(mesh.nodes("wall"), np.sort(box.nodes("xmin")))
+    assert np.array_equal(mesh.cell_sets["soft"], np.arange(10))
+    assert np.array_equal(mesh.cell_sets["physical_2"], np.arange(10, 24))
+
+
+def test_mesh_file_written_by_gmsh_itself(tmp_path: Path):
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.Binary", 1)
+        square = gmsh.model.occ.addRectangle(0.0, 0.0, 0.0, 1.0, 1.0)
+        swept = gmsh.model.occ.extrude([(2, square)], 0.0, 0.0, 2.0, numElements=[3], recombine=True)
+        gmsh.model.occ.synchronize()
+        for _, curve in gmsh.model.getEntities(1):
+            gmsh.model.mesh.setTransfiniteCurve(curve, 3)
+        gmsh.model.mesh.setTransfiniteSurface(square)
+        gmsh.model.mesh.setRecombine(2, square)
+        gmsh.model.addPhysicalGroup(2, [square], name="floor")
+        gmsh.model.addPhysicalGroup(3, [swept[1][1]], name="column")
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(tmp_path / "column.msh"))
+    finally:
+        gmsh.finalize()
+    mesh = MeshFile(path=str(tmp_path / "column.msh")).build()
+    check(mesh, "column")
+    assert volumes(mesh).sum() == pytest.approx(2.0)
+    assert area(mesh, "floor") == pytest.approx(1.0)
+    assert np.array_equal(mesh.cell_sets["column"], np.arange(len(mesh.hexahedra)))
+
+
+def test_mesh_file_vtu(tmp_path: Path, capfd):
+    box = Box(size=(1.0, 2.0, 3.0), divisions=(2, 3, 4)).build()
+    mesh = read_back(tmp_path / "box.vtu", as_meshio(box))
+    assert np.array_equal(mesh.points, box.points)
+    assert np.array_equal(mesh.hexahedra, box.hexahedra)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_mesh_file_point_and_cell_sets(tmp_path: Path):
+    box = Box(size=(1.0, 1.0, 1.0), divisions=(2, 1, 1)).build()
+    sets = {"point_sets": {"pins": np.array([0, 4])}, "cell_sets": {"left": [np.array([], int), np.array([0])]}}
+    mesh = read_back(tmp_path / "box.inp", as_meshio(box, **sets))
+    assert mesh.nodes("pins").tolist() == [0, 4]
+    assert mesh.cell_sets["left"].tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("*Part, name=a\n{}*End Part\n*PART, name=b\n{}", r"more than one \*PART"),
+        ("{}*Instance, name=a-1\n*End Instance\n *x\n* instance, name=a-2", r"more than one \*INSTANCE"),
+        ("{}*INSTANCE, name=a-1, part=a\n** moved\n0.1, 0., 0.\n*END INSTANCE\n", r"\*INSTANCE is moved"),
+        ("{}*node\n99, 0., 0., 0.\n", r"more than one \*NODE"),
+    ],
+)
+def test_abaqus_files_that_meshio_misreads_are_refused(tmp_path: Path, lines: str, words: str):
+    """It numbers nodes from the start in each part, and leaves instances where their parts are."""
+    file = tmp_path / "it.inp"
+    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
+    read_back(file, as_meshio(box))
+    part = "".join(file.read_text().partition("*NODE")[1:])
+    file.write_text(f"*Part, name=a\n{part}*End Part\n*Instance, name=a-1, part=a\n\n** *Part\n*End Instance\n")
+    assert np.array_equal(MeshFile(file).build().points, box.points)
+    file.write_text(lines.format(part, part))
+    with pytest.raises(RequestError, match=rf"it\.inp.*{words}.*NO PARTS ASSEMBLIES"):
+        MeshFile(file).build()
+
+
+def test_a_refusal_gives_the_reason_of_meshio(tmp_path: Path):
+    """Files of gmsh were told to become what they were; some readers print their reason and exit, others raise it."""
+    for line, reason in (("9.9 0 8", "Need mesh format in"), ("4.1 0 8\n$EndMeshFormat", "Element section not found")):
+        (tmp_path / "it.msh").write_text(f"$MeshFormat\n{line}\n")
+        with pytest.raises(
+            RequestError, match=rf"\(.*{reason}.*\); save it in gmsh's format 4.1 with Mesh.SaveAll off"
+        ):
+            MeshFile(tmp_path / "it.msh").build()
+
+
+def test_mesh_file_refusals(tmp_path: Path, capfd):
+    import meshio
+
+    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
+    cases = {
+        "tetra10": [("hexahedron", box.hexahedra), ("tetra10", [[0, 1, 2, 4, 3, 5, 6, 7, 0, 1]])],
+        "no volume cells": [("quad", box.surface("xmin")[0])],
+        "nodes beyond its 8 points": [("hexahedron", box.hexahedra + 1)],
+    }
+    for message, cells in cases.items():
+        with pytest.raises(RequestError, match=message):
+            read_back(tmp_path / "case.vtu", meshio.Mesh(box.points, cells))
+    with pytest.raises(RequestError, match="not finite"):
+        read_back(tmp_path / "case.vtu", meshio.Mesh(box.points * math.nan, [("hexahedron", box.hexahedra)]))
+    with pytest.raises(RequestError, match="no such file"):
+        MeshFile(path=tmp_path / "none.vtu").build()
+    for name in ("broken.vtu", "broken.msh", "broken.unknown"):
+        (tmp_path / name).write_text("nonsense")
+        with pytest.raises(RequestError, match="cannot read it"):
+            MeshFile(path=tmp_path / name).build()
+    assert capfd.readouterr() == ("", "")
