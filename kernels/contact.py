@@ -18,12 +18,10 @@ wp.set_module_options({"enable_backward": False})
 BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
 LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
-# A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
-_EDGE_REACH = 1.02
-# Where such neighbours rise, the node is deeper in the next face at once, by less than that reach; share of an edge.
-_FOLD = 0.01
+_FOLD = 0.01  # of an edge: how much deeper a node may be at once in a neighbour that rises, past the edge between
 _SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
 _FAR = 1e30  # further than anything [m]
+_TURN = -0.5  # least cosine between the normals of a face that presses a node and of the next that does
 
 # Depth before the first step: bodies may overlap from the start.
 ANY_DEPTH = _FAR
@@ -38,7 +36,7 @@ class Spring:
     far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
     force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
     penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
-    in front of all faces, ANY_DEPTH before the first step [m]; planes leave it alone.
+    in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -126,14 +124,10 @@ def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.
         moved: along the face's normal in this step, as the face sees it [m].
         edge: length of the face's edges [m].
     """
-    before = held
     slack = wp.float64(_SLACK) * edge
-    if depth < front:
-        if held > wp.float64(0.0):  # inside already, and maybe past a fold since
-            slack = held + wp.float64(_FOLD) * edge
-    elif held == wp.float64(ANY_DEPTH):
-        before = wp.float64(0.0)
-    return depth <= before + wp.float64(2.0) * wp.abs(moved) + slack
+    if depth < front and held > wp.float64(0.0):  # inside already, and maybe past a fold since
+        slack = held + wp.float64(_FOLD) * edge
+    return depth <= held + wp.float64(2.0) * wp.abs(moved) + slack
 
 
 @cache
@@ -142,6 +136,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
 
     Slaves are those from `first` on. With `each`, scenes of a batch have values of their own, and slaves know their
     scene. Of the faces that have a node behind them the shallowest counts, if it is `reachable`; no deeper one is then.
+    Nor does one that would press the node back where the last one did not let it go: the other side of a thin body.
     """
     press = spring_function(friction)
     open_contact = open_function(friction)
@@ -178,8 +173,11 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         best_area = wp.float64(0.0)
         best_normal = wp.vec3d()
         best_at = wp.vec2d()
-        best_triangle = bool(False)
         front = wp.float64(_FAR)
+        pressed = spring.force[s]
+        if wp.static(friction):
+            pressed -= spring.tangential[s]
+        along = wp.vec3f(wp.normalize(pressed))
         x = X[i] + u[i]
         for c in range(count[s]):
             i0 = face[f, 0]
@@ -191,26 +189,26 @@ def surface_kernel(friction: bool, each: bool) -> Any:
             p1 = X[i1] + u[i1] - x
             p2 = X[i2] + u[i2] - x
             p3 = X[i3] + u[i3] - x
-            inside, at, away, area_normal = project(p0, p1, p2, p3, i2 == i3, wp.float64(_EDGE_REACH))
+            inside, at, away, area_normal = project(p0, p1, p2, p3, i2 == i3)
             if inside:
                 area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
                 normal = (wp.float64(1.0) / area) * area_normal
                 gap = wp.dot(away, normal)
-                if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area:
+                turn = wp.dot(wp.vec3f(normal), along)
+                if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and turn > wp.static(_TURN):
                     # the shallowest face wins; the lower number at a tie, whatever the order of the search
                     if best < 0 or gap > best_gap or (gap == best_gap and f < best):
                         best = f
                         best_gap = gap
                         best_normal = normal
                         best_at = at
-                        best_triangle = i2 == i3
                         best_area = area
                 elif gap >= wp.float64(0.0):
                     front = wp.min(front, gap)
             f = candidate[s, wp.min(c + 1, candidate.shape[1] - 1)]
         held = spring.held[s]
         if best >= 0:
-            weight = weights_at(best_at, best_triangle)
+            weight = weights_at(best_at, face[best, 2] == face[best, 3])
             du = dt * (v[i] - master_velocity(v, face, best, weight))
             edge = wp.float64(2.0) * wp.sqrt(best_area)
             touches = reachable(-best_gap, held, front, wp.dot(du, best_normal), edge)

@@ -4,6 +4,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+# A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
+EDGE_REACH = 1.02
+
 
 @wp.func
 def shape(xi: wp.float64, eta: wp.float64) -> wp.vec4d:
@@ -91,13 +94,14 @@ def closest_point(r0: wp.vec3d, e: wp.vec3d, f: wp.vec3d, t: wp.vec3d) -> wp.vec
 
 
 @wp.func
-def project(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, triangle: bool, reach: wp.float64):
+def project(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, triangle: bool):
     """The nearest point of a face to the origin of its corners' coordinates.
 
-    Returns whether it lies within `reach` of the face's half size, its coordinates as `weights_at` takes them, the
+    Returns whether it lies within EDGE_REACH of the face's half size, its coordinates as `weights_at` takes them, the
     vector from it to the origin, and a quarter of the face's area vector. A triangle has its last corner twice;
     coordinates that run along its edges then have no inverse there.
     """
+    reach = wp.float64(EDGE_REACH)
     if triangle:
         ab = b - a
         ac = c - a

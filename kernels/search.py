@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.projection import project
 
 wp.set_module_options({"enable_backward": False})
 
@@ -105,9 +106,66 @@ def candidates_kernel(each: bool) -> Any:
     return find_candidates
 
 
+@cache
+def clear_kernel(each: bool) -> Any:
+    """Kernel: slave nodes whose nearest face has them in front of it hold no depth at the start.
+
+    The lists do not tell: of a body that is thinner than its faces are long they may hold the far side alone. Faces
+    are looked for as far away as their boxes are deep.
+    """
+    of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
+
+    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    def find_clear(
+        bvh: wp.uint64,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        slave: wp.array(dtype=wp.int32),
+        face: wp.array2d(dtype=wp.int32),
+        scene: Index,
+        origin: Vector,
+        longest: Real,
+        held_out: wp.array(dtype=wp.float64),
+    ):
+        s = wp.tid()
+        i = slave[s]
+        k = of(scene, s)
+        x = X[i] + u[i]
+        point = x - of(origin, k)
+        reach = of(longest, k)
+        lower = wp.vec3f(wp.float32(point[0] - reach), wp.float32(point[1] - reach), wp.float32(point[2] - reach))
+        upper = wp.vec3f(wp.float32(point[0] + reach), wp.float32(point[1] + reach), wp.float32(point[2] + reach))
+        root = int(-1)  # of all faces
+        if wp.static(each):
+            root = wp.bvh_get_group_root(bvh, k)
+        query = wp.bvh_query_aabb(bvh, lower, upper, root)
+        f = int(0)
+        nearest = wp.float64(wp.inf)
+        clear = bool(False)
+        while wp.bvh_query_next(query, f):
+            i0 = face[f, 0]
+            i1 = face[f, 1]
+            i2 = face[f, 2]
+            i3 = face[f, 3]
+            p0 = X[i0] + u[i0] - x
+            p1 = X[i1] + u[i1] - x
+            p2 = X[i2] + u[i2] - x
+            p3 = X[i3] + u[i3] - x
+            inside, _, away, area_normal = project(p0, p1, p2, p3, i2 == i3)
+            gap = wp.dot(away, wp.normalize(area_normal))
+            if inside and (wp.abs(gap) < nearest or (wp.abs(gap) == nearest and gap >= wp.float64(0.0))):
+                nearest = wp.abs(gap)
+                clear = gap >= wp.float64(0.0)
+        if clear:
+            held_out[s] = wp.float64(0.0)
+
+    return find_clear
+
+
 # Those of a lone scene belong to this module, so they are made before it is loaded; a batch has its own modules.
 bounds_kernel(False)
 candidates_kernel(False)
+clear_kernel(False)
 
 
 @wp.kernel(enable_backward=False)

@@ -112,3 +112,64 @@ def test_each_contact_of_each_scene_of_a_batch_counts_by_itself(momentum):
         a, b, c = (momentum(NODES * (3 * k + i), NODES * (3 * k + i + 1))[k] for i in range(3))
         before = 2.0 / 3.0 * (a + b + c)  # of the ball behind
         assert impulse(result) == pytest.approx(b + before - c, rel=5e-3)
+
+
+def block_and_plate(thickness: float, *, gap: float, speed: float, closed: bool = True, **contact) -> mca.Scene:
+    """A soft block above a stiff plate whose foot is held, of 5 mm cells."""
+    soft, stiff = mca.Elastic(E=1e7, nu=0.3, rho=1000.0), mca.Elastic(E=10e9, nu=0.3, rho=7850.0)
+    block = mca.Box(size=(0.02, 0.02, 0.02), divisions=(4, 4, 4), origin=(-0.01, 0.0, -0.01))
+    plate = mca.Box(size=(0.04, thickness, 0.04), divisions=(8, 1, 8), origin=(-0.02, -thickness, -0.02))
+    bodies = (
+        mca.Body(name="block", geometry=block, material=soft, position=(1e-3, gap, 1.2e-3), velocity=(0, -speed, 0)),
+        mca.Body(name="plate", geometry=plate, material=stiff),
+    )
+    slave, master = ("boundary", "boundary") if closed else ("ymin", "ymax")
+    meet = mca.Contact(
+        slave=mca.Surface(body="block", nodes=slave), master=mca.Surface(body="plate", nodes=master), **contact
+    )
+    held = mca.Fixed(body="plate", nodes="ymin")
+    impact = mca.ImpactPhase(duration=5e-4, output_interval=1e-6)
+    return mca.Scene(name="thin", bodies=bodies, contacts=(meet,), fixed=(held,), impact=impact)
+
+
+@pytest.mark.parametrize("contact", [{}, {"mu": 0.3}, {"two_way": True}], ids=str)
+@pytest.mark.parametrize("thickness", [1e-3, 2e-3])
+def test_nodes_deeper_than_half_a_thin_plate_are_pushed_back_the_way_they_came(thickness: float, contact: dict):
+    """The far side, then the nearer, let them through."""
+    closed, open_one = (
+        mca.run(block_and_plate(thickness, gap=1e-5, speed=20.0, closed=closed, **contact)) for closed in (True, False)
+    )
+    assert closed.summary["max_penetration"] > 0.6e-3
+    assert closed.F_n == pytest.approx(open_one.F_n, abs=0.03 * open_one.F_n.max())
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 2e-3, 5e-3])
+@pytest.mark.parametrize("gap", [0.0, 0.3e-3, 1e-3, 2e-3])
+def test_nothing_happens_in_front_of_a_thin_plate(thickness: float, gap: float):
+    """At first, nodes of which a search found the far side alone were pulled through."""
+    scene = block_and_plate(thickness, gap=gap, speed=0.0)
+    result = mca.run(replace(scene, impact=mca.ImpactPhase(duration=1e-5)))
+    assert (result.F_n == 0.0).all()
+    assert result.summary["max_penetration"] == 0.0
+    batch = mca.run_batch([replace(scene, impact=mca.ImpactPhase(duration=1e-5))] * 2)
+    assert all((one.F_n == 0.0).all() for one in batch)
+
+
+def test_bodies_that_overlap_at_the_start_are_pushed_apart():
+    scene = block_and_plate(5e-3, gap=-1e-4, speed=0.0)
+    result = mca.run(replace(scene, impact=mca.ImpactPhase(duration=2e-5, energy_tolerance=10.0)))
+    assert result.F_n[1] > 10.0
+    assert result.summary["max_penetration"] == pytest.approx(1e-4)
+
+
+@pytest.mark.parametrize("cause", ["driven", "falling"])
+def test_bodies_that_start_from_rest_are_searched_as_often_as_they_become_fast(cause: str):
+    """At the speed that tables and gravity give them, they outran the search between two outputs."""
+    at_rest = block_and_plate(5e-3, gap=1e-3, speed=0.0)
+    driven = mca.Prescribed(body="block", nodes="ymax", axis="y", times=(0.0, 1e-4), velocities=(0.0, -12.0))
+    scene = (
+        replace(at_rest, prescribed=(driven,), impact=mca.ImpactPhase(duration=4e-4, output_interval=1e-4))
+        if cause == "driven"
+        else replace(at_rest, gravity=(0.0, -1e4, 0.0), impact=mca.ImpactPhase(duration=8e-4, output_interval=2e-4))
+    )
+    assert mca.run(scene).F_n.max() > 100.0

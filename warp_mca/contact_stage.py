@@ -65,7 +65,7 @@ class ContactStage:
         self.kernel = contact.surface_kernel(friction, self.each)
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
-        self.find = search.candidates_kernel(self.each)
+        self.find, self.clear = search.candidates_kernel(self.each), search.clear_kernel(self.each)
         self._make_faces(model)
 
     def _join(self, name: str) -> NDArray:
@@ -97,6 +97,7 @@ class ContactStage:
         rows = [item.face_offset[:-1] + start for item, start in zip(self.items, around, strict=False)]
         numbers = [item.face_of_node + start for item, start in zip(self.items, faces, strict=False)]
         self.margin = _numbers([item.margin for item in self.items])
+        self.longest = _numbers([item.longest for item in self.items])
         self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
         self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
         self.face = wp.array(self._join("face"), dtype=wp.int32)
@@ -128,7 +129,7 @@ class ContactStage:
 
     def search_kernels(self) -> list[Any]:
         """Those of a search."""
-        return [] if self.on_plane else [self.bounds, self.find]
+        return [] if self.on_plane else [self.bounds, self.find, self.clear]
 
     def search(self, X: wp.array, u: wp.array, flag: wp.array) -> None:
         """Broad phase: list what each slave may touch until the next search."""
@@ -136,14 +137,17 @@ class ContactStage:
             return
         inputs = [X, u, self.face, self.face_scene, self.origin, self.margin]
         wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper, self.face_count])
+        slaves = [X, u, self.slave]
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
+            inputs = [self.bvh.id, *slaves, self.face, self.slave_scene, self.origin, self.longest]
+            wp.launch(self.clear, len(self.slave), inputs=inputs, outputs=[self.spring.held])
         else:
             self.bvh.refit()
         wp.launch(
             self.find,
             len(self.slave),
-            inputs=[self.bvh.id, X, u, self.slave, self.slave_scene, self.origin],
+            inputs=[self.bvh.id, *slaves, self.slave_scene, self.origin],
             outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
         )
         wp.launch(search.sort_lists, len(self.face), inputs=[self.face_count], outputs=[self.face_slave])

@@ -183,6 +183,8 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         )
     with np.errstate(over="ignore"):
         speed = float(np.linalg.norm(model.V, axis=1).max())
+    driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
+    fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
     spacing = float(np.spacing(np.abs(model.X).max()))
     if 0.0 < speed * stable < 4.0 * spacing:
         raise bad_value(
@@ -192,10 +194,10 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
             f"{speed * stable:.2g} m is lost; move the scene closer to the origin",
         )
     margins = [item.margin for item in model.passes if item.plane is None]
-    searches = SPEED_RESERVE * speed * interval / (0.5 * min(margins)) if margins else 1.0
+    searches = SPEED_RESERVE * fastest * interval / (0.5 * min(margins)) if margins else 1.0
     if not searches * intervals <= MOST_STEPS:
         remedy = f"so fast, a run would search for contact more than {MOST_STEPS:.0e} times; check the unit [m/s]"
-        raise bad_value("speed of the bodies", float(np.abs(model.V).max()), remedy)
+        raise bad_value("speed of the bodies", max(float(np.abs(model.V).max()), driven), remedy)
     return stable, max(1, math.ceil(searches))
 
 

@@ -56,6 +56,7 @@ class ContactPass:
         master: their nodes, shape (master_count,), int32.
         face_offset, face_of_node: faces around each master node, compressed rows, int32.
         margin: that the search looks ahead [m].
+        longest: edge of the largest face [m].
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
     """
@@ -71,6 +72,7 @@ class ContactPass:
     face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
     face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32))
     margin: float = 0.0
+    longest: float = 0.0
     room: int = LIST_LENGTH
     deepest: float = 0.0
 
@@ -137,6 +139,7 @@ def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sig
         face_offset=np.searchsorted(corner[order], np.append(masters, masters[-1] + 1)).astype(np.int32),
         face_of_node=(order // 4).astype(np.int32),
         margin=margin,
+        longest=float(np.sqrt(master.area.max())),
         room=_room(slave, master, margin),
     )
 
