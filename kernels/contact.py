@@ -177,7 +177,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         pressed = spring.force[s]
         if wp.static(friction):
             pressed -= spring.tangential[s]
-        along = wp.vec3f(wp.normalize(pressed))
+        along = wp.vec3f(pressed)  # of any length
         x = X[i] + u[i]
         for c in range(count[s]):
             i0 = face[f, 0]
@@ -195,7 +195,8 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                 normal = (wp.float64(1.0) / area) * area_normal
                 gap = wp.dot(away, normal)
                 turn = wp.dot(wp.vec3f(normal), along)
-                if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and turn > wp.static(_TURN):
+                kept = turn >= 0.0 or turn * turn < wp.static(_TURN**2) * wp.dot(along, along)
+                if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
                     # the shallowest face wins; the lower number at a tie, whatever the order of the search
                     if best < 0 or gap > best_gap or (gap == best_gap and f < best):
                         best = f
