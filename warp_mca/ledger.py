@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 # Columns of a record, then eight for each contact pass (`kernels.contact.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
 PASS_COLUMNS = 8
+OVERLAP = 0.01  # share of the energy at the start, in contact springs, that is worth a word when a guard stops the run
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
@@ -45,6 +46,7 @@ class Ledger:
         self.columns: list[Array] = []
         self.velocities: list[Array] = []
         self.count = 0
+        self._hint = ""  # at what else may be wrong
         self.energy_error = 0.0
         self.max_strain = 0.0
         self.initial_energy: float | None = None
@@ -63,10 +65,13 @@ class Ledger:
         Raises:
             GuardError: a record breaks a guard.
         """
+        sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
+        if self.count == 0 and written:
+            self._hint = self._overlap(sums[0])
         for raised, message in zip(records["flag"], _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
-                raise GuardError(f"stopped before t = {(self.count + written) * self.interval:.4g} s: {message}")
-        sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
+                end = (self.count + written) * self.interval
+                raise GuardError(f"stopped before t = {end:.4g} s: {message}{self._hint}")
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
         share = self._balance(sums[:good])
@@ -82,12 +87,20 @@ class Ledger:
             raise GuardError(
                 f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
                 f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
-                "tolerance if that much is acceptable"
+                f"tolerance if that much is acceptable{self._hint}"
             )
         if good < written and not np.isfinite(sums[good]).all():
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
         if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
+
+    def _overlap(self, first: Array) -> str:
+        """What to say where the first record has contact springs that are pressed; nothing where it has none."""
+        energy = self._energies(first)
+        pressed, total = energy["contact"], sum(energy.values()) - energy["external_work"]
+        if not pressed > OVERLAP * total:
+            return ""
+        return f"; bodies overlap at the start, where contact springs hold {pressed:.3g} J: move them apart"
 
     def _sums(self, partial: Array) -> Array:
         """Columns of each record from its partial sums, shape (row_count, column_count)."""

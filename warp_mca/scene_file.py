@@ -85,9 +85,9 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
     """
     target = check_path(path)
     arrays: list[NDArray] = []
-    known = _vocabulary()
+    known = set(_vocabulary().values())
     bodies = tuple(
-        body if type(body.geometry).__name__ in known else dataclasses.replace(body, geometry=meshes[body.name])
+        body if type(body.geometry) in known else dataclasses.replace(body, geometry=meshes[body.name])
         for body in scene.bodies
     )
     content = {
@@ -167,6 +167,8 @@ def _vocabulary() -> dict[str, type]:
 def _encoded(value: object, arrays: list[NDArray]) -> object:
     """`value` as JSON; arrays are put into `arrays`, the same one once, and referred to by their place there."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        if type(value) not in _vocabulary().values():
+            raise bad_value("scene", type(value).__name__, "a model file holds warp_mca's own classes; use these")
         members = {f.name: _encoded(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
         return {"$type": type(value).__name__, **members}
     if isinstance(value, np.ndarray):

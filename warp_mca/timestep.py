@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.elements import Element
 from warp_mca.elements.hexahedron import CHUNK, chunks
-from warp_mca.errors import bad_value
+from warp_mca.errors import RequestError, bad_value
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -64,7 +64,11 @@ def stable_step(
     """
 
     def exact(part: NDArray[np.intp]) -> Array:
-        return formulation.largest_eigenvalues(X[conn[part]], K[part], G[part], mass[part]) + contact[part]
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is refused
+                return formulation.largest_eigenvalues(X[conn[part]], K[part], G[part], mass[part]) + contact[part]
+        except np.linalg.LinAlgError as error:
+            raise _out_of_range(int(index[part[0]]), float(bound.max())) from error
 
     def bounds(part: NDArray[np.intp] | slice, coarse: bool) -> Array:
         return formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse) + contact[part]
@@ -73,9 +77,7 @@ def stable_step(
     for part in chunks(len(conn), CHUNK):
         bound[part] = bounds(part, True)
     if not np.isfinite(bound).all():
-        element = int(index[np.argmin(np.isfinite(bound))])
-        remedy = "moduli and penalty over density exceed the range of numbers there; check their units"
-        raise bad_value(f"largest eigenvalue of element {element} [1/s^2]", float(bound.max()), remedy)
+        raise _out_of_range(int(index[np.argmin(np.isfinite(bound))]), float(bound.max()))
     usual = float(np.median(bound))
     first = _greatest(bound, BATCH)
     value = exact(first)
@@ -112,6 +114,11 @@ def stable_step(
         contact_share=1.0 - own / worst,
         shortened=math.sqrt(own / usual),
     )
+
+
+def _out_of_range(element: int, bound: float) -> RequestError:
+    remedy = "moduli and penalty over density exceed the range of numbers there; check their units"
+    return bad_value(f"largest eigenvalue of element {element} [1/s^2]", bound, remedy)
 
 
 def _switching(contact: Array, share: Array | float) -> Array:

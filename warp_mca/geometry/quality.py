@@ -69,6 +69,14 @@ def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
     return length[length > 0.0]
 
 
+def doubled_nodes(mesh: Mesh) -> int:
+    """Number of nodes of the boundary that lie within a millionth of the shortest edge of one before them."""
+    places = mesh.points[np.unique(mesh.boundary[0])]
+    grid = np.rint((places - places.min(axis=0)) / (1e-6 * edge_lengths(mesh).min())).astype(np.int64)
+    grid = grid[np.lexsort(grid.T)]
+    return int((grid[1:] == grid[:-1]).all(axis=1).sum())
+
+
 def check(mesh: Mesh, name: str) -> None:
     """Refuses a mesh that is not whole, or that has an inverted cell.
 
