@@ -21,7 +21,7 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 _FOLD = 0.01  # of an edge: how much deeper a node may be at once in a neighbour that rises, past the edge between
 _SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
 _FAR = 1e30  # further than anything [m]
-_TURN = -0.5  # least cosine between the normals of a face that presses a node and of the next that does
+_TURN = -0.9  # least cosine between the normals of a face that presses a node and of the next that does
 
 # Depth before the first step: bodies may overlap from the start.
 ANY_DEPTH = _FAR

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry import Box, Plate, Rod, Sphere
@@ -166,12 +167,15 @@ class Account:
         return found
 
     def _coarser(self, contact: Contact) -> float:
-        """Width of the slave's smallest face over that of the master's [-]; 0 where nodes of both are kept out."""
+        """Width of the slave's faces over that of the master's [-]; 0 where nodes of both are kept out.
+
+        The lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
+        """
         if contact.two_way or isinstance(contact.master, RigidPlane):
             return 0.0
         sides = ((self.ready.meshes[side.body], side.nodes) for side in (contact.slave, contact.master))
-        slave, master = (face_geometry(mesh.points, mesh.surface(nodes)[0])[0].min() for mesh, nodes in sides)
-        return math.sqrt(slave / master)
+        slave, master = (face_geometry(mesh.points, mesh.surface(nodes)[0])[0] for mesh, nodes in sides)
+        return math.sqrt(min(slave.min() / master.min(), np.median(slave) / np.median(master)))
 
     def _warnings(self) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
