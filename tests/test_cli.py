@@ -243,7 +243,7 @@ def finished(**figures: object) -> mca.Result:
     ("error", "status", "words"),
     [
         (mca.GuardError("the energy balance\nis off by 3 %"), 1, "balance is off by 3 %"),
-        (KeyboardInterrupt(), 130, "interrupted before it was done; recordings hold the frames until then"),
+        (KeyboardInterrupt(), 130, "interrupted before it was done"),
     ],
 )
 def test_exit_status_of_a_run_that_stops(

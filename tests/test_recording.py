@@ -185,7 +185,7 @@ def test_a_recorder_that_fails_is_a_warning_and_the_run_goes_on(plain: mca.Resul
     assert failing.ended is False
     assert len(memory.frames) == 5
     assert memory.ended is True
-    assert "failing: recording stopped at frame 3: no space left" in result.warnings
+    assert "failing: recording stopped after 2 frames: no space left" in result.warnings
 
 
 def test_a_recorder_that_cannot_start_stops_the_run_before_it_begins(tmp_path):
@@ -277,11 +277,37 @@ def test_a_snapshot_after_the_end_is_refused(tmp_path):
     for name in names:
         (tmp_path / name).write_text("older")
     files = RerunStream(tmp_path / "a.rrd"), UsdFile(tmp_path / "a.usdc")
-    with pytest.raises(RequestError, match=r"snapshot = 0\.0001: the run ends at 4e-05 s"):
+    with pytest.raises(RequestError, match=r"^time of .*a\.png = 0\.0001: the run ends at 4e-05 s"):
         mca.run(bar(), recorders=[*files, SnapshotFile(tmp_path / "a.png", time=1e-4)])
     assert [(tmp_path / name).read_text() for name in names] == ["older"] * 2
     mca.run(bar(), recorders=[SnapshotFile(tmp_path / "a.png", time=4e-5)])
     assert (tmp_path / "a.png").is_file()
+
+
+@pytest.mark.parametrize("kind", [UsdFile, RerunStream, VtkHdfFile, None])
+def test_a_cadence_beyond_the_end_is_refused(tmp_path, kind):
+    """The last state was taken instead, and nobody was told."""
+    suffix = {UsdFile: "usdc", RerunStream: "rrd", VtkHdfFile: "vtkhdf"}
+    cadence = Cadence(times=(1e-5, 1.0))
+    recorder = kind(tmp_path / "new" / f"a.{suffix[kind]}", cadence=cadence) if kind else Memory(cadence=cadence)
+    with pytest.raises(RequestError, match=r"^time of .* = 1\.0: the run ends at 4e-05 s; give times until then$"):
+        mca.run(bar(), recorders=[recorder], out=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_breaks_a_guard_leaves_all_frames_until_then(tmp_path):
+    """The USD file lacked those since it was saved last."""
+    import h5py
+    from pxr import Usd
+
+    usd, vtkhdf, cadence = tmp_path / "a.usda", tmp_path / "a.vtkhdf", Cadence(seconds=1e-6)
+    impact = mca.ImpactPhase(duration=1e-3, output_interval=1e-6, energy_tolerance=1e-4)
+    with pytest.raises(GuardError):
+        mca.run(bar(impact=impact), recorders=[UsdFile(usd, cadence=cadence), VtkHdfFile(vtkhdf, cadence=cadence)])
+    with h5py.File(vtkhdf) as file:
+        count = int(file["VTKHDF/Steps"].attrs["NSteps"])
+    assert count % 5
+    assert Usd.Stage.Open(str(usd)).GetEndTimeCode() == count - 1.0
 
 
 def test_a_run_that_breaks_a_guard_closes_its_recorders():
@@ -314,11 +340,31 @@ def test_frames_fall_on_the_ends_of_output_intervals(cadence: Cadence, expected:
 
 
 @pytest.mark.parametrize(
-    "given", [{}, {"frames": 3, "seconds": 1.0}, {"frames": 1}, {"seconds": 0.0}, {"times": (-1.0,)}]
+    ("given", "words"),
+    [
+        ({}, r"Cadence = \(None, None, None\)"),
+        ({"frames": 3, "seconds": 1.0}, r"Cadence = \(3, 1.0, None\)"),
+        ({"frames": 1}, "frames = 1"),
+        ({"frames": 2.5}, "frames = 2.5"),
+        ({"frames": "3"}, "frames = '3'"),
+        ({"frames": True}, "frames = True"),
+        ({"seconds": 0.0}, "seconds = 0.0"),
+        ({"seconds": "1"}, "seconds = '1'"),
+        ({"seconds": np.ones(2)}, "seconds = 'ndarray'"),
+        ({"times": (-1.0,)}, r"times = \(-1.0,\)"),
+        ({"times": ()}, r"times = \(\)"),
+        ({"times": ("a",)}, r"times = \('a',\)"),
+        ({"times": 5}, "times = 5"),
+        ({"times": np.ones((2, 2))}, "times = 'ndarray'"),
+    ],
 )
-def test_bad_cadences_are_refused(given: dict):
-    with pytest.raises(RequestError):
+def test_bad_cadences_are_refused_in_one_sentence(given: dict, words: str):
+    with pytest.raises(RequestError, match=f"^{words}: give [^\n]*$"):
         Cadence(**given)
+
+
+def test_times_may_be_an_array():
+    assert Cadence(times=np.array([1e-6, 3e-6])) == Cadence(times=(1e-6, 3e-6))  # type: ignore[arg-type]
 
 
 def solver_with_output(material, precision: str = "float64") -> tuple[Solver, Output]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from warp_mca import results
 from warp_mca.errors import RequestError
 from warp_mca.history import (
     contact_intervals,
@@ -171,6 +174,41 @@ def test_results_are_not_overwritten_unless_forced(tmp_path: Path):
     assert load(tmp_path).summary["mu"] == 1
     save(Result({"mu": 2}, history()), tmp_path, force=True)
     assert load(tmp_path).summary["mu"] == 2
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_of_two_runs_that_save_at_once_the_first_keeps_its_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exists: bool
+):
+    """Both found the folder free, and the second wrote over the first."""
+    folder, write = tmp_path / "out", results._write_history
+
+    def write_after_the_other(*args: object) -> None:
+        monkeypatch.setattr(results, "_write_history", write)
+        save(Result({"mu": 1}, history()), folder)
+        write(*args)
+
+    if exists:
+        folder.mkdir()
+        (folder / "a.usdc").write_text("recorded")
+    monkeypatch.setattr(results, "_write_history", write_after_the_other)
+    with pytest.raises(RequestError, match=r"^out = .*: it holds results already, and these are not saved"):
+        save(Result({"mu": 2}, history()), folder)
+    assert load(folder).summary["mu"] == 1
+    assert sorted(file.name for file in folder.iterdir()) == sorted([*FILES, *["a.usdc"] * exists])
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_what_a_killed_save_left_goes_with_a_later_one(tmp_path: Path):
+    old, new = tmp_path / ".warp_mca-old", tmp_path / ".warp_mca-new"
+    for folder in (old, new):
+        folder.mkdir()
+        (folder / "history.csv").write_text("")
+    then = time.time() - 2 * results.LONGEST_SAVE
+    os.utime(old, (then, then))
+    save(Result({}, history()), tmp_path, force=True)
+    assert not old.exists()
+    assert new.exists()
 
 
 def test_failure_while_saving_leaves_nothing(tmp_path: Path):

@@ -225,6 +225,44 @@ def test_a_killed_run_leaves_every_saved_frame(bars: FlyingBars, tmp_path: Path)
     assert mesh(stage, "lower").GetPointsAttr().GetTimeSamples() == list(range(10))
 
 
+@pytest.mark.parametrize("ok", [True, False])
+def test_a_recording_that_ends_early_holds_all_frames(bars: FlyingBars, tmp_path: Path, ok: bool):
+    recorder = UsdFile(tmp_path / "a.usdc")
+    recorder.start(bars.info)
+    for index in range(8):
+        recorder.frame(bars.frame(index))
+    recorder.finish(ok)
+    stage = opened(tmp_path / "a.usdc")
+    assert stage.GetEndTimeCode() == 7.0
+    assert len(stage.GetRootLayer().customLayerData["warp_mca"]["times_s"]) == 8
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_frame_that_is_interrupted_is_whole(
+    bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+):
+    def interrupted(*values: object) -> np.ndarray:
+        os.kill(os.getpid(), number)
+        return levels(*values)
+
+    recorder, levels = UsdFile(tmp_path / "a.usdc"), usd_file.levels
+    recorder.start(bars.info)
+    recorder.frame(bars.frame(0))
+    monkeypatch.setattr(usd_file, "levels", interrupted)
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            recorder.frame(bars.frame(1))
+    finally:
+        signal.signal(number, before)
+    recorder.finish(False)
+    stage = opened(tmp_path / "a.usdc")
+    assert stage.GetEndTimeCode() == 1.0
+    for name in ("upper_bar", "lower"):
+        assert mesh(stage, name).GetPointsAttr().GetTimeSamples() == [0.0, 1.0]
+    assert len(np.array(mesh(stage, "contact").GetPrim().GetAttribute("points").Get(1))) == 1
+
+
 def test_a_second_run_replaces_the_file_of_the_first(bars: FlyingBars, tmp_path: Path):
     from pxr import Usd
 

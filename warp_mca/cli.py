@@ -14,8 +14,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -115,7 +115,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail("the model does not fit into this machine's memory: take fewer elements", 2)
     except KeyboardInterrupt as stop:
         what, number = ("terminated", stop.args[0]) if isinstance(stop, _Terminated) else ("interrupted", signal.SIGINT)
-        print(f"warp-mca: {what} before it was done; recordings hold the frames until then", file=sys.stderr)
+        print("; ".join([f"warp-mca: {what} before it was done", *getattr(stop, "__notes__", ())]), file=sys.stderr)
         return 128 + number
     finally:
         gc.set_threshold(*collect)
@@ -312,7 +312,7 @@ def _run(args: argparse.Namespace) -> None:
     _start_warp(
         *(["scipy.integrate"] if request.scene.rigid else []), "scipy.signal", "matplotlib.backends.backend_agg"
     )
-    with progress_bar() as progress:
+    with _noting_recordings(args), progress_bar() as progress:
         result = mca.run(
             request.scene,
             device=args.device,
@@ -334,6 +334,17 @@ def _run(args: argparse.Namespace) -> None:
             print(f"check: {message}")
     if result.failed:
         raise McaError(f"{', '.join(result.failed)}: not written whole, as the warnings say; all else is")
+
+
+@contextmanager
+def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
+    """Note on what stops a run that its recordings, if there are some, are worth a look."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        if any((args.rrd, args.usd, args.vtkhdf)):
+            stop.add_note("recordings hold the frames until then")
+        raise
 
 
 def _sweep(args: argparse.Namespace) -> None:

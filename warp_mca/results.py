@@ -9,6 +9,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import chain
 from pathlib import Path
@@ -39,6 +40,8 @@ HISTORY_COLUMNS = (
 )
 FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
+STAGING = ".warp_mca-"  # begins the names of folders that results are written in at first
+LONGEST_SAVE = 3600.0  # far more than any takes [s]
 
 
 @dataclass(frozen=True)
@@ -173,9 +176,13 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
     """
     path = folder_path("out", directory)
     check_folder("out", path)
-    if not force and any((path / name).exists() for name in FILES + PATH_FILES):
+    if not force and _holds_results(path):
         raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
     return path
+
+
+def _holds_results(path: Path) -> bool:
+    return any((path / name).exists() for name in FILES + PATH_FILES)
 
 
 def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
@@ -190,18 +197,20 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         The result with its `path` set, and with the time that writing took in wall.output.
 
     Raises:
-        RequestError: as in `check_output`.
+        RequestError: as in `check_output`; also where another run saves to the folder at the same time and is first.
         McaError: the disk is full or fails.
     """
     from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
     from warp_mca.report.paths import save_path_figures
 
-    path = check_output(directory, force=force)
+    path = check_output(directory, force=True)
+    if not force and _holds_results(path):  # of a run beside this one, whose own check found none
+        raise _not_saved(path)
     # Written beside the folder first: a run that fails half-way leaves nothing behind.
     staging = None
     try:
-        staging = Path(tempfile.mkdtemp(prefix=".warp_mca-", dir=nearest(path)))
+        staging = Path(tempfile.mkdtemp(prefix=STAGING, dir=nearest(path)))
         begun = time.perf_counter()
         _write_history(staging / "history.csv", result.history)
         save_forces(staging / "forces.png", result)
@@ -213,17 +222,45 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         summary = {**result.summary, "warnings": list(result.warnings)}
         (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
         path.mkdir(parents=True, exist_ok=True)
+        if not force:
+            _claim(path)
         for name in FILES + PATH_FILES:
             if (staging / name).exists():
                 (staging / name).replace(path / name)
             else:  # left by a run of another scene
                 (path / name).unlink(missing_ok=True)
+        _clear(path)
     except OSError as error:
         raise McaError(f"the results could not be written to {path}: {error.strerror or error}") from error
     finally:
         if staging:
             shutil.rmtree(staging, ignore_errors=True)
     return result
+
+
+def _claim(path: Path) -> None:
+    """Make the first file of results in a folder, empty: of several runs only one can.
+
+    Raises:
+        RequestError: another run was first.
+    """
+    try:
+        (path / FILES[0]).open("x").close()
+    except FileExistsError as error:
+        raise _not_saved(path) from error
+
+
+def _not_saved(path: Path) -> RequestError:
+    remedy = "it holds results already, and these are not saved; name another folder, or use --force (force=True)"
+    return bad_value("out", str(path), remedy)
+
+
+def _clear(path: Path) -> None:
+    """Remove what is left in a folder by runs that were killed while they saved."""
+    for folder in path.glob(f"{STAGING}*"):
+        with suppress(OSError):
+            if time.time() - folder.stat().st_mtime > LONGEST_SAVE:
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def load(directory: str | os.PathLike[str]) -> Result:

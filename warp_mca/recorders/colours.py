@@ -7,14 +7,13 @@ off by more than 2 of 255 from matplotlib's, which need not be imported.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
 from warp_mca.materials import J2Bilinear
 from warp_mca.scene import Scene
+from warp_mca.validate import brief, is_number
 
 STICK, SLIP = 0xF0E442FF, 0xD55E00FF  # contact points, as 0xRRGGBBAA: Okabe and Ito's yellow and vermilion
 _NODES = """
@@ -58,6 +57,16 @@ def packed(value: NDArray[np.floating], limit: float) -> NDArray[np.uint32]:
     return _PACKED[levels(value, limit)]
 
 
+def check_limit(limit: float | None) -> None:
+    """The stress at the upper end of the palette [Pa] must be a finite number above 0, or None.
+
+    Raises:
+        RequestError: it is none.
+    """
+    if limit is not None and not (is_number(limit) and limit > 0.0):
+        raise bad_value("limit", brief(limit), "give the stress at the upper end of the colours, above 0 Pa")
+
+
 class ColourScale:
     """The stress at the upper end of the palette: fixed, or the greatest seen so far.
 
@@ -73,8 +82,7 @@ class ColourScale:
         Raises:
             RequestError: `limit` is not a finite number above 0.
         """
-        if limit is not None and not (math.isfinite(limit) and limit > 0.0):
-            raise bad_value("limit", limit, "give the stress at the upper end of the colours, above 0 Pa")
+        check_limit(limit)
         found = [m.sigma_y for m in _materials(scene) if isinstance(m, J2Bilinear)]
         self.fixed = limit is not None or bool(found)
         self.limit = limit if limit is not None else min(found, default=0.0)

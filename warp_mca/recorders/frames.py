@@ -11,9 +11,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca import validate
 from warp_mca.errors import bad_value
 from warp_mca.kernels.output import OPEN, STICK
-from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame, Recorder, RunInfo, SurfaceMesh, Volume
+from warp_mca.recorders.recorder import (
+    CONTACT,
+    NEEDS,
+    PATHS,
+    SURFACE,
+    VOLUME,
+    Cadence,
+    Frame,
+    Recorder,
+    RunInfo,
+    SurfaceMesh,
+    Volume,
+    file_path,
+)
 from warp_mca.results import FILES, PATH_FILES
 from warp_mca.transfer import Transfer
 
@@ -39,11 +53,13 @@ def _files(recorders: Sequence[Recorder]) -> list[Path]:
 
 
 def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None = None) -> None:
-    """Refuse outputs that cross, of which one would write over the other or be a folder above it.
+    """Refuse attributes that are none, and outputs that cross: one would write over the other or be a folder above it.
 
     Raises:
         RequestError: so it is, for files of the recorders, or one of them and the results in `out`.
     """
+    for k, recorder in enumerate(recorders):
+        _check_attributes(f"recorders[{k}]", recorder)
     known = [Path(out, name).resolve() for name in FILES + PATH_FILES] if out is not None else []
     for file in _files(recorders):
         path = file.resolve()
@@ -53,6 +69,43 @@ def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | Non
             if path in other.parents or other in path.parents:
                 raise bad_value("recorders", str(file), f"it cannot be there beside {other}; name another file")
         known.append(path)
+
+
+def _check_attributes(field: str, recorder: Recorder) -> None:
+    """What a recorder, which may be the user's own, says of itself must be of the kinds that `Recorder` states."""
+    validate.texts(field, name=recorder.name)
+    validate.kinds(field, Cadence, "give a Cadence, as Cadence(frames=100)", cadence=recorder.cadence)
+    remedy = f"give a frozenset of what frames must hold, out of {', '.join(NEEDS)}"
+    validate.kinds(field, (set, frozenset, tuple, list), remedy, needs=recorder.needs)
+    for need in recorder.needs:
+        if not (isinstance(need, str) and need in NEEDS):
+            raise bad_value(f"{field}.needs", validate.brief(need), remedy)
+    files = getattr(recorder, "files", ())
+    validate.kinds(field, (tuple, list), "give a tuple of the paths that it writes", files=files)
+    for k, file in enumerate(files):
+        file_path(f"{field}.files[{k}]", file)
+
+
+def _begin(index: int, recorder: Recorder, method: str, info: RunInfo) -> None:
+    """Let a recorder check or start.
+
+    Raises:
+        RequestError: it failed.
+    """
+    validate.call(f"recorders[{index}]", recorder.name, f"{method}()", getattr(recorder, method), info)
+
+
+def _wanted(recorder: Recorder, intervals: int, info: RunInfo) -> NDArray[np.bool_]:
+    """The ends of output intervals at which a recorder wants a frame, see `Cadence.rows`.
+
+    Raises:
+        RequestError: the run does not reach one of its times.
+    """
+    for time in recorder.cadence.times or ():
+        if time > info.duration + 0.5 * info.output_interval:
+            remedy = f"the run ends at {info.duration:g} s; give times until then"
+            raise bad_value(f"time of {recorder.name}", time, remedy)
+    return recorder.cadence.rows(intervals, info.output_interval)
 
 
 class Recording:
@@ -68,10 +121,12 @@ class Recording:
         """Start the recorders of a run of `intervals` output intervals of `steps` steps each.
 
         Raises:
-            RequestError: an output cannot be made; what the others had made by then is removed.
+            RequestError: an output cannot be made, or a time is not reached; what others had made by then is removed.
         """
-        for recorder in recorders:
-            getattr(recorder, "check", lambda info: None)(info)
+        wanted = [_wanted(recorder, intervals, info) for recorder in recorders]
+        for k, recorder in enumerate(recorders):
+            if hasattr(recorder, "check"):
+                _begin(k, recorder, "check", info)
         self.failed: list[str] = []
         self.info, self.steps, self.output = info, steps, output
         self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = []
@@ -79,9 +134,9 @@ class Recording:
         self.transfer: Transfer[tuple[str, str]] | None = None
         missing = {folder for file in _files(recorders) for folder in file.parents if not folder.exists()}
         try:
-            for recorder in recorders:
-                self.rows.append((recorder, recorder.cadence.rows(intervals, info.output_interval)))
-                recorder.start(info)
+            for k, recorder in enumerate(recorders):
+                self.rows.append((recorder, wanted[k]))
+                _begin(k, recorder, "start", info)
         except BaseException:
             self.finish(False)
             for folder in sorted(missing, reverse=True):  # the inner ones first
@@ -128,21 +183,21 @@ class Recording:
         for recorder, rows in list(self.rows):
             if rows[row]:
                 index = self.taken.get(id(recorder), 0)
-                self.taken[id(recorder)] = index + 1
                 frame = self._frame(row, arrays, recorder.needs, index)
                 self._call(recorder, lambda recorder=recorder, frame=frame: recorder.frame(frame))
+                self.taken[id(recorder)] = index + 1
 
     def _call(self, recorder: Recorder, act: Callable[[], None]) -> None:
         """Let a recorder act; one that fails is closed and left out from then on."""
         try:
             act()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             count = self.taken.get(id(recorder), 0)
             reason = " ".join(str(error).split()) or type(error).__name__
-            self.info.warn(f"{recorder.name}: recording stopped at frame {count}: {reason}")
+            self.info.warn(f"{recorder.name}: recording stopped after {count} frames: {reason}")
             self.failed.append(recorder.name)
             self.rows = [item for item in self.rows if item[0] is not recorder]
-            with suppress(Exception):
+            with suppress(Exception, SystemExit):
                 recorder.finish(False)
 
     def _frame(self, row: int, sent: Mapping[tuple[str, str], NDArray], needs: frozenset[str], index: int) -> Frame:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.errors import McaError, RequestError, bad_value
 from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds
-from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
+from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file, file_path
 
 if TYPE_CHECKING:
     import meshio
@@ -44,7 +44,7 @@ class FinalState:
             RequestError: `file` cannot be written, or its format holds no 8-node hexahedra.
         """
         meshio = _load_meshio()
-        suffix = Path(file).suffix
+        suffix = file_path("final", file).suffix
         if suffix not in meshio.extension_to_filetypes:
             raise bad_value("final", str(file), f"meshio knows no format with this suffix; {USUAL}")
         self.path = check_file("final", file, suffix)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.errors import bad_value
 from warp_mca.files import check_folder
 from warp_mca.scene import RigidPlane
+from warp_mca.validate import brief, is_list, is_number
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
@@ -26,7 +26,7 @@ Index = NDArray[np.int32]
 
 DISK_RESERVE = 64 << 20  # that recorders leave free on a disk, for the results [byte]
 # What a frame can hold. Only what a recorder of the run asks for is computed and copied.
-SURFACE, CONTACT, PATHS, VOLUME = "surface", "contact", "paths", "volume"
+SURFACE, CONTACT, PATHS, VOLUME = NEEDS = "surface", "contact", "paths", "volume"
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,10 @@ class Cadence:
     """When frames are taken: `frames` over the run, one every `seconds` [s] of simulated time, or at `times` [s].
 
     The state can be read at the end of each output interval: the nearest ends are taken. The first two ways always
-    take the first and the last one.
+    take the first and the last one; times that a run does not reach are refused when it starts.
+
+    Raises:
+        RequestError: none or several of them are given, or one is no whole number from 2 on, no time, no list of times.
     """
 
     frames: int | None = None
@@ -42,14 +45,18 @@ class Cadence:
     times: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if [self.frames, self.seconds, self.times].count(None) != 2:
-            raise bad_value("Cadence", (self.frames, self.seconds, self.times), "give one of frames, seconds and times")
-        if self.frames is not None and self.frames < 2:
-            raise bad_value("frames", self.frames, "give at least 2: the first and the last")
-        if self.seconds is not None and not (math.isfinite(self.seconds) and self.seconds > 0.0):
-            raise bad_value("seconds", self.seconds, "give a finite time above 0 s")
-        if self.times is not None and not all(math.isfinite(time) and time >= 0.0 for time in self.times):
-            raise bad_value("times", self.times, "give finite times from 0 s on")
+        given = (self.frames, self.seconds, self.times)
+        if sum(value is not None for value in given) != 1:
+            raise bad_value("Cadence", tuple(map(brief, given)), "give one of frames, seconds and times")
+        if self.frames is not None and not (isinstance(self.frames, int | np.integer) and self.frames >= 2):
+            raise bad_value("frames", brief(self.frames), "give a whole number, at least 2: the first and the last")
+        if self.seconds is not None and not (is_number(self.seconds) and self.seconds > 0.0):
+            raise bad_value("seconds", brief(self.seconds), "give a finite time above 0 s")
+        if self.times is not None:
+            if not (is_list(self.times) and len(self.times) and min(self.times) >= 0.0):
+                value = self.times if isinstance(self.times, tuple | list) else brief(self.times)
+                raise bad_value("times", value, "give a tuple of finite times from 0 s on")
+            object.__setattr__(self, "times", tuple(map(float, self.times)))
 
     def rows(self, intervals: int, interval: float) -> NDArray[np.bool_]:
         """Which ends of `intervals` output intervals of `interval` [s] are frames, shape (intervals + 1,), bool."""
@@ -174,8 +181,8 @@ class Frame:
 class Recorder(Protocol):
     """Writes or shows a run while it goes on.
 
-    A recorder that raises is dropped with a warning, and the run goes on without it; what it has written stays as far
-    as it can be opened.
+    What `check` or `start` raises stops the run before it begins. A recorder that raises later is dropped with a
+    warning, and the run goes on without it; what it has written stays as far as it can be opened.
 
     Attributes:
         name: for warnings, such as the file that it writes.
@@ -197,7 +204,7 @@ class Recorder(Protocol):
         """Open the file or the viewer.
 
         Raises:
-            RequestError: it cannot be opened; the run does not begin.
+            RequestError: it cannot be opened. The run does not begin, whatever is raised.
         """
         ...
 
@@ -224,6 +231,18 @@ def apart(names: Iterable[str]) -> list[str]:
     return found
 
 
+def file_path(field: str, file: object) -> Path:
+    """What the user named `field` as a path.
+
+    Raises:
+        RequestError: it is no name of a file.
+    """
+    text = os.fspath(file) if isinstance(file, str | os.PathLike) else None
+    if not (isinstance(text, str) and text and "\0" not in text):
+        raise bad_value(field, brief(file), "name a file")
+    return Path(text)
+
+
 def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path:
     """`file` as a path, when a recording can be written there.
 
@@ -233,9 +252,9 @@ def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path
         suffixes: that the name may end with.
 
     Raises:
-        RequestError: the suffix is another one, or the path is a folder or cannot be written to.
+        RequestError: it is no name, the suffix is another one, or the path is a folder or cannot be written to.
     """
-    path = Path(file)
+    path = file_path(field, file)
     if path.suffix not in suffixes:
         raise bad_value(field, str(path), f"give the file the suffix {' or '.join(suffixes)}")
     if path.is_dir():

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
-from warp_mca.recorders.colours import SLIP, STICK, ColourScale, packed
+from warp_mca.recorders.colours import SLIP, STICK, ColourScale, check_limit, packed
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
+from warp_mca.validate import kinds, members
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -62,8 +63,11 @@ class RerunStream:
             viewer_options: of rerun's own program, such as --headless.
 
         Raises:
-            RequestError: `file` cannot be written, or there is nowhere to send to.
+            RequestError: `file` cannot be written, there is nowhere to send to, or a value is none of its kind.
         """
+        kinds("RerunStream", bool, "give True or False", viewer=viewer)
+        members("RerunStream", str, viewer_options=viewer_options)
+        check_limit(limit)
         if file is None and not viewer:
             raise bad_value("RerunStream.file", file, "name a file, or set viewer=True")
         self.path = None if file is None else check_file("rrd", file, ".rrd")
@@ -81,14 +85,6 @@ class RerunStream:
         self.failed = False
         self._file_stream: rr.RecordingStream | None = None
         self._viewer_stream: rr.RecordingStream | None = None
-
-    def check(self, info: RunInfo) -> None:
-        """Refuse a limit that is none.
-
-        Raises:
-            RequestError: so it is.
-        """
-        ColourScale(info.scene, self.limit)
 
     def start(self, info: RunInfo) -> None:
         """Open the streams and log what never changes.

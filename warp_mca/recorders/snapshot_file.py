@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
 from warp_mca.recorders.recorder import SURFACE, Cadence, Frame, RunInfo, check_file
+from warp_mca.validate import brief, is_number
 
 
 class SnapshotFile:
@@ -22,21 +22,12 @@ class SnapshotFile:
         Raises:
             RequestError: the file cannot be written, or the time is not one.
         """
-        if not (math.isfinite(time) and time >= 0.0):
-            raise bad_value("snapshot", time, "give a finite time from 0 s on")
+        if not (is_number(time) and time >= 0.0):
+            raise bad_value("snapshot", brief(time), "give a finite time from 0 s on")
         self.path = check_file("snapshot", file, ".png")
         self.name, self.files = str(self.path), (self.path,)
         self.needs = frozenset((SURFACE,))
-        self.time, self.cadence = time, Cadence(times=(time,))
-
-    def check(self, info: RunInfo) -> None:
-        """Refuse a time that the run does not reach.
-
-        Raises:
-            RequestError: so it is.
-        """
-        if self.time > info.duration + 0.5 * info.output_interval:
-            raise bad_value("snapshot", self.time, f"the run ends at {info.duration:g} s; give a time until then")
+        self.cadence = Cadence(times=(time,))
 
     def start(self, info: RunInfo) -> None:
         """Keep the faces."""

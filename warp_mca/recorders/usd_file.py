@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
 from warp_mca.files import nearest
-from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, levels
+from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, check_limit, levels
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, apart, check_file
 
 if TYPE_CHECKING:
@@ -49,8 +49,9 @@ class UsdFile:
             limit: stress at the upper end of the colours [Pa], see `ColourScale`.
 
         Raises:
-            RequestError: `file` cannot be written.
+            RequestError: `file` cannot be written, or the limit is none.
         """
+        check_limit(limit)
         self.path = check_file("usd", file, ".usdc", ".usd", ".usda")
         self.name, self.files = str(self.path), (self.path,)
         if not _is_utf8(self.name):
@@ -65,17 +66,16 @@ class UsdFile:
         self.bodies: dict[str, _Body] = {}
         self.stage: Any = None
         self.contact: Any = None
-        self.saved_count = 0  # frames that the file holds
+        self.saved_count = self.unsaved_count = 0  # frames that the file holds, and lacks
 
     def check(self, info: RunInfo) -> None:
-        """Load USD; refuse a limit that is none, and a disk that is full.
+        """Load USD; refuse a disk that is full.
 
         Raises:
             RequestError: so it is.
         """
         with _signals_held():
             from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401
-        ColourScale(info.scene, self.limit)
         if shutil.disk_usage(nearest(self.path).absolute()).free < DISK_RESERVE:
             raise bad_value("usd", str(self.path), f"it cannot be written ({FULL}); name another file")
 
@@ -121,17 +121,17 @@ class UsdFile:
         from pxr import Sdf, Usd
 
         self.scale.include(max(float(value.max(initial=0.0)) for value in frame.von_mises.values()))
-        code = Usd.TimeCode(len(self.times))
-        with Sdf.ChangeBlock():
-            for name, body in self.bodies.items():
-                body.write(
-                    code, frame.points[name], frame.von_mises[name], frame.plastic_strain[name], self.scale.limit
-                )
-            self.contact.write(code, frame.contact_points, frame.contact_stick)
-        self.times.append(frame.time)
-        self.limits.append(self.scale.limit)
-        if len(self.times) % SAVE_EVERY == 0:
-            self._save()
+        code, limit = Usd.TimeCode(len(self.times)), self.scale.limit
+        with _signals_held():  # a frame that is interrupted is whole
+            with Sdf.ChangeBlock():
+                for name, body in self.bodies.items():
+                    body.write(code, frame.points[name], frame.von_mises[name], frame.plastic_strain[name], limit)
+                self.contact.write(code, frame.contact_points, frame.contact_stick)
+            self.times.append(frame.time)
+            self.limits.append(limit)
+            self.unsaved_count += 1
+            if self.unsaved_count == SAVE_EVERY:
+                self._save()
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
         """Has no place in this file."""
@@ -142,9 +142,11 @@ class UsdFile:
         Raises:
             OSError: the disk is full or fails.
         """
-        if self.stage is not None:
+        if self.stage is None:
+            return
+        with _signals_held():
             try:
-                if ok:
+                if self.unsaved_count:
                     self._save()
             finally:
                 self.stage, self.bodies, self.contact = None, {}, None
@@ -154,6 +156,7 @@ class UsdFile:
     def _save(self) -> None:
         from pxr import Tf, Vt
 
+        self.unsaved_count = 0  # what cannot be saved now is not tried again
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
             raise OSError(FULL)
         self.stage.SetStartTimeCode(0.0)
@@ -261,9 +264,10 @@ def _is_utf8(name: str) -> bool:
 
 @contextmanager
 def _signals_held() -> Iterator[None]:
-    """Let SIGINT and SIGTERM act only afterwards: what they raise is lost while pxr is imported, and breaks it."""
+    """Let signals that stop a run act only afterwards: what they raise cuts a frame in two, and breaks pxr's import."""
     held: list[int] = []
-    numbers = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if main_thread else ()
     handlers = {number: signal.signal(number, lambda number, frame: held.append(number)) for number in numbers}
     try:
         yield
