@@ -58,3 +58,10 @@ def test_faces_look_outwards():
     p = mesh.points[boundary_faces(mesh.hexahedra, mesh.tetrahedra, len(mesh.points))[0]]
     normal = 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     assert (normal * p.mean(axis=1)).sum() / 3.0 == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_set_of_the_mesh_may_go_by_the_name_of_the_whole_skin():
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+    assert len(box.surface("boundary")[0]) == 24
+    named = mca.Mesh(box.points, box.hexahedra, {"boundary": box.nodes("xmin")})
+    assert len(named.surface("boundary")[0]) == 4

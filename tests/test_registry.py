@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import gc
 import math
+import sys
 from pathlib import Path
 
 import pytest
@@ -184,6 +185,13 @@ def test_a_file_that_is_no_scene_file_is_refused(tmp_path: Path, text: str, word
     with pytest.raises(RequestError, match=words) as error:
         load_source(str(path))
     assert "\n" not in str(error.value)
+
+
+def test_a_scene_file_may_import_what_lies_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    (tmp_path / "beside_the_scene.py").write_text("LENGTH = 2.0")
+    (tmp_path / "it.py").write_text("from beside_the_scene import LENGTH\ndef build(length: float = LENGTH): ...\n")
+    assert load_source(tmp_path / "it.py").parameters["length"].default == 2.0
 
 
 def test_build_must_return_a_scene(tmp_path: Path):

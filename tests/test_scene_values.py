@@ -124,3 +124,8 @@ def test_a_point_off_its_body_is_refused():
     mca.run(mca.Scene(name="s", bodies=(body,), tip=near, impact=mca.ImpactPhase(duration=1e-6)))
     with pytest.raises(RequestError, match=r"Point of a\.at = \(2.0, 0.5, 0.5\): that is 1 m off the body"):
         mca.run(mca.Scene(name="s", bodies=(body,), tip=far, impact=mca.ImpactPhase(duration=1e-6)))
+
+
+def test_a_name_that_no_file_can_hold_is_refused():
+    with pytest.raises(RequestError, match=r"Scene\.name = .*whole characters"):
+        mca.Scene(name="\ud800", bodies=(), impact=mca.ImpactPhase(duration=1.0))

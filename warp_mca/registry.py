@@ -254,6 +254,8 @@ def _imported(path: Path) -> ModuleType:
     assert spec is not None and spec.loader is not None  # true of every name that ends in .py
     module = util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses in the file look themselves up there
+    if (folder := str(path.parent.resolve())) not in sys.path:
+        sys.path.append(folder)  # modules beside the file
     try:
         spec.loader.exec_module(module)
     except McaError:

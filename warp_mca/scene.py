@@ -138,7 +138,7 @@ class Path:
 
 @dataclass(frozen=True, kw_only=True)
 class Surface:
-    """The boundary faces of `body` that the node set `nodes` covers; "boundary" is the whole skin."""
+    """Boundary faces of `body` that the node set `nodes` covers; "boundary" is the whole skin, unless it is a set."""
 
     body: str
     nodes: str

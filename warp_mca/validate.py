@@ -89,8 +89,11 @@ def kinds(owner: str, kind: type | tuple[type, ...], remedy: str, /, **values: o
 
 
 def texts(owner: str, /, **values: str) -> None:
-    """Each value must be a text."""
+    """Each value must be a text that files can hold."""
     kinds(owner, str, "give a text", **values)
+    for name, value in values.items():
+        if not value.isascii() and value != value.encode(errors="replace").decode():  # half of a character
+            raise bad_value(f"{owner}.{name}", value, "give a text of whole characters")
 
 
 def members(owner: str, kind: type, /, **values: Sequence[object]) -> None:

@@ -50,7 +50,7 @@ class Mesh:
         return boundary_faces(self.hexahedra, self.tetrahedra, len(self.points))
 
     def surface(self, name: str) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Boundary faces whose nodes all lie in the node set `name` ("boundary": all of them).
+        """Boundary faces whose nodes all lie in the node set `name` ("boundary", unless there is one: all of them).
 
         Returns:
             Nodes of each face, shape (face_count, 4), int32, and its element, shape (face_count,), int32.
@@ -59,7 +59,7 @@ class Mesh:
             RequestError: the set is unknown or holds no whole face.
         """
         faces, elements = self.boundary
-        if name == "boundary":
+        if name == "boundary" and name not in self.node_sets:
             return faces, elements
         member = np.zeros(len(self.points), dtype=bool)
         member[self.nodes(name)] = True
