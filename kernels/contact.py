@@ -9,8 +9,8 @@ from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
-from warp_mca.kernels.projection import interpolate, project, weights_at
-from warp_mca.kernels.search import STALE, TOO_DEEP, moved_too_far
+from warp_mca.kernels.projection import EDGE_REACH, interpolate, project, weights_at
+from warp_mca.kernels.search import STALE, TOO_DEEP, TURNED, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
 
 wp.set_module_options({"enable_backward": False})
@@ -20,7 +20,9 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 _FOLD = 0.01  # of an edge: how much deeper a node may be at once in a neighbour that rises, past the edge between
 _SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
+_RIM = 1e-3  # of half an edge, that a node may lie off a face and still count as above it
 _FAR = 1e30  # further than anything [m]
+_SHARP = 0.7  # cosine between normals below which a node that goes from one face to the next turned a sharp edge
 _TURN = -0.9  # least cosine between the normals of a face that presses a node and of the next that does
 
 # Depth before the first step: bodies may overlap from the start.
@@ -130,6 +132,14 @@ def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.
     return depth <= held + wp.float64(2.0) * wp.abs(moved) + slack
 
 
+@wp.func
+def is_beside(at: wp.vec2d, triangle: bool) -> bool:
+    """Whether a point at these coordinates of a face, as `weights_at` takes them, lies beside it."""
+    if triangle:
+        return wp.min(at[0], wp.min(at[1], wp.float64(1.0) - at[0] - at[1])) < wp.float64(wp.static(-0.5 * _RIM))
+    return wp.max(wp.abs(at[0]), wp.abs(at[1])) > wp.float64(wp.static(1.0 + _RIM))
+
+
 @cache
 def surface_kernel(friction: bool, each: bool) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
@@ -173,6 +183,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         best_area = wp.float64(0.0)
         best_normal = wp.vec3d()
         best_at = wp.vec2d()
+        best_beside = bool(False)
         front = wp.float64(_FAR)
         pressed = spring.force[s]
         if wp.static(friction):
@@ -197,12 +208,19 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                 turn = wp.dot(wp.vec3f(normal), along)
                 kept = turn >= 0.0 or turn * turn < wp.static(_TURN**2) * wp.dot(along, along)
                 if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
-                    # the shallowest face wins; the lower number at a tie, whatever the order of the search
-                    if best < 0 or gap > best_gap or (gap == best_gap and f < best):
+                    # the lower number at a tie, whatever the order of the search
+                    beside = is_beside(at, i2 == i3)
+                    better = best < 0 or (gap == best_gap and f < best)
+                    if beside != best_beside:
+                        better = better or best_beside
+                    elif gap != best_gap:
+                        better = better or (gap > best_gap) != beside
+                    if better:
                         best = f
                         best_gap = gap
                         best_normal = normal
                         best_at = at
+                        best_beside = beside
                         best_area = area
                 elif gap >= wp.float64(0.0):
                     front = wp.min(front, gap)
@@ -213,6 +231,8 @@ def surface_kernel(friction: bool, each: bool) -> Any:
             du = dt * (v[i] - master_velocity(v, face, best, weight))
             edge = wp.float64(2.0) * wp.sqrt(best_area)
             touches = reachable(-best_gap, held, front, wp.dot(du, best_normal), edge)
+            if best_beside and held == wp.float64(0.0) and front < wp.float64(wp.static(2.0 * EDGE_REACH - 2.0)) * edge:
+                touches = bool(False)
             # a spring with neither gap nor normal has no force, and is released as an open one
             gap_kept = wp.where(touches, best_gap, wp.float64(0.0))
             normal_kept = wp.where(touches, best_normal, wp.vec3d())
@@ -223,6 +243,9 @@ def surface_kernel(friction: bool, each: bool) -> Any:
             contact_force_out[i] = contact_force_out[i] + force
             if gap_kept * gap_kept > best_area:
                 flag_out[k, TOO_DEEP] = 1
+            turn = wp.dot(wp.vec3f(normal_kept), along)
+            if touches and (turn < 0.0 or turn * turn < wp.static(_SHARP**2) * wp.dot(along, along)):
+                flag_out[k, TURNED] = 1
         else:
             if spring.face[s] >= 0:
                 du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))

@@ -11,7 +11,7 @@ from warp_mca.kernels.projection import project
 wp.set_module_options({"enable_backward": False})
 
 # Entries of the flag array that the host reads with every batch of records.
-OVERFLOW, STALE, TOO_DEEP = 0, 1, 2
+FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
 
 
 @cache

@@ -195,6 +195,11 @@ class Account:
                 f"contact's penalty{ledger.other_remedy}, if that is above what energy_tolerance = {tolerance:g} "
                 "should allow"
             )
+        if ledger.turned:
+            found.append(
+                "nodes that a master pressed went over to a face of it around a sharp edge, where single nodes do not "
+                "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
+            )
         found += self._mesh_warnings()
         if scene.rigid and scene.rigid.inertia == "slender":
             found.append(

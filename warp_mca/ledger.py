@@ -38,6 +38,7 @@ class Ledger:
         exchanged: largest energy so far that was in elements, contact springs and friction, or that motion had gained
             or lost [J].
         max_strain: largest deviatoric strain so far [-].
+        turned: whether a pressed node went over to a face across a sharp edge.
     """
 
     def __init__(self, model: Model, dt: float, interval: float, tolerance: float, precision: str) -> None:
@@ -46,6 +47,7 @@ class Ledger:
         self.columns: list[Array] = []
         self.velocities: list[Array] = []
         self.count = 0
+        self.turned = False
         self._hint = ""  # at what else may be wrong
         self.energy_error = 0.0
         self.max_strain = 0.0
@@ -68,7 +70,10 @@ class Ledger:
         sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
         if self.count == 0 and written:
             self._hint = self._overlap(sums[0])
-        for raised, message in zip(records["flag"], _FLAGS, strict=True):  # these explain what the sums would show
+        self.turned = bool(records["flag"][len(_FLAGS) :].any())
+        for raised, message in zip(
+            records["flag"][: len(_FLAGS)], _FLAGS, strict=True
+        ):  # these explain what the sums would show
             if raised:
                 end = (self.count + written) * self.interval
                 raise GuardError(f"stopped before t = {end:.4g} s: {message}{self._hint}")

@@ -30,7 +30,7 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
-from warp_mca.kernels import constraint, contact, ledger, node, output, subnormals
+from warp_mca.kernels import constraint, contact, ledger, node, output, search, subnormals
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
 from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
@@ -111,7 +111,7 @@ class Solver:
         cuda = wp.get_device().is_cuda
         self.side, self.sums = (wp.Stream(priority=-1), wp.Stream(priority=-1)) if cuda else (None, None)
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
-        self.flag = wp.zeros((scenes, 3), dtype=wp.int32)
+        self.flag = wp.zeros((scenes, len(search.FLAGS)), dtype=wp.int32)
         self.bonds = BondStage(model, self.layout)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)  # of the latest record
@@ -329,7 +329,7 @@ class Solver:
 
         Returns:
             `partial`: partial sums, shape (ROWS, scene_count, columns, SUM_WIDTH), float64; `point_velocity` [m/s],
-            shape (ROWS, point_count), vec3d; `flag`, shape (scene_count, 3), int32; `path_stress` [Pa], where the scene
+            shape (ROWS, point_count), vec3d; `flag`, shape (scene_count, 4), int32; `path_stress` [Pa], where the scene
             has paths, shape (ROWS, probe_count), vec6 of float32.
         """
         found = {"partial": self.partial, "point_velocity": self.point_velocity, "flag": self.flag}
