@@ -20,7 +20,7 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 _FOLD = 0.01  # of an edge: how much deeper a node may be at once in a neighbour that rises, past the edge between
 _SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
-_RIM = 1e-3  # of half an edge, that a node may lie off a face and still count as above it
+_RIM = 1e-4  # of half an edge, that a node may lie off a face and still count as above it
 _FAR = 1e30  # further than anything [m]
 _SHARP = 0.7  # cosine between normals below which a node that goes from one face to the next turned a sharp edge
 _TURN = -0.9  # least cosine between the normals of a face that presses a node and of the next that does
