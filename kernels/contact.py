@@ -145,8 +145,9 @@ def surface_kernel(friction: bool, each: bool) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
 
     Slaves are those from `first` on. With `each`, scenes of a batch have values of their own, and slaves know their
-    scene. Of the faces that have a node behind them the shallowest counts, if it is `reachable`; no deeper one is then.
-    Nor does one that would press the node back where the last one did not let it go: the other side of a thin body.
+    scene. Of the faces below which a node lies the shallowest counts, if it is `reachable`; no deeper one is then.
+    Where there is none, the deepest of those that it lies beside does, as a concave fold asks for. None does that would
+    press the node back where the last one did not let it go: the other side of a thin body.
     """
     press = spring_function(friction)
     open_contact = open_function(friction)
@@ -208,14 +209,13 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                 turn = wp.dot(wp.vec3f(normal), along)
                 kept = turn >= 0.0 or turn * turn < wp.static(_TURN**2) * wp.dot(along, along)
                 if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
-                    # the lower number at a tie, whatever the order of the search
                     beside = is_beside(at, i2 == i3)
-                    better = best < 0 or (gap == best_gap and f < best)
+                    better = (gap > best_gap) != beside
                     if beside != best_beside:
-                        better = better or best_beside
-                    elif gap != best_gap:
-                        better = better or (gap > best_gap) != beside
-                    if better:
+                        better = best_beside
+                    elif gap == best_gap:
+                        better = f < best  # whatever the order of the search
+                    if better or best < 0:
                         best = f
                         best_gap = gap
                         best_normal = normal

@@ -70,10 +70,9 @@ class Ledger:
         sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
         if self.count == 0 and written:
             self._hint = self._overlap(sums[0])
-        self.turned = bool(records["flag"][len(_FLAGS) :].any())
-        for raised, message in zip(
-            records["flag"][: len(_FLAGS)], _FLAGS, strict=True
-        ):  # these explain what the sums would show
+        *flags, turned = records["flag"]
+        self.turned = bool(turned)
+        for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
                 end = (self.count + written) * self.interval
                 raise GuardError(f"stopped before t = {end:.4g} s: {message}{self._hint}")
