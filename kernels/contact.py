@@ -9,7 +9,7 @@ from warp_mca.kernels.each import kind, value_function
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
-from warp_mca.kernels.projection import EDGE_REACH, interpolate, project, weights_at
+from warp_mca.kernels.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, TURNED, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
 
@@ -21,6 +21,7 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 _FOLD = 0.01  # of an edge: how much deeper a node may be at once in a neighbour that rises, past the edge between
 _SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
 _RIM = 1e-4  # of half an edge, that a node may lie off a face and still count as above it
+_ABOVE = 0.04  # of an edge: who arrives beside a face, nearer than this above another, passes by
 _FAR = 1e30  # further than anything [m]
 _SHARP = 0.7  # cosine between normals below which a node that goes from one face to the next turned a sharp edge
 _TURN = -0.9  # least cosine between the normals of a face that presses a node and of the next that does
@@ -192,16 +193,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         along = wp.vec3f(pressed)  # of any length
         x = X[i] + u[i]
         for c in range(count[s]):
-            i0 = face[f, 0]
-            i1 = face[f, 1]
-            i2 = face[f, 2]
-            i3 = face[f, 3]
-            # coordinates relative to the slave keep the digits that the gap needs
-            p0 = X[i0] + u[i0] - x
-            p1 = X[i1] + u[i1] - x
-            p2 = X[i2] + u[i2] - x
-            p3 = X[i3] + u[i3] - x
-            inside, at, away, area_normal = project(p0, p1, p2, p3, i2 == i3)
+            inside, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
             if inside:
                 area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
                 normal = (wp.float64(1.0) / area) * area_normal
@@ -209,7 +201,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                 turn = wp.dot(wp.vec3f(normal), along)
                 kept = turn >= 0.0 or turn * turn < wp.static(_TURN**2) * wp.dot(along, along)
                 if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
-                    beside = is_beside(at, i2 == i3)
+                    beside = is_beside(at, triangle)
                     better = (gap > best_gap) != beside
                     if beside != best_beside:
                         better = best_beside
@@ -231,7 +223,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
             du = dt * (v[i] - master_velocity(v, face, best, weight))
             edge = wp.float64(2.0) * wp.sqrt(best_area)
             touches = reachable(-best_gap, held, front, wp.dot(du, best_normal), edge)
-            if best_beside and held == wp.float64(0.0) and front < wp.float64(wp.static(2.0 * EDGE_REACH - 2.0)) * edge:
+            if best_beside and held == wp.float64(0.0) and front < wp.float64(_ABOVE) * edge:
                 touches = bool(False)
             # a spring with neither gap nor normal has no force, and is released as an open one
             gap_kept = wp.where(touches, best_gap, wp.float64(0.0))

@@ -115,3 +115,23 @@ def project(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, triangle: bool):
     along_xi = e + at[1] * t
     along_eta = f + at[0] * t
     return inside, at, -m - at[0] * e - at[1] * along_eta, wp.cross(along_xi, along_eta)
+
+
+@wp.func
+def project_on_face(
+    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int, x: wp.vec3d
+):
+    """`project` of the point x on face f of nodes at X + u, and whether that is a triangle.
+
+    Coordinates relative to the point keep the digits that a gap needs.
+    """
+    i0 = face[f, 0]
+    i1 = face[f, 1]
+    i2 = face[f, 2]
+    i3 = face[f, 3]
+    p0 = X[i0] + u[i0] - x
+    p1 = X[i1] + u[i1] - x
+    p2 = X[i2] + u[i2] - x
+    p3 = X[i3] + u[i3] - x
+    inside, at, away, area_normal = project(p0, p1, p2, p3, i2 == i3)
+    return inside, at, away, area_normal, i2 == i3

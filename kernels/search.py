@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
-from warp_mca.kernels.projection import project
+from warp_mca.kernels.projection import project_on_face
 
 wp.set_module_options({"enable_backward": False})
 
@@ -143,15 +143,7 @@ def clear_kernel(each: bool) -> Any:
         nearest = wp.float64(wp.inf)
         clear = bool(False)
         while wp.bvh_query_next(query, f):
-            i0 = face[f, 0]
-            i1 = face[f, 1]
-            i2 = face[f, 2]
-            i3 = face[f, 3]
-            p0 = X[i0] + u[i0] - x
-            p1 = X[i1] + u[i1] - x
-            p2 = X[i2] + u[i2] - x
-            p3 = X[i3] + u[i3] - x
-            inside, _, away, area_normal = project(p0, p1, p2, p3, i2 == i3)
+            inside, _at, away, area_normal, _triangle = project_on_face(X, u, face, f, x)
             gap = wp.dot(away, wp.normalize(area_normal))
             if inside and (wp.abs(gap) < nearest or (wp.abs(gap) == nearest and gap >= wp.float64(0.0))):
                 nearest = wp.abs(gap)

@@ -192,7 +192,7 @@ def test_of_two_runs_that_save_at_once_the_first_keeps_its_results(
         folder.mkdir()
         (folder / "a.usdc").write_text("recorded")
     monkeypatch.setattr(results, "_write_history", write_after_the_other)
-    with pytest.raises(RequestError, match=r"^out = .*: it holds results already, and these are not saved"):
+    with pytest.raises(RequestError, match=r"^out = .*: it holds results already; name another"):
         save(Result({"mu": 2}, history()), folder)
     assert load(folder).summary["mu"] == 1
     assert sorted(file.name for file in folder.iterdir()) == sorted([*FILES, *["a.usdc"] * exists])

@@ -1,11 +1,25 @@
-"""Owns the question whether a path can be written."""
+"""Owns what users give as paths: whether one is a path, and can be written."""
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 
 from warp_mca.errors import bad_value
+from warp_mca.validate import brief
+
+
+def given_path(field: str, value: object, remedy: str) -> Path:
+    """What the user named `field` as a path; an empty name would be the folder that one is in.
+
+    Raises:
+        RequestError: it is no path.
+    """
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not (isinstance(text, str) and text and "\0" not in text):
+        raise bad_value(field, brief(value), remedy)
+    return Path(text)
 
 
 def nearest(path: Path) -> Path:

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from warp_mca.errors import McaError, RequestError, bad_value
-from warp_mca.files import check_folder, nearest
+from warp_mca.files import check_folder, given_path, nearest
 from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
 from warp_mca.paths import PathHistory, load_paths, save_paths
-from warp_mca.validate import DAMAGE, brief
+from warp_mca.validate import DAMAGE
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -176,13 +176,13 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
     """
     path = folder_path("out", directory)
     check_folder("out", path)
-    if not force and _holds_results(path):
-        raise bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
+    if not force and any((path / name).exists() for name in FILES + PATH_FILES):
+        raise _taken(path)
     return path
 
 
-def _holds_results(path: Path) -> bool:
-    return any((path / name).exists() for name in FILES + PATH_FILES)
+def _taken(path: Path) -> RequestError:
+    return bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
 
 
 def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
@@ -204,9 +204,7 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     from warp_mca.report.forces import save_forces
     from warp_mca.report.paths import save_path_figures
 
-    path = check_output(directory, force=True)
-    if not force and _holds_results(path):  # of a run beside this one, whose own check found none
-        raise _not_saved(path)
+    path = check_output(directory, force=force)
     # Written beside the folder first: a run that fails half-way leaves nothing behind.
     staging = None
     try:
@@ -247,12 +245,7 @@ def _claim(path: Path) -> None:
     try:
         (path / FILES[0]).open("x").close()
     except FileExistsError as error:
-        raise _not_saved(path) from error
-
-
-def _not_saved(path: Path) -> RequestError:
-    remedy = "it holds results already, and these are not saved; name another folder, or use --force (force=True)"
-    return bad_value("out", str(path), remedy)
+        raise _taken(path) from error
 
 
 def _clear(path: Path) -> None:
@@ -283,11 +276,12 @@ def load(directory: str | os.PathLike[str]) -> Result:
 
 
 def folder_path(field: str, directory: object) -> Path:
-    """What the user named `field` as a path; an empty name would be the folder that one is in."""
-    text = os.fspath(directory) if isinstance(directory, str | os.PathLike) else None
-    if not (isinstance(text, str) and text and "\0" not in text):
-        raise bad_value(field, brief(directory), "name a folder, or . for this one")
-    return Path(text)
+    """The folder that the user named `field`.
+
+    Raises:
+        RequestError: it is no path.
+    """
+    return given_path(field, directory, "name a folder, or . for this one")
 
 
 def _read_history(path: Path) -> dict[str, Array]:

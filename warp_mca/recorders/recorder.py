@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
-from warp_mca.files import check_folder
+from warp_mca.files import check_folder, given_path
 from warp_mca.scene import RigidPlane
 from warp_mca.validate import brief, is_list, is_number
 
@@ -232,15 +232,12 @@ def apart(names: Iterable[str]) -> list[str]:
 
 
 def file_path(field: str, file: object) -> Path:
-    """What the user named `field` as a path.
+    """The file that the user named `field`.
 
     Raises:
-        RequestError: it is no name of a file.
+        RequestError: it is no path.
     """
-    text = os.fspath(file) if isinstance(file, str | os.PathLike) else None
-    if not (isinstance(text, str) and text and "\0" not in text):
-        raise bad_value(field, brief(file), "name a file")
-    return Path(text)
+    return given_path(field, file, "name a file")
 
 
 def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path:
