@@ -103,7 +103,8 @@ def _stable_step(formulation: Element, X: NDArray, *arrays: NDArray) -> StableSt
 
 def without(model: Model, case: Case) -> Model:
     """The model with what the case has."""
-    blocks = tuple(replace(block, plastic=case.yielding is not None) for block in model.blocks)
+    law = STEEL.law if case.yielding is not None else mca.Elastic.law
+    blocks = tuple(replace(block, law=law) for block in model.blocks)
     changes: dict[str, object] = {"blocks": blocks}
     changes["passes"] = tuple(replace(p, mu=case.mu) for p in model.passes) if case.contact else ()
     if not case.joint:

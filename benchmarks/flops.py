@@ -14,6 +14,8 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.materials import Elastic, J2Bilinear
+
 INSTRUCTION = re.compile(r"^\s*(?:@\S+\s+)?([a-z]+)(?:\.(?!f32|f64)\w+)*\.(f32|f64)\b", re.MULTILINE)
 WORTH = {
     "fma": 2,
@@ -50,7 +52,8 @@ def flops(element: str, precision: str, plastic: bool, patches: bool) -> dict[st
 
     patches = patches and element != "tet4"
     kernels = importlib.import_module(f"warp_mca.kernels.{element}{'_patch' if patches else ''}")
-    total: Counter[str] = Counter(count(kernels.force_kernel(precision, plastic)))
+    law = J2Bilinear.law if plastic else Elastic.law
+    total: Counter[str] = Counter(count(kernels.force_kernel(precision, law)))
     if element == "tet4":
         total.update(count(kernels.dilation_kernel(precision, False)))
     return dict(total)

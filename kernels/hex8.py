@@ -11,7 +11,6 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.fused import NOTHING
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hex8_finite import finite_force_kernel
@@ -28,22 +27,23 @@ from warp_mca.kernels.hexahedron import (
     stress_function,
 )
 from warp_mca.kernels.kinematics import kinematics
+from warp_mca.kernels.laws import law_functions
 from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
-    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`.
+def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, and the plastic history where there is a law.
 
     Every plastic element takes the return map, which suits a CPU that computes several elements side by side; a GPU
     runs `kernels.hex8_patch`.
     """
     if finite:
-        return finite_force_kernel(precision, plastic)
-    if plastic:
-        return _plastic_force_kernel(precision)
+        return finite_force_kernel(precision, law_name)
+    if law_name:
+        return _plastic_force_kernel(precision, law_name)
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     element_rotation, local_displacement = frame_functions(precision)
@@ -79,7 +79,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 
 
 @cache
-def _plastic_force_kernel(precision: str) -> Any:
+def _plastic_force_kernel(precision: str, law_name: str) -> Any:
     """The force kernel with a return map at each point."""
     t = scalars(precision)
     R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
@@ -90,7 +90,8 @@ def _plastic_force_kernel(precision: str) -> Any:
     add_traction, symmetric_gradient = stress_functions(precision)
     store_force = store_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
-    j2_return = j2.return_map(precision)
+    functions = law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
     scale = LINE_SCALE**3
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
@@ -121,9 +122,7 @@ def _plastic_force_kernel(precision: str) -> Any:
         # as in `elastic_function`
         K = R(scale) * law[m, 0]
         G = R(scale) * law[m, 1]
-        limit = R(scale) * law[m, 2]
-        H = R(scale) * law[m, 3]
-        beta = law[m, 4]
+        parameters = read_parameters(law, m, R(scale))
         Sx = mat43()
         Sy = mat43()
         Sz = mat43()
@@ -163,7 +162,7 @@ def _plastic_force_kernel(precision: str) -> Any:
             yz = shear * yz
             xz = shear * xz
             S = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-            S, eps_new, p_new = j2_return(S, eps_p, p, G, limit, H, beta)
+            S, eps_new, p_new = return_map(S, eps_p, p, G, parameters)
             if p_new > p:
                 write_plastic_strain(history_out, g, e, eps_new, p_new)
                 flag_new = int(1)
@@ -187,7 +186,7 @@ def _plastic_force_kernel(precision: str) -> Any:
 
 
 @cache
-def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
     k = kinematics(precision, finite)
     dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
@@ -198,7 +197,8 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     load_element = load_function(precision)
     point_gradient = gradient_function(precision)
     read_plastic_strain, _ = history_functions(precision)
-    plastic_energy = j2.plastic_energy(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
 
     # logarithms need all their digits
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -241,7 +241,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
             if wp.static(plastic):
                 if yielded[e] != 0:
                     eps_p, p = read_plastic_strain(history, g, e)
-                    dissipated += det * plastic_energy(eps_p, p, law[m, 2], law[m, 3], law[m, 4])
+                    dissipated += det * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
             elastic += det * law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
             largest = wp.max(largest, wp.ddot(strain, strain))
             smallest = wp.min(smallest, wp.determinant(identity + grad))
@@ -256,7 +256,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 
 
 @cache
-def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: stress [Pa] and plastic strain [-] at the integration points of some elements, in the world frame.
 
     A point's values go to the slot of the element's corner that lies nearest: rows xx, yy, zz, xy, yz, xz, p.
@@ -268,6 +268,7 @@ def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     load_element = load_function(precision)
     point_gradient = gradient_function(precision)
     read_plastic_strain, _ = history_functions(precision)
+    plastic = bool(law_name)
     write_stress = stress_function(precision)
     k = kinematics(precision, finite)
     dilation_of, deviator, pressure_of, cauchy = k.dilation, k.deviator, k.pressure, k.cauchy

@@ -5,7 +5,6 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.hexahedron import (
     edge_functions,
     frame_functions,
@@ -16,13 +15,14 @@ from warp_mca.kernels.hexahedron import (
     store_function,
 )
 from warp_mca.kernels.kinematics import kinematics
+from warp_mca.kernels.laws import law_functions
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def finite_force_kernel(precision: str, plastic: bool) -> Any:
+def finite_force_kernel(precision: str, law_name: str) -> Any:
     """The force kernel at finite strain: volumes first, because the pressure's direction varies within an element."""
     t = scalars(precision)
     R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
@@ -33,7 +33,8 @@ def finite_force_kernel(precision: str, plastic: bool) -> Any:
     store_force = store_function(precision)
     point_gradient = gradient_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
-    j2_return = j2.return_map(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, True)
     dilation_of, deviator, nominal, pressure_of = k.dilation, k.deviator, k.nominal, k.pressure
 
@@ -92,7 +93,7 @@ def finite_force_kernel(precision: str, plastic: bool) -> Any:
                 p = R(0.0)
                 if flag != 0:
                     eps_p, p = read_plastic_strain(history_out, g, e)
-                S, eps_new, p_new = j2_return(S, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
+                S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
                 if p_new > p:
                     write_plastic_strain(history_out, g, e, eps_new, p_new)
                     flag_new = int(1)

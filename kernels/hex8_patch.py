@@ -10,10 +10,10 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
+from warp_mca.kernels.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.overlap import begins_early
 from warp_mca.kernels.patch import (
     POINT,
@@ -102,7 +102,7 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any]:
 
 
 @cache
-def point_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
     """Functions of one Gauss point.
 
     (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
@@ -111,8 +111,9 @@ def point_functions(precision: str) -> tuple[Any, Any, Any, Any]:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     add_traction, symmetric_gradient = stress_functions(precision)
-    j2_return = j2.return_map(precision)
-    pair = wp.types.vector(2 * j2.HISTORY_SIZE, R)
+    functions = law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
+    pair = wp.types.vector(2 * HISTORY_SIZE, R)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -150,8 +151,7 @@ def point_functions(precision: str) -> tuple[Any, Any, Any, Any]:
         p_yz = history[first + 3]
         p_xz = history[first + 4]
         eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
-        H = R(scale) * law[m, 3]
-        return j2_return(elastic, eps_p, history[first + 5], G, R(scale) * law[m, 2], H, law[m, 4])
+        return return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
 
     @wp.func
     def force_of_edge(S: mat33, pressure: R, b: vec3):
@@ -170,13 +170,14 @@ def point_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def force_kernel(precision: str, plastic: bool) -> Any:
-    """Kernel: forces of each patch on its nodes, and the plastic history where `plastic`."""
+def force_kernel(precision: str, law_name: str) -> Any:
+    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     force_pool, _ = shared_functions(precision)
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
+    plastic = bool(law_name)
     # otherwise lanes of elements that yield still need the nodes of this patch where those of the next would go
     early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
@@ -186,8 +187,8 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     elastic_forces = elastic_function(precision)
     add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
     to_point_lines, to_corners, lane_sum = lane_functions(precision)
-    shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision)
-    size, last = j2.HISTORY_SIZE, j2.HISTORY_SIZE - 1
+    shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
+    size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
     scale = LINE_SCALE**3
 

@@ -12,17 +12,17 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.fused import NOTHING, fused
 from warp_mca.kernels.hexahedron import history_functions, load_function, store_function, stress_function
 from warp_mca.kernels.kinematics import kinematics
+from warp_mca.kernels.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
 from warp_mca.kernels.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
 # Rows of the history beside those of the plastic strain: plastic hourglass amplitudes, and the energy they took [J].
-_AMPLITUDES = j2.HISTORY_SIZE
+_AMPLITUDES = HISTORY_SIZE
 _DISSIPATED = _AMPLITUDES + 12
 HISTORY_ROWS = _DISSIPATED + 1
 
@@ -115,7 +115,7 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any, Any, Any]:
+def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
@@ -129,7 +129,8 @@ def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any,
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
-    j2_return = j2.return_map(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
     dilation_of, deviator, nominal, pressure_of = k.dilation, k.deviator, k.nominal, k.pressure
 
@@ -166,7 +167,7 @@ def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any,
                 eps_p, p = read_plastic_strain(history_out, 0, e)
                 q_p = read_amplitudes(history_out, e)
                 q = q - q_p
-            S, eps_new, p_new = j2_return(S, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
+            S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
             if p_new > p:
                 write_plastic_strain(history_out, 0, e, eps_new, p_new)
                 # the flow rule at a point is linear in its stress: the part about the mean relaxes by 3 G dp / S_eq
@@ -204,13 +205,13 @@ def element_functions(precision: str, plastic: bool, finite: bool) -> tuple[Any,
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
-    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`."""
+def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     load_element = load_function(precision)
     to_patterns, _ = pattern_functions(precision)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, finite)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
     store_force = store_function(precision)
 
     # ln(1 + x) of small x needs the rounding that fast math gives away
@@ -240,7 +241,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 
 
 @cache
-def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
     t = scalars(precision)
     R, mat33, mat43 = t.real, t.mat33, t.mat43
@@ -251,7 +252,8 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
     read_amplitudes, _ = amplitude_functions(precision)
-    plastic_energy = j2.plastic_energy(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
     k = kinematics(precision, finite)
     dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
 
@@ -283,7 +285,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         if wp.static(plastic):
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
-                dissipated = volume * plastic_energy(eps_p, p, law[m, 2], law[m, 3], law[m, 4])
+                dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
                 dissipated += history[wp.static(_DISSIPATED), e]
         q = amplitudes(x, du, H_world, W)
         if wp.static(plastic):
@@ -304,7 +306,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 
 
 @cache
-def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
@@ -313,6 +315,7 @@ def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
     load_element = load_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
+    plastic = bool(law_name)
     write_stress = stress_function(precision)
     k = kinematics(precision, finite)
     dilation_of, deviator, pressure_of, cauchy = k.dilation, k.deviator, k.pressure, k.cauchy

@@ -36,8 +36,8 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def force_kernel(precision: str, plastic: bool) -> Any:
-    """Kernel: forces of each patch on its nodes, and the plastic history where `plastic`."""
+def force_kernel(precision: str, law_name: str) -> Any:
+    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
@@ -48,7 +48,7 @@ def force_kernel(precision: str, plastic: bool) -> Any:
     _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, plastic, False)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False)
 
     @wp.kernel(
         enable_backward=False,

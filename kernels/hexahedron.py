@@ -9,8 +9,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.fused import fused
+from warp_mca.kernels.laws import HISTORY_SIZE
 from warp_mca.kernels.rotation import nearest_rotation
 from warp_mca.kernels.scalars import scalars
 
@@ -237,7 +237,7 @@ def load_function(precision: str) -> Any:
 
 @cache
 def history_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that read and write the J2 history of one integration point.
+    """Functions that read and write the plastic history of one integration point.
 
     Points g and g + 4, which differ along zeta, lie side by side: a lane of `kernels.hex8_patch` takes both.
     """
@@ -246,7 +246,7 @@ def history_functions(precision: str) -> tuple[Any, Any]:
 
     @wp.func
     def read_plastic_strain(history: wp.array2d(dtype=R), point: int, e: int):
-        k = (2 * (point & 3) + (point >> 2)) * wp.static(j2.HISTORY_SIZE)
+        k = (2 * (point & 3) + (point >> 2)) * wp.static(HISTORY_SIZE)
         xx = history[k, e]
         yy = history[k + 1, e]
         xy = history[k + 2, e]
@@ -256,7 +256,7 @@ def history_functions(precision: str) -> tuple[Any, Any]:
 
     @wp.func
     def write_plastic_strain(history_out: wp.array2d(dtype=R), point: int, e: int, eps_p: mat33, p: R):
-        k = (2 * (point & 3) + (point >> 2)) * wp.static(j2.HISTORY_SIZE)
+        k = (2 * (point & 3) + (point >> 2)) * wp.static(HISTORY_SIZE)
         history_out[k, e] = eps_p[0, 0]
         history_out[k + 1, e] = eps_p[1, 1]
         history_out[k + 2, e] = eps_p[0, 1]

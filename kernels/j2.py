@@ -13,21 +13,33 @@ from warp_mca.kernels.scalars import THIRD, scalars
 
 wp.set_module_options({"enable_backward": False})
 
-HISTORY_SIZE = 6  # xx, yy, xy, yz, xz of the plastic strain, and the equivalent plastic strain
+
+@cache
+def parameters(precision: str) -> Any:
+    """The function (law, m, scale) -> (sigma_y, H, beta) of row m of `Model.law`; sigma_y, H [Pa] times `scale`."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+
+    @wp.func
+    def j2_parameters(law: wp.array2d(dtype=R), m: int, scale: R):
+        return vec3(scale * law[m, 2], scale * law[m, 3], law[m, 4])
+
+    return j2_parameters
 
 
 @cache
 def return_map(precision: str) -> Any:
-    """The function (elastic, eps_p, p, G, sigma_y, H, beta) -> (S, eps_p, p) in the scalars of `precision`.
+    """The function (elastic, eps_p, p, G, c) -> (S, eps_p, p) in the scalars of `precision`; c: sigma_y, H, beta.
 
     elastic: 2 G e of the deviatoric strain e [Pa], which callers often have already; eps_p: plastic strain [-],
     symmetric and traceless; p: equivalent plastic strain [-]; G, sigma_y, H [Pa]; beta [-]; S: deviatoric stress [Pa].
     """
     t = scalars(precision)
-    R, mat33 = t.real, t.mat33
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
 
     @wp.func
-    def j2_return(elastic: mat33, eps_p: mat33, p: R, G: R, sigma_y: R, H: R, beta: R):
+    def j2_return(elastic: mat33, eps_p: mat33, p: R, G: R, c: vec3):
+        sigma_y, H, beta = c[0], c[1], c[2]
         xi = elastic - (R(2.0) * G + R(2.0) * R(THIRD) * (R(1.0) - beta) * H) * eps_p
         shear2 = xi[0, 1] * xi[0, 1] + xi[1, 2] * xi[1, 2] + xi[0, 2] * xi[0, 2]
         direct2 = xi[0, 0] * xi[0, 0] + xi[1, 1] * xi[1, 1] + xi[2, 2] * xi[2, 2]
@@ -44,15 +56,16 @@ def return_map(precision: str) -> Any:
 
 @cache
 def plastic_energy(precision: str) -> Any:
-    """The function (eps_p, p, sigma_y, H, beta) -> plastic work per volume [J/m^3]: a function of state here.
+    """The function (eps_p, p, c) -> plastic work per volume [J/m^3]: a function of state here; c: sigma_y, H, beta.
 
     The integral of sigma : d eps_p = sigma_y p + beta H p^2 / 2 + (1 - beta) H (eps_p : eps_p) / 3.
     """
     t = scalars(precision)
-    R, mat33 = t.real, t.mat33
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
 
     @wp.func
-    def j2_plastic_energy(eps_p: mat33, p: R, sigma_y: R, H: R, beta: R):
+    def j2_plastic_energy(eps_p: mat33, p: R, c: vec3):
+        sigma_y, H, beta = c[0], c[1], c[2]
         stored = (R(1.0) - beta) * H * wp.ddot(eps_p, eps_p) / R(3.0)
         return sigma_y * p + R(0.5) * beta * H * p * p + stored
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hexahedron import history_functions, stress_function
 from warp_mca.kernels.kinematics import kinematics
+from warp_mca.kernels.laws import law_functions
 from warp_mca.kernels.overlap import begins_early, wait_for_previous
 from warp_mca.kernels.patterns import mean_frame
 from warp_mca.kernels.scalars import THIRD, scalars
@@ -103,13 +103,14 @@ def average_kernel(precision: str) -> Any:
 
 
 @cache
-def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
-    """Kernel: forces of each element on its nodes, and the plastic history where `plastic`."""
+def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     tet_gradient = gradient_function(precision, finite)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
-    j2_return = j2.return_map(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
     add_matrices = fused(precision).add_matrices
     k = kinematics(precision, finite)
     deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
@@ -146,7 +147,7 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
             flag = yielded_out[e]
             if flag != 0:
                 eps_p, p = read_plastic_strain(history_out, 0, e)
-            S, eps_new, p_new = j2_return(S, eps_p, p, G, law[m, 2], law[m, 3], law[m, 4])
+            S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
             if p_new > p:
                 write_plastic_strain(history_out, 0, e, eps_new, p_new)
                 if flag == 0:
@@ -166,13 +167,14 @@ def force_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 
 
 @cache
-def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     tet_gradient = gradient_function(precision, finite)
     read_plastic_strain, _ = history_functions(precision)
-    plastic_energy = j2.plastic_energy(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
     k = kinematics(precision, finite)
     deviator, volumetric_energy = k.deviator, k.volumetric_energy
 
@@ -202,7 +204,7 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
         if wp.static(plastic):
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
-                dissipated = volume * plastic_energy(eps_p, p, law[m, 2], law[m, 3], law[m, 4])
+                dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
         elastic += law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
         identity = wp.identity(n=3, dtype=R)
         energy_out[0, first + e] = volume * elastic
@@ -215,12 +217,13 @@ def energy_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
 
 
 @cache
-def stress_kernel(precision: str, plastic: bool, finite: bool = False) -> Any:
+def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     tet_gradient = gradient_function(precision, finite)
     read_plastic_strain, _ = history_functions(precision)
+    plastic = bool(law_name)
     write_stress = stress_function(precision)
     k = kinematics(precision, finite)
     deviator, pressure_of, cauchy = k.deviator, k.pressure, k.cauchy

@@ -13,6 +13,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels import hex8
 from warp_mca.kernels.rotation import nearest_rotation
 from warp_mca.kernels.scalars import scalars
+from warp_mca.materials import Elastic, J2Bilinear
 from warp_mca.timestep import stable_step
 
 K, G = 50.7e9, 27.6e9
@@ -38,6 +39,7 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
     """Forces on nodes (node_count, 3) and energies (4, element_count) of a displacement field."""
     t = scalars(precision)
     plastic, count = sigma_y is not None, len(hexahedra)
+    law_name = J2Bilinear.law if plastic else Elastic.law
     with wp.ScopedDevice("cpu"):
         arrays = [
             wp.array(X, dtype=wp.vec3d),
@@ -49,9 +51,9 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         field = wp.array(u, dtype=wp.vec3d)
         force = wp.full(8 * count, np.nan, dtype=t.vec3)
         energy = wp.full((5, count), np.nan, dtype=t.real)
-        kernel = hex8.force_kernel(precision, plastic)
+        kernel = hex8.force_kernel(precision, law_name)
         wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[*history, force])
-        kernel = hex8.energy_kernel(precision, plastic)
+        kernel = hex8.energy_kernel(precision, law_name)
         wp.launch(kernel, count, inputs=[*arrays, law, *history, field, 0], outputs=[energy])
     total = np.zeros_like(X)
     for a in range(8):

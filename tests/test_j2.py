@@ -16,7 +16,7 @@ class Point:
 
     def __init__(self, precision: str, beta: float) -> None:
         t = scalars(precision)
-        R, mat33 = t.real, t.mat33
+        R, vec3, mat33 = t.real, t.vec3, t.mat33
         j2_return, j2_energy = return_map(precision), plastic_energy(precision)
 
         @wp.kernel(enable_backward=False, module="unique")
@@ -28,11 +28,12 @@ class Point:
             S_out: wp.array(dtype=mat33),
             w_out: wp.array(dtype=R),
         ):
-            S, eps_new, p_new = j2_return(R(2.0) * R(G) * e[0], eps_p[0], p[0], R(G), R(SIGMA_Y), R(H), beta)
+            c = vec3(R(SIGMA_Y), R(H), beta)
+            S, eps_new, p_new = j2_return(R(2.0) * R(G) * e[0], eps_p[0], p[0], R(G), c)
             eps_p[0] = eps_new
             p[0] = p_new
             S_out[0] = S
-            w_out[0] = j2_energy(eps_new, p_new, R(SIGMA_Y), R(H), beta)
+            w_out[0] = j2_energy(eps_new, p_new, c)
 
         self.kernel, self.mat33, self.beta = drive, mat33, beta
         self.eps_p, self.p = (wp.zeros(1, dtype=kind, device="cpu") for kind in (mat33, R))
@@ -110,7 +111,7 @@ def test_plastic_energy_is_the_integral_of_stress_over_plastic_strain(beta):
 def test_rounding_of_many_small_steps_does_not_add_up():
     """Sixty thousand steps to and fro: p is what ten strokes add up to, but for what one rounding makes of it."""
     t = scalars("mixed")
-    R, D, mat33, j2_return = t.real, wp.float64, t.mat33, return_map("mixed")
+    R, D, vec3, mat33, j2_return = t.real, wp.float64, t.vec3, t.mat33, return_map("mixed")
     e_yield, steps = SIGMA_Y / (3.0 * G), 6_000
     peak = 5.0 * e_yield
 
@@ -128,7 +129,7 @@ def test_rounding_of_many_small_steps_does_not_add_up():
             )
             if k > wp.static(steps // 2):  # from rest
                 elastic = R(D(2.0) * D(G) * e) * wp.diag(wp.vec3(1.0, -0.5, -0.5))
-                _, eps_p, p = j2_return(elastic, eps_p, p, R(G), R(SIGMA_Y), R(H), R(0.0))
+                _, eps_p, p = j2_return(elastic, eps_p, p, R(G), vec3(R(SIGMA_Y), R(H), R(0.0)))
         p_out[i] = p
 
     p = wp.zeros(20, dtype=R, device="cpu")

@@ -11,11 +11,13 @@ import warp as wp
 from warp_mca import overlap as module
 from warp_mca.kernels import constraint, contact, hex8_patch, hex8r_patch, node, patch, tet4
 from warp_mca.kernels.overlap import EARLY, LEAST_ARCH
+from warp_mca.materials import Elastic, J2Bilinear
 from warp_mca.overlap import overlap
 
 KERNELS = Path(node.__file__).parent
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
 TWO = (("mixed", False), ("float64", True))
+LAWS = {False: Elastic.law, True: J2Bilinear.law}
 VARIANTS = {
     "integrate": [node.integrate_kernel(p, not m, True, m, m, m) for p, m in TWO],
     "advance_bound": [constraint.bound_kernel(p, m, m) for p, m in TWO],
@@ -24,9 +26,9 @@ VARIANTS = {
     "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
     "tet4_dilation": [tet4.dilation_kernel(p, m) for p, m in TWO],
     "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],
-    "tet4_force": [tet4.force_kernel(p, m, False) for p, m in TWO],
-    "hex8_patch_force": [hex8_patch.force_kernel(p, not m) for p, m in TWO],
-    "hex8r_patch_force": [hex8r_patch.force_kernel(p, not m) for p, m in TWO],
+    "tet4_force": [tet4.force_kernel(p, LAWS[m], False) for p, m in TWO],
+    "hex8_patch_force": [hex8_patch.force_kernel(p, LAWS[not m]) for p, m in TWO],
+    "hex8r_patch_force": [hex8r_patch.force_kernel(p, LAWS[not m]) for p, m in TWO],
 }
 # Reads ahead of the wait: the first two slots and the mass of a node; head, corners and points of patches.
 READS = {"integrate": 3, "hex8_patch_force": 15, "hex8r_patch_force": 15}

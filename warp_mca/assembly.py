@@ -12,7 +12,7 @@ from warp_mca.elements import ELEMENTS, Element
 from warp_mca.elements.hexahedron import CHUNK, chunks
 from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.materials import Elastic, J2Bilinear
+from warp_mca.materials import Material
 from warp_mca.patches import PATCH, compact_order
 from warp_mca.scene import Body, Point, Scene, Surface
 from warp_mca.surfaces import Faces, make_faces
@@ -31,7 +31,7 @@ class Block:
 
     Attributes:
         element: name of their formulation.
-        plastic: whether they keep a plastic history.
+        law: module of the law by which they flow, as `Elastic.law`; empty where they keep no plastic history.
         finite: whether strains may be large.
         conn: nodes of each element, shape (corners, element_count), int32.
         material: row of `Model.law`, shape (element_count,), int32.
@@ -40,7 +40,7 @@ class Block:
     """
 
     element: str
-    plastic: bool
+    law: str
     finite: bool
     conn: Index
     material: Index
@@ -48,18 +48,23 @@ class Block:
     ends: tuple[int, ...] = ()
 
     @property
-    def kind(self) -> tuple[bool, str, bool]:
-        """What tells it from other blocks: not plastic, element, finite. Blocks of a model stand in this order."""
-        return not self.plastic, self.element, self.finite
+    def plastic(self) -> bool:
+        """Whether they keep a plastic history."""
+        return bool(self.law)
+
+    @property
+    def kind(self) -> tuple[bool, str, str, bool]:
+        """What tells it from other blocks: not plastic, law, element, finite. Blocks of a model stand in this order."""
+        return not self.plastic, self.law, self.element, self.finite
 
 
-def body_materials(body: Body, mesh: Mesh) -> list[tuple[Elastic, Index]]:
+def body_materials(body: Body, mesh: Mesh) -> list[tuple[Material, Index]]:
     """Materials of a body with the cells that each fills; together they fill the body.
 
     Raises:
         RequestError: a named cell set is unknown, or cells are left without material or have two.
     """
-    if isinstance(body.material, Elastic):
+    if isinstance(body.material, Material):
         return [(body.material, np.arange(mesh.cell_count, dtype=np.int32))]
     owner = np.full(mesh.cell_count, -1, dtype=np.int32)
     listed = list(body.material.items())
@@ -169,7 +174,7 @@ class Assembly:
         self.element_count = elements
         self.X = np.concatenate([X[body.name] for body in scene.bodies])
         self.cells = self._merged_cells()
-        self.materials: list[Elastic] = []
+        self.materials: list[Material] = []
         self.material = np.empty(elements, dtype=np.int32)
         for body in scene.bodies:
             for material, cells in body_materials(body, meshes[body.name]):
@@ -206,20 +211,18 @@ class Assembly:
         ]
 
     def law(self) -> Array:
-        """Rows of K, G, sigma_y, H, beta; an elastic material never yields."""
-        rows = []
-        for m in self.materials:
-            plastic = (m.sigma_y, m.hardening_modulus, m.beta) if isinstance(m, J2Bilinear) else (0.0, 0.0, 0.0)
-            rows.append((m.bulk_modulus, m.shear_modulus, *plastic))
-        return np.array(rows)
+        """Parameters of each material, followed by zeros up to the length of the longest."""
+        rows = [m.parameters for m in self.materials]
+        width = max(map(len, rows))
+        return np.array([(*row, *[0.0] * (width - len(row))) for row in rows])
 
     def blocks(self) -> tuple[tuple[Block, ...], Index]:
         """Elements grouped by kernels, those of a patch together, and the order that this gives them."""
-        plastic = np.array([isinstance(m, J2Bilinear) for m in self.materials])[self.material]
         blocks, order, first = [], [], 0
-        for flag in (True, False):
+        for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
+            flowing = np.array([m.law == law for m in self.materials])[self.material]
             for part in self.cells:
-                mine = np.flatnonzero(plastic[part.index] == flag)
+                mine = np.flatnonzero(flowing[part.index])
                 if len(mine):
                     if part.element.corners == 8:  # tetrahedra are not computed by patches
                         mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
@@ -227,7 +230,7 @@ class Assembly:
                     blocks.append(
                         Block(
                             element=part.element.name,
-                            plastic=flag,
+                            law=law,
                             finite=part.finite,
                             conn=np.ascontiguousarray(part.conn[mine].T),
                             material=self.material[index],

@@ -42,7 +42,7 @@ def join_models(models: Sequence[Model]) -> Model:
         V=np.concatenate([model.V for model in models]),
         mass=np.concatenate([model.mass for model in models]),
         blocks=blocks,
-        law=np.concatenate([model.law for model in models]),
+        law=_laws(models),
         fixed_axes=np.concatenate([model.fixed_axes for model in models]),
         prescribed_node=shifted("prescribed_node", nodes),
         prescribed_axis=np.concatenate([model.prescribed_axis for model in models]),
@@ -93,11 +93,11 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
-        elastic, element, finite = kind
+        _, law, element, finite = kind
         blocks.append(
             Block(
                 element=element,
-                plastic=not elastic,
+                law=law,
                 finite=finite,
                 conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),
@@ -107,6 +107,12 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
         )
         first = end
     return tuple(blocks), np.concatenate(order), ranges
+
+
+def _laws(models: Sequence[Model]) -> NDArray[np.float64]:
+    """Parameters of the materials of all scenes, as `Model.law`."""
+    width = max(model.law.shape[1] for model in models)
+    return np.concatenate([np.pad(model.law, ((0, 0), (0, width - model.law.shape[1]))) for model in models])
 
 
 def _tables(models: Sequence[Model]) -> dict[str, NDArray]:

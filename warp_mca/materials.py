@@ -1,12 +1,14 @@
 """Owns the public vocabulary of materials: moduli, densities and yield, checked.
 
-A material is plain, immutable data; it raises `RequestError` with the field, the value and the remedy.
+A material is plain, immutable data; it raises `RequestError` with the field, the value and the remedy. A new one names
+the module of its law, gives its parameters, and has a place in the table `MATERIALS`.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from warp_mca import validate
 from warp_mca.errors import bad_value
@@ -20,11 +22,13 @@ class Elastic:
         E: Young's modulus [Pa].
         nu: Poisson's ratio [-], in (-1, 0.5).
         rho: density [kg/m^3].
+        law: module of the law by which it flows, as `warp_mca.kernels.laws` asks for it; empty where it never does.
     """
 
     E: float
     nu: float
     rho: float
+    law: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         validate.positive(type(self).__name__, E=self.E, rho=self.rho)
@@ -40,6 +44,16 @@ class Elastic:
     def shear_modulus(self) -> float:
         """G = E / (2 (1 + nu)) [Pa]."""
         return self.E / (2.0 * (1.0 + self.nu))
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Its row of `Model.law`: K, G [Pa], then the initial yield stress [Pa] and what else its law reads."""
+        return self.bulk_modulus, self.shear_modulus
+
+    @property
+    def yield_stress(self) -> float:
+        """Von Mises stress at which it first flows [Pa], infinite where it never does."""
+        return self.parameters[2] if self.law else math.inf
 
     @property
     def wave_speeds(self) -> dict[str, float]:
@@ -62,6 +76,7 @@ class J2Bilinear(Elastic):
     sigma_y: float
     E_t: float
     beta: float = 0.0
+    law = "warp_mca.kernels.j2"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,5 +91,12 @@ class J2Bilinear(Elastic):
         """H = E E_t / (E - E_t) [Pa], the slope of yield stress over equivalent plastic strain."""
         return self.E * self.E_t / (self.E - self.E_t)
 
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """K, G, sigma_y, H [Pa] and beta [-]."""
+        return *super().parameters, self.sigma_y, self.hardening_modulus, self.beta
 
-Material = Elastic | J2Bilinear
+
+Material = Elastic  # a name for any of these: all are elastic first
+
+MATERIALS: dict[str, type[Material]] = {kind.__name__: kind for kind in (Elastic, J2Bilinear)}

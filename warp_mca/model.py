@@ -34,7 +34,8 @@ class Model:
         V: initial velocities [m/s], shape (node_count, 3), float64.
         mass: lumped masses [kg], shape (node_count,), float64.
         blocks: elements by kernel.
-        law: K, G, sigma_y, H [Pa] and beta [-] of each material, shape (material_count, 5), float64.
+        law: parameters of each material, as `Elastic.parameters` has them, then zeros, shape (material_count,
+            parameters of the longest), float64.
         fixed_axes: bits 0, 1, 2 hold the axes x, y, z of each node, shape (node_count,), int32.
         prescribed_node, prescribed_axis, prescribed_table: one entry for each driven axis of a node, int32.
         table_offset: start of each table, shape (table_count + 1,), int32.

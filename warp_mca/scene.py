@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 from warp_mca import validate
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
-from warp_mca.materials import Elastic, J2Bilinear, Material
+from warp_mca.materials import MATERIALS, Material
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -57,8 +57,9 @@ class Body:
         if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
             raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
         materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
-        if not all(type(material) in (Elastic, J2Bilinear) for material in materials):  # others have no kernels
-            remedy = "give an Elastic or a J2Bilinear, no class made of them, or one for each cell set"
+        if not all(type(material) in MATERIALS.values() for material in materials):  # others have no kernels
+            known = " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in MATERIALS)
+            remedy = f"give {known}, no class made of them, or one for each cell set"
             raise bad_value(f"Body {self.name}.material", self.material, remedy)
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")

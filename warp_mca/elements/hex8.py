@@ -24,6 +24,6 @@ class Hex8:
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
         from warp_mca.elements.patch_stage import hexahedral_stage
-        from warp_mca.kernels import hex8, hex8_patch, j2
+        from warp_mca.kernels import hex8, hex8_patch
 
-        return hexahedral_stage(block, X, precision, hex8, hex8_patch, points=8, rows=8 * j2.HISTORY_SIZE)
+        return hexahedral_stage(block, X, precision, hex8, hex8_patch, points=8)

@@ -27,11 +27,18 @@ class PatchStage(ElementStage):
     """
 
     def __init__(
-        self, block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
+        self,
+        block: Block,
+        X: Array,
+        precision: str,
+        kernels: Any,
+        patch_kernels: Any,
+        points: int,
+        rows: int | None = None,
     ) -> None:
         """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points, rows)
-        self.force_kernel = patch_kernels.force_kernel(precision, block.plastic)
+        self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
         host = make_patches(block.conn, block.ends, SLOTS[precision], X if mixed else None)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
@@ -81,7 +88,13 @@ class PatchStage(ElementStage):
 
 
 def hexahedral_stage(
-    block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int, rows: int
+    block: Block,
+    X: Array,
+    precision: str,
+    kernels: Any,
+    patch_kernels: Any,
+    points: int,
+    rows: int | None = None,
 ) -> ElementStage:
     """By patches on a GPU at small strain, one by one otherwise; arguments as `ElementStage`, `PatchStage`."""
     if block.finite or not wp.get_device().is_cuda:

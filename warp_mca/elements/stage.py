@@ -9,8 +9,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels import j2
 from warp_mca.kernels.lanes import side_by_side
+from warp_mca.kernels.laws import HISTORY_SIZE
 from warp_mca.kernels.scalars import scalars
 from warp_mca.patches import PATCH
 from warp_mca.threads import ELEMENTS, Split, whole
@@ -58,8 +58,8 @@ class ElementStage:
         kept = self.count if block.plastic else 0
         self.yielded = wp.zeros(kept, dtype=wp.int32)
         self.points = points
-        self.history = wp.zeros((rows or points * j2.HISTORY_SIZE, kept), dtype=scalars(precision).real)
-        kind = (precision, block.plastic, block.finite)
+        self.history = wp.zeros((rows or points * HISTORY_SIZE, kept), dtype=scalars(precision).real)
+        kind = (precision, block.law, block.finite)
         self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
         self.energy_kernel = side_by_side(kernels.energy_kernel(*kind), large=block.finite)
         self.stress_kernel = side_by_side(kernels.stress_kernel(*kind), large=block.finite)
@@ -120,7 +120,7 @@ class ElementStage:
         """Greatest equivalent plastic strain of any point of a range of elements [-]."""
         if not self.block.plastic or part.start == part.stop:
             return 0.0
-        last = self.history[j2.HISTORY_SIZE - 1 : self.points * j2.HISTORY_SIZE : j2.HISTORY_SIZE, part]
+        last = self.history[HISTORY_SIZE - 1 : self.points * HISTORY_SIZE : HISTORY_SIZE, part]
         return float(last.numpy().max())
 
 

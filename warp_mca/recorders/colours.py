@@ -7,11 +7,13 @@ off by more than 2 of 255 from matplotlib's, which need not be imported.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.errors import bad_value
-from warp_mca.materials import J2Bilinear
+from warp_mca.materials import Material
 from warp_mca.scene import Scene
 from warp_mca.validate import brief, is_number
 
@@ -83,10 +85,11 @@ class ColourScale:
             RequestError: `limit` is not a finite number above 0.
         """
         check_limit(limit)
-        found = [m.sigma_y for m in _materials(scene) if isinstance(m, J2Bilinear)]
-        self.fixed = limit is not None or bool(found)
-        self.limit = limit if limit is not None else min(found, default=0.0)
-        self.origin = "as asked" if limit is not None else "yield stress" if found else "greatest so far"
+        lowest = min((m.yield_stress for m in _materials(scene)), default=math.inf)
+        yields = math.isfinite(lowest)
+        self.fixed = limit is not None or yields
+        self.limit = limit if limit is not None else lowest if yields else 0.0
+        self.origin = "as asked" if limit is not None else "yield stress" if yields else "greatest so far"
 
     def include(self, greatest: float) -> bool:
         """Let a running scale grow to `greatest` [Pa]; whether the limit changed."""
@@ -102,8 +105,8 @@ class ColourScale:
         return f"von Mises stress [MPa], square-root scale, {kind} ({self.origin})"
 
 
-def _materials(scene: Scene) -> list[object]:
-    found: list[object] = []
+def _materials(scene: Scene) -> list[Material]:
+    found: list[Material] = []
     for body in scene.bodies:
         found += [body.material] if not hasattr(body.material, "values") else list(body.material.values())  # pyright: ignore
     return found

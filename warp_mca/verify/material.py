@@ -270,12 +270,13 @@ def yield_surface(setup: Setup) -> list[Row]:
     rows = []
     for precision, rounding in (("mixed", 2.0**-24), ("float64", 2.0**-53)):
         t = scalars(precision)
-        numbers = [np.full(count, value) for value in (G, SIGMA_Y, H)]
+        limits = np.stack([np.full(count, SIGMA_Y), np.full(count, H), share], axis=1)
         tensor = [wp.array(a, dtype=t.mat33, device=setup.device) for a in (2.0 * G * strain, before)]
-        scalar = [wp.array(a, dtype=t.real, device=setup.device) for a in (passed, *numbers, share)]
-        found: Any = wp.map(return_map(precision), *tensor, *scalar, device=setup.device)
+        scalar = [wp.array(a, dtype=t.real, device=setup.device) for a in (passed, np.full(count, G))]
+        c = wp.array(limits, dtype=t.vec3, device=setup.device)
+        found: Any = wp.map(return_map(precision), *tensor, *scalar, c, device=setup.device)
         S, plastic, p = (np.asarray(item.numpy(), dtype=np.float64) for item in found)
-        beta = scalar[-1].numpy().astype(np.float64)
+        beta = c.numpy()[:, 2].astype(np.float64)
         xi = S - (2.0 / 3.0 * (1.0 - beta) * H)[:, None, None] * plastic
         off = np.abs(np.sqrt(1.5 * (xi**2).sum(axis=(1, 2))) - SIGMA_Y - beta * H * p)
         trial = np.sqrt(6.0 * G * G * ((strain - before) ** 2).sum(axis=(1, 2)))

@@ -255,9 +255,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "beta_swapped": Mutation(
         "isotropic and kinematic hardening are swapped: 1 - beta is taken for beta",
-        "warp_mca/assembly.py",
-        "m.hardening_modulus, m.beta)",
-        "m.hardening_modulus, 1.0 - m.beta)",
+        "warp_mca/materials.py",
+        "self.hardening_modulus, self.beta",
+        "self.hardening_modulus, 1.0 - self.beta",
     ),
     "friction_limit_ignored": Mutation(
         "friction has no limit",
