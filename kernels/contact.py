@@ -6,12 +6,11 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
-from warp_mca.kernels.friction import release, stick_slip
-from warp_mca.kernels.ledger import run_of
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, TURNED, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
+from warp_mca.kernels.spring import ANY_DEPTH, FAR, Spring, open_function, spring_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -22,87 +21,8 @@ _FOLD = 0.01  # of an edge: how much deeper a node may be at once in a neighbour
 _SLACK = 1e-4  # of an edge, that a node may be deeper in a face than it can have moved
 _RIM = 1e-4  # of half an edge, that a node may lie off a face and still count as above it
 _ABOVE = 0.04  # of an edge: who arrives beside a face, nearer than this above another, passes by
-_FAR = 1e30  # further than anything [m]
 _SHARP = 0.7  # cosine between normals below which a node that goes from one face to the next turned a sharp edge
 _TURN = -0.9  # least cosine between the normals of a face that presses a node and of the next that does
-
-# Depth before the first step: bodies may overlap from the start.
-ANY_DEPTH = _FAR
-
-
-@wp.struct
-class Spring:
-    """State of every slave node's springs; arrays have shape (slave_count,).
-
-    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1.
-    weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
-    far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
-    force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
-    penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
-    in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
-    """
-
-    tangential: wp.array(dtype=wp.vec3d)
-    force: wp.array(dtype=wp.vec3d)
-    face: wp.array(dtype=wp.int32)
-    weight: wp.array(dtype=wp.vec4d)
-    energy: wp.array(dtype=wp.float64)
-    friction: wp.array(dtype=wp.float64)
-    drive: wp.array(dtype=wp.float64)
-    impulse: wp.array(dtype=wp.vec3d)
-    normal_impulse: wp.array(dtype=wp.float64)
-    stick_impulse: wp.array(dtype=wp.float64)
-    depth: wp.array(dtype=wp.float64)
-    held: wp.array(dtype=wp.float64)
-
-
-@cache
-def spring_function(friction: bool) -> Any:
-    """The function that turns a gap into force and bookkeeping; without `friction` it has no tangential part."""
-
-    @wp.func
-    def press(s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k: wp.float64, mu: wp.float64, spring: Spring):
-        # all is read before anything is written, so that a GPU waits for memory once
-        impulse = spring.impulse[s]
-        normal_impulse = spring.normal_impulse[s]
-        depth = spring.depth[s]
-        Fn = -k * gap
-        force = Fn * normal
-        squares = Fn * Fn
-        if wp.static(friction):
-            friction_work = spring.friction[s]
-            stick_impulse = spring.stick_impulse[s]
-            Ft, work, stick = stick_slip(spring.tangential[s], du, normal, mu * Fn, k)
-            force += Ft
-            squares += wp.dot(Ft, Ft)
-            spring.tangential[s] = Ft
-            spring.friction[s] = friction_work + work
-            if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
-                spring.stick_impulse[s] = stick_impulse + Fn
-        spring.energy[s] = wp.float64(0.5) * squares / k
-        spring.force[s] = force
-        spring.impulse[s] = impulse + force
-        spring.normal_impulse[s] = normal_impulse + Fn
-        spring.depth[s] = wp.max(depth, -gap)
-        return force
-
-    return press
-
-
-@cache
-def open_function(friction: bool) -> Any:
-    """The function that clears the springs of a node that lost its contact."""
-
-    @wp.func
-    def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):
-        if wp.static(friction):
-            spring.friction[s] = spring.friction[s] + release(spring.tangential[s], du, k)
-            spring.tangential[s] = wp.vec3d()
-        spring.energy[s] = wp.float64(0.0)
-        spring.force[s] = wp.vec3d()
-        spring.face[s] = -1
-
-    return open_contact
 
 
 @wp.func
@@ -134,11 +54,136 @@ def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.
 
 
 @wp.func
-def is_beside(at: wp.vec2d, triangle: bool) -> bool:
-    """Whether a point at these coordinates of a face, as `weights_at` takes them, lies beside it."""
+def is_beside(at: wp.vec2d, triangle: bool, rim: wp.float64) -> bool:
+    """Whether a point at these coordinates of a face, as `weights_at` has them, is beside it by `rim` half edges."""
     if triangle:
-        return wp.min(at[0], wp.min(at[1], wp.float64(1.0) - at[0] - at[1])) < wp.float64(wp.static(-0.5 * _RIM))
-    return wp.max(wp.abs(at[0]), wp.abs(at[1])) > wp.float64(wp.static(1.0 + _RIM))
+        return wp.min(at[0], wp.min(at[1], wp.float64(1.0) - at[0] - at[1])) < wp.float64(-0.5) * rim
+    return wp.max(wp.abs(at[0]), wp.abs(at[1])) > wp.float64(1.0) + rim
+
+
+@wp.func
+def nearest_face(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    candidate: wp.array2d(dtype=wp.int32),
+    s: int,
+    count: int,
+    x: wp.vec3d,
+    along: wp.vec3f,
+):
+    """Of the faces in row s of the lists the one that may press a node at x, on which a force `along` acts.
+
+    Of those below which it lies the shallowest counts, and where there is none the deepest of those that it lies
+    beside, as a concave fold asks for. None does that would press the node back where the last one did not let it go:
+    the other side of a thin body.
+
+    Returns the face or -1, gap, normal, natural coordinates, whether the node is beside it, a quarter of its area, the
+    distance to the nearest face that has the node in front of it, and that face.
+    """
+    f = candidate[s, 0]  # read before it is known whether there is one: memory answers late
+    best = int(-1)
+    best_gap = wp.float64(0.0)
+    best_area = wp.float64(0.0)
+    best_normal = wp.vec3d()
+    best_at = wp.vec2d()
+    best_beside = bool(False)
+    front = wp.float64(FAR)
+    open_face = int(-1)
+    for c in range(count):
+        inside, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
+        if inside:
+            area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
+            normal = (wp.float64(1.0) / area) * area_normal
+            gap = wp.dot(away, normal)
+            turn = wp.dot(wp.vec3f(normal), along)
+            kept = turn >= 0.0 or turn * turn < wp.static(_TURN**2) * wp.dot(along, along)
+            if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
+                beside = is_beside(at, triangle, wp.float64(_RIM))
+                better = (gap > best_gap) != beside
+                if beside != best_beside:
+                    better = best_beside
+                elif gap == best_gap:
+                    better = f < best  # whatever the order of the search
+                if better or best < 0:
+                    best = f
+                    best_gap = gap
+                    best_normal = normal
+                    best_at = at
+                    best_beside = beside
+                    best_area = area
+            elif gap >= wp.float64(0.0):
+                if gap < front:
+                    open_face = f
+                front = wp.min(front, gap)
+        f = candidate[s, wp.min(c + 1, candidate.shape[1] - 1)]
+    return best, best_gap, best_normal, best_at, best_beside, best_area, front, open_face
+
+
+@wp.func
+def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float64) -> bool:
+    """Whether a node that arrives beside a face flies above another one instead; arguments as of `reachable`."""
+    return beside and held == wp.float64(0.0) and front < wp.float64(_ABOVE) * edge
+
+
+@cache
+def settle_functions(friction: bool) -> tuple[Any, Any]:
+    """The functions that press a node on the face found, if it `touches` that, and that let one go which found none."""
+    press = spring_function(friction)
+    open_contact = open_function(friction)
+
+    @wp.func
+    def settle(
+        s: int,
+        scene: int,
+        f: int,
+        gap: wp.float64,
+        normal: wp.vec3d,
+        area: wp.float64,
+        weight: wp.vec4d,
+        du: wp.vec3d,
+        touches: bool,
+        front: wp.float64,
+        held: wp.float64,
+        along: wp.vec3f,
+        stiffness: wp.float64,
+        mu: wp.float64,
+        spring: Spring,
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        # a spring with neither gap nor normal has no force, and is released as an open one
+        gap_kept = wp.where(touches, gap, wp.float64(0.0))
+        normal_kept = wp.where(touches, normal, wp.vec3d())
+        force = press(s, gap_kept, normal_kept, du, stiffness, mu, spring)
+        spring.face[s] = wp.where(touches, f, -1)
+        spring.weight[s] = weight
+        spring.held[s] = wp.where(touches or front < wp.float64(FAR), -gap_kept, held)
+        if gap_kept * gap_kept > area:
+            flag_out[scene, TOO_DEEP] = 1
+        turn = wp.dot(wp.vec3f(normal_kept), along)
+        if touches and (turn < 0.0 or turn * turn < wp.static(_SHARP**2) * wp.dot(along, along)):
+            flag_out[scene, TURNED] = 1
+        return force
+
+    @wp.func
+    def let_go(
+        s: int,
+        i: int,
+        v: wp.array(dtype=wp.vec3d),
+        face: wp.array2d(dtype=wp.int32),
+        dt: wp.float64,
+        front: wp.float64,
+        held: wp.float64,
+        stiffness: wp.float64,
+        spring: Spring,
+    ):
+        if spring.face[s] >= 0:
+            du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
+            open_contact(s, du, stiffness, spring)
+        if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(FAR)):
+            spring.held[s] = wp.float64(0.0)
+
+    return settle, let_go
 
 
 @cache
@@ -150,8 +195,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
     Where there is none, the deepest of those that it lies beside does, as a concave fold asks for. None does that would
     press the node back where the last one did not let it go: the other side of a thin body.
     """
-    press = spring_function(friction)
-    open_contact = open_function(friction)
+    settle, let_go = settle_functions(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
@@ -179,71 +223,42 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
-        f = candidate[s, 0]  # read before it is known whether there is one: memory answers late
-        best = int(-1)
-        best_gap = wp.float64(0.0)
-        best_area = wp.float64(0.0)
-        best_normal = wp.vec3d()
-        best_at = wp.vec2d()
-        best_beside = bool(False)
-        front = wp.float64(_FAR)
         pressed = spring.force[s]
         if wp.static(friction):
             pressed -= spring.tangential[s]
-        along = wp.vec3f(pressed)  # of any length
         x = X[i] + u[i]
-        for c in range(count[s]):
-            inside, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
-            if inside:
-                area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
-                normal = (wp.float64(1.0) / area) * area_normal
-                gap = wp.dot(away, normal)
-                turn = wp.dot(wp.vec3f(normal), along)
-                kept = turn >= 0.0 or turn * turn < wp.static(_TURN**2) * wp.dot(along, along)
-                if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
-                    beside = is_beside(at, triangle)
-                    better = (gap > best_gap) != beside
-                    if beside != best_beside:
-                        better = best_beside
-                    elif gap == best_gap:
-                        better = f < best  # whatever the order of the search
-                    if better or best < 0:
-                        best = f
-                        best_gap = gap
-                        best_normal = normal
-                        best_at = at
-                        best_beside = beside
-                        best_area = area
-                elif gap >= wp.float64(0.0):
-                    front = wp.min(front, gap)
-            f = candidate[s, wp.min(c + 1, candidate.shape[1] - 1)]
+        along = wp.vec3f(pressed)  # of any length
+        best, best_gap, best_normal, best_at, best_beside, best_area, front, _face = nearest_face(
+            X, u, face, candidate, s, count[s], x, along
+        )
         held = spring.held[s]
         if best >= 0:
             weight = weights_at(best_at, face[best, 2] == face[best, 3])
             du = dt * (v[i] - master_velocity(v, face, best, weight))
             edge = wp.float64(2.0) * wp.sqrt(best_area)
             touches = reachable(-best_gap, held, front, wp.dot(du, best_normal), edge)
-            if best_beside and held == wp.float64(0.0) and front < wp.float64(_ABOVE) * edge:
+            if passes_by(best_beside, held, front, edge):
                 touches = bool(False)
-            # a spring with neither gap nor normal has no force, and is released as an open one
-            gap_kept = wp.where(touches, best_gap, wp.float64(0.0))
-            normal_kept = wp.where(touches, best_normal, wp.vec3d())
-            force = press(s, gap_kept, normal_kept, du, stiffness[s], of(mu, k), spring)
-            spring.face[s] = wp.where(touches, best, -1)
-            spring.weight[s] = weight
-            spring.held[s] = wp.where(touches or front < wp.float64(_FAR), -gap_kept, held)
-            contact_force_out[i] = contact_force_out[i] + force
-            if gap_kept * gap_kept > best_area:
-                flag_out[k, TOO_DEEP] = 1
-            turn = wp.dot(wp.vec3f(normal_kept), along)
-            if touches and (turn < 0.0 or turn * turn < wp.static(_SHARP**2) * wp.dot(along, along)):
-                flag_out[k, TURNED] = 1
+            contact_force_out[i] = contact_force_out[i] + settle(
+                s,
+                k,
+                best,
+                best_gap,
+                best_normal,
+                best_area,
+                weight,
+                du,
+                touches,
+                front,
+                held,
+                along,
+                stiffness[s],
+                of(mu, k),
+                spring,
+                flag_out,
+            )
         else:
-            if spring.face[s] >= 0:
-                du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
-                open_contact(s, du, stiffness[s], spring)
-            if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(_FAR)):
-                spring.held[s] = wp.float64(0.0)
+            let_go(s, i, v, face, dt, front, held, stiffness[s], spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
@@ -362,53 +377,3 @@ def plane_kernel(friction: bool, each: bool) -> Any:
             spring.drive[s] = spring.drive[s] + half * dt * wp.dot(before + spring.tangential[s], velocity)
 
     return begins_early(touch_plane)
-
-
-@wp.kernel(enable_backward=False)
-def sum_springs(
-    row: wp.array(dtype=wp.int32),
-    column: int,
-    first: wp.array(dtype=wp.int32),
-    spring: Spring,
-    partial_out: wp.array4d(dtype=wp.float64),
-):
-    """Sums over the slaves of each scene, which begin at `first`, into eight columns, as `kernels.ledger` sums.
-
-    What is summed over the record interval then starts afresh.
-    """
-    scene, k, lane = wp.tid()
-    energy = wp.float64(0.0)
-    friction = wp.float64(0.0)
-    drive = wp.float64(0.0)
-    impulse = wp.vec3d()
-    normal = wp.float64(0.0)
-    stick = wp.float64(0.0)
-    begin, end = run_of(first[scene], first[scene + 1], k)
-    for s in range(begin + lane, end, wp.block_dim()):
-        energy += spring.energy[s]
-        friction += spring.friction[s]
-        drive += spring.drive[s]
-        impulse += spring.impulse[s]
-        normal += spring.normal_impulse[s]
-        stick += spring.stick_impulse[s]
-        spring.impulse[s] = wp.vec3d()
-        spring.normal_impulse[s] = wp.float64(0.0)
-        spring.stick_impulse[s] = wp.float64(0.0)
-    energy_sum = wp.tile_sum(wp.tile(energy))
-    friction_sum = wp.tile_sum(wp.tile(friction))
-    drive_sum = wp.tile_sum(wp.tile(drive))
-    x_sum = wp.tile_sum(wp.tile(impulse[0]))
-    y_sum = wp.tile_sum(wp.tile(impulse[1]))
-    z_sum = wp.tile_sum(wp.tile(impulse[2]))
-    normal_sum = wp.tile_sum(wp.tile(normal))
-    stick_sum = wp.tile_sum(wp.tile(stick))
-    if lane == 0:
-        r = row[0]
-        partial_out[r, scene, column, k] = energy_sum[0]
-        partial_out[r, scene, column + 1, k] = friction_sum[0]
-        partial_out[r, scene, column + 2, k] = drive_sum[0]
-        partial_out[r, scene, column + 3, k] = x_sum[0]
-        partial_out[r, scene, column + 4, k] = y_sum[0]
-        partial_out[r, scene, column + 5, k] = z_sum[0]
-        partial_out[r, scene, column + 6, k] = normal_sum[0]
-        partial_out[r, scene, column + 7, k] = stick_sum[0]

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_mca.kernels.contact import Spring
+from warp_mca.kernels.spring import Spring
 
 wp.set_module_options({"enable_backward": False})
 
@@ -96,21 +96,24 @@ def contact_points(
     u: wp.array(dtype=wp.vec3d),
     slave: wp.array(dtype=wp.int32),
     mu: wp.float64,
+    sides: int,
     first: int,
     spring: Spring,
     point_out: wp.array(dtype=wp.vec3f),
     state_out: wp.array(dtype=wp.int32),
 ):
-    """Where the slave nodes of a pass are [m], and whether each is open, slips or sticks."""
+    """Where the slave nodes of a pass are [m], and whether each is open, slips or sticks (on any side)."""
     s = wp.tid()
     i = slave[s]
     point_out[first + s] = wp.vec3f(X[i] + u[i])
     state = int(wp.static(OPEN))
-    force = spring.force[s]
-    if wp.dot(force, force) > wp.float64(0.0):
-        state = int(wp.static(SLIP))
-        tangential = spring.tangential[s]
-        normal = force - tangential
-        if wp.length(tangential) < wp.float64(_STICKING) * mu * wp.length(normal):
-            state = int(wp.static(STICK))
+    for e in range(sides * s, sides * s + sides):
+        force = spring.force[e]
+        if wp.dot(force, force) > wp.float64(0.0):
+            tangential = spring.tangential[e]
+            normal = force - tangential
+            if wp.length(tangential) < wp.float64(_STICKING) * mu * wp.length(normal):
+                state = int(wp.static(STICK))
+            elif state == wp.static(OPEN):
+                state = int(wp.static(SLIP))
     state_out[first + s] = state

@@ -56,19 +56,22 @@ def bounds_kernel(each: bool) -> Any:
 
 
 @cache
-def candidates_kernel(each: bool) -> Any:
+def candidates_kernel(each: bool, sides: int) -> Any:
     """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
 
-    With `each`, faces are grouped by scene, and a slave looks among those of its own.
+    With `each`, faces are grouped by scene, and a slave looks among those of its own. With more `sides` of the master,
+    a slave has a list for each of them, and goes by the number of that list.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
 
-    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
     def find_candidates(
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
         slave: wp.array(dtype=wp.int32),
+        side: Side,
         scene: Index,
         origin: Vector,
         count_out: wp.array(dtype=wp.int32),
@@ -90,38 +93,50 @@ def candidates_kernel(each: bool) -> Any:
         query = wp.bvh_query_aabb(bvh, point, point, root)
         f = int(0)
         found = int(0)
+        if wp.static(sides > 1):
+            for p in range(wp.static(sides)):
+                count_out[wp.static(sides) * s + p] = 0
         while wp.bvh_query_next(query, f):
+            row = wp.static(sides) * s + of_face(side, f)
+            if wp.static(sides > 1):
+                found = count_out[row]
             if found < candidate_out.shape[1]:
-                candidate_out[s, found] = f
+                candidate_out[row, found] = f
                 place = wp.atomic_add(face_count_out, f, 1)
                 if place < face_slave_out.shape[1]:
-                    face_slave_out[f, place] = s
+                    face_slave_out[f, place] = row
                 else:
                     flag_out[k, OVERFLOW] = 1
             else:
                 flag_out[k, OVERFLOW] = 1
             found += 1
-        count_out[s] = wp.min(found, candidate_out.shape[1])
+            if wp.static(sides > 1):
+                count_out[row] = wp.min(found, candidate_out.shape[1])
+        if wp.static(sides == 1):
+            count_out[s] = wp.min(found, candidate_out.shape[1])
 
     return find_candidates
 
 
 @cache
-def clear_kernel(each: bool) -> Any:
+def clear_kernel(each: bool, sides: int) -> Any:
     """Kernel: slave nodes whose nearest face has them in front of it hold no depth at the start.
 
-    The lists do not tell: of a body that is thinner than its faces are long they may hold the far side alone. Faces
-    are looked for as far away as their boxes are deep.
+    With more `sides` of the master, a node that its nearest face has behind it holds none in the other sides. The lists
+    do not tell: of a body that is thinner than its faces are long they may hold the far side alone. Faces are looked
+    for as far away as their boxes are deep.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
+    of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
 
-    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
     def find_clear(
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
         slave: wp.array(dtype=wp.int32),
         face: wp.array2d(dtype=wp.int32),
+        side: Side,
         scene: Index,
         origin: Vector,
         longest: Real,
@@ -142,22 +157,25 @@ def clear_kernel(each: bool) -> Any:
         f = int(0)
         nearest = wp.float64(wp.inf)
         clear = bool(False)
+        behind = int(0)  # side of the nearest face
         while wp.bvh_query_next(query, f):
             inside, _at, away, area_normal, _triangle = project_on_face(X, u, face, f, x)
             gap = wp.dot(away, wp.normalize(area_normal))
             if inside and (wp.abs(gap) < nearest or (wp.abs(gap) == nearest and gap >= wp.float64(0.0))):
                 nearest = wp.abs(gap)
                 clear = gap >= wp.float64(0.0)
-        if clear:
-            held_out[s] = wp.float64(0.0)
+                behind = of_face(side, f)
+        for p in range(wp.static(sides)):
+            if clear or p != behind:
+                held_out[wp.static(sides) * s + p] = wp.float64(0.0)
 
     return find_clear
 
 
 # Those of a lone scene belong to this module, so they are made before it is loaded; a batch has its own modules.
 bounds_kernel(False)
-candidates_kernel(False)
-clear_kernel(False)
+candidates_kernel(False, 1)
+clear_kernel(False, 1)
 
 
 @wp.kernel(enable_backward=False)

@@ -232,22 +232,3 @@ def test_a_block_that_flies_above_a_box_meets_nothing(clearance: float):
     impact = mca.ImpactPhase(duration=4e-4, output_interval=1e-5)
     result = mca.run(mca.Scene(name="flight", bodies=bodies, contacts=(meet,), impact=impact))
     assert (result.F_n == 0.0).all()
-
-
-@pytest.mark.parametrize(("closed", "width", "told"), [(True, 0.01, True), (True, 0.012, False), (False, 0.01, False)])
-def test_a_contact_that_goes_round_a_sharp_edge_is_told(closed: bool, width: float, told: bool):
-    """Bars end on: nodes on the rim of the master go over to its sides."""
-    bodies = tuple(
-        mca.Body(
-            name=name,
-            geometry=mca.Box(size=(0.04, w, w), divisions=(8, 2, 2), origin=(x, -w / 2, -w / 2)),
-            material=STEEL,
-            velocity=(v, 0.0, 0.0),
-        )
-        for name, w, x, v in (("one", 0.01, -0.04, 10.0), ("other", width, 0.0, 0.0))
-    )
-    slave, master = ("boundary", "boundary") if closed else ("xmax", "xmin")
-    meet = mca.Contact(slave=mca.Surface(body="one", nodes=slave), master=mca.Surface(body="other", nodes=master))
-    impact = mca.ImpactPhase(duration=4e-5, energy_tolerance=10.0)
-    result = mca.run(mca.Scene(name="bars", bodies=bodies, contacts=(meet,), impact=impact))
-    assert any("around a sharp edge" in warning for warning in result.warnings) == told

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
+from sharp_edges import bars, in_frame, roof
 
 import warp_mca as mca
 
@@ -122,6 +123,35 @@ def test_scenes_of_a_batch_give_the_bits_that_they_give_alone():
         assert all(np.array_equal(one[name], result[name], equal_nan=True) for name in one.history)
         assert one.summary["max_plastic_strain"] == result.summary["max_plastic_strain"]
     assert len({float(result.F_t.max()) for result in results[:3]}) == 3
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        bars(True, aside=1.3e-3, along=3.0, mu=0.3, two_way=True),
+        in_frame("L", ("every",), (-3.0, -2.5, 0.0)),
+        in_frame("C", ("every",), (-3.0, -2.7, -2.4), mu=0.3, two_way=True),
+        roof(55.0, position=(0.012, 1e-5, 0.0), velocity=(20.0, -3.0, 0.0)),
+    ],
+    ids=["bars", "two walls", "three walls", "roof"],
+)
+def test_sides_of_a_master_press_as_on_the_cpu_and_repeat_bit_for_bit(scene):
+    short = replace(scene, impact=replace(scene.impact, duration=min(scene.impact.duration, 1e-4)))
+    host, one, two = (mca.run(short, device=name, precision="float64") for name in ("cpu", "cuda:0", "cuda:0"))
+    assert host.F_n.max() > 100.0
+    assert one.F_n == pytest.approx(host.F_n, abs=1e-6 * host.F_n.max())
+    assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one.history)
+    alone = mca.run(short, device="cuda:0")
+    for batched in mca.run_batch([short, short], device="cuda:0"):
+        assert all(np.array_equal(batched[name], alone[name], equal_nan=True) for name in alone.history)
+
+
+def test_scenes_with_unlike_numbers_of_sides_give_what_they_give_alone_but_for_rounding():
+    """That with fewer is computed by the kernel of the others."""
+    scenes = [bars(closed, aside=1.3e-3, along=3.0) for closed in (True, False)]
+    (closed, open_one), alone = mca.run_batch(scenes, device="cuda:0"), [mca.run(s, device="cuda:0") for s in scenes]
+    assert all(np.array_equal(closed[name], alone[0][name], equal_nan=True) for name in closed.history)
+    assert open_one.F_n == pytest.approx(alone[1].F_n, abs=1e-4 * alone[1].F_n.max())
 
 
 @pytest.mark.parametrize("element", ["hex8", "hex8r"])

@@ -9,7 +9,7 @@ import pytest
 import warp as wp
 
 from warp_mca import overlap as module
-from warp_mca.kernels import constraint, contact, hex8_patch, hex8r_patch, node, patch, tet4
+from warp_mca.kernels import constraint, contact, hex8_patch, hex8r_patch, node, patch, sides, tet4
 from warp_mca.kernels.overlap import EARLY, LEAST_ARCH
 from warp_mca.materials import Elastic, J2Bilinear
 from warp_mca.overlap import overlap
@@ -22,6 +22,7 @@ VARIANTS = {
     "integrate": [node.integrate_kernel(p, not m, True, m, m, m) for p, m in TWO],
     "advance_bound": [constraint.bound_kernel(p, m, m) for p, m in TWO],
     "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
+    "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
     "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
     "tet4_dilation": [tet4.dilation_kernel(p, m) for p, m in TWO],

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels import contact, search
+from warp_mca.kernels import contact, search, sides, spring
 from warp_mca.layout import offsets
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.threads import CONTACT, Split, whole
@@ -42,17 +42,20 @@ class ContactStage:
     Attributes:
         items: the pass of each scene; no slave meets the faces of another scene.
         column: of its sums in a record.
-        slaves, first: first slave of each scene, and the number of all, shape (scene_count + 1,), int32, on the host
+        sides: of the master, the most of any scene; each slave has a spring and a list of faces for each.
+        springs, first: first spring of each scene, and the number of all, shape (scene_count + 1,), int32, on the host
             and on the device.
-        spring: state of the slaves' springs.
+        spring: state of the springs, those of slave 0 first.
     """
 
     def __init__(self, items: Sequence[ContactPass], model: Model, column: int) -> None:
         self.items, self.column = items, column
         self.each = len(items) > 1
-        self.slaves = offsets([len(item.slave) for item in items])
-        self.first = wp.array(self.slaves, dtype=wp.int32)
-        self.slave_scene = per_scene(self.slaves)
+        self.sides = max(item.sides for item in items)
+        slaves = offsets([len(item.slave) for item in items])
+        self.springs = self.sides * slaves
+        self.first = wp.array(self.springs, dtype=wp.int32)
+        self.slave_scene = per_scene(slaves)
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = _numbers([item.mu for item in items])
@@ -62,23 +65,38 @@ class ContactStage:
             self.kernel = contact.plane_kernel(friction, self.each)
             self._make_planes()
             return
-        self.kernel = contact.surface_kernel(friction, self.each)
+        self.kernel = (
+            contact.surface_kernel(friction, self.each)
+            if self.sides == 1
+            else sides.sided_kernel(friction, self.each, self.sides)
+        )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
-        self.find, self.clear = search.candidates_kernel(self.each), search.clear_kernel(self.each)
+        self.find = search.candidates_kernel(self.each, self.sides)
+        self.clear = search.clear_kernel(self.each, self.sides)
         self._make_faces(model)
 
     def _join(self, name: str) -> NDArray:
         return np.concatenate([getattr(item, name) for item in self.items])
 
+    def _rows(self, face: str, offset: str, number: str) -> tuple[wp.array, wp.array]:
+        """Compressed rows of all scenes, which count faces and entries on."""
+        faces, entries = (offsets([len(getattr(item, name)) for item in self.items]) for name in (face, number))
+        rows = [getattr(item, offset)[:-1] + start for item, start in zip(self.items, entries, strict=False)]
+        numbers = [getattr(item, number) + start for item, start in zip(self.items, faces, strict=False)]
+        return (
+            wp.array(np.append(np.concatenate(rows), entries[-1]), dtype=wp.int32),
+            wp.array(np.concatenate(numbers), dtype=wp.int32),
+        )
+
     def _make_springs(self) -> None:
-        count = len(self.slave)
-        self.spring = contact.Spring()
+        count = int(self.springs[-1])
+        self.spring = spring.Spring()
         for name in ("tangential", "force", "impulse"):
             setattr(self.spring, name, wp.zeros(count, dtype=wp.vec3d))
         for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth"):
             setattr(self.spring, name, wp.zeros(count, dtype=wp.float64))
-        self.spring.held = wp.full(count, contact.ANY_DEPTH, dtype=wp.float64)
+        self.spring.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
         self.spring.face = wp.full(count, -1, dtype=wp.int32)
         self.spring.weight = wp.zeros(count, dtype=wp.vec4d)
 
@@ -90,22 +108,21 @@ class ContactStage:
         self.deepest = _numbers([item.deepest for item in self.items])
 
     def _make_faces(self, model: Model) -> None:
-        slaves, faces = len(self.slave), offsets([len(item.face) for item in self.items])
-        masters, around = (
-            offsets([len(getattr(item, name)) for item in self.items]) for name in ("master", "face_of_node")
-        )
-        rows = [item.face_offset[:-1] + start for item, start in zip(self.items, around, strict=False)]
-        numbers = [item.face_of_node + start for item, start in zip(self.items, faces, strict=False)]
+        lists, faces = int(self.springs[-1]), offsets([len(item.face) for item in self.items])
+        masters = offsets([len(item.master) for item in self.items])
         self.margin = _numbers([item.margin for item in self.items])
         self.longest = _numbers([item.longest for item in self.items])
         self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
         self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
         self.face = wp.array(self._join("face"), dtype=wp.int32)
+        self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
-        self.face_offset = wp.array(np.append(np.concatenate(rows), around[-1]), dtype=wp.int32)
-        self.face_of_node = wp.array(np.concatenate(numbers), dtype=wp.int32)
-        self.count = wp.zeros(slaves, dtype=wp.int32)
-        self.candidate = wp.zeros((slaves, LIST_LENGTH), dtype=wp.int32)
+        self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
+        if self.sides > 1:
+            self.slave_face = wp.array(self._join("slave_face"), dtype=wp.int32)
+            self.around_slave = self._rows("slave_face", "slave_offset", "face_of_slave")
+        self.count = wp.zeros(lists, dtype=wp.int32)
+        self.candidate = wp.zeros((lists, LIST_LENGTH), dtype=wp.int32)
         self.face_count = wp.zeros(len(self.face), dtype=wp.int32)
         self.face_slave = wp.zeros((len(self.face), max(item.room for item in self.items)), dtype=wp.int32)
         self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
@@ -140,14 +157,14 @@ class ContactStage:
         slaves = [X, u, self.slave]
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
-            inputs = [self.bvh.id, *slaves, self.face, self.slave_scene, self.origin, self.longest]
+            inputs = [self.bvh.id, *slaves, self.face, self.side, self.slave_scene, self.origin, self.longest]
             wp.launch(self.clear, len(self.slave), inputs=inputs, outputs=[self.spring.held])
         else:
             self.bvh.refit()
         wp.launch(
             self.find,
             len(self.slave),
-            inputs=[self.bvh.id, *slaves, self.slave_scene, self.origin],
+            inputs=[self.bvh.id, *slaves, self.side, self.slave_scene, self.origin],
             outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
         )
         wp.launch(search.sort_lists, len(self.face), inputs=[self.face_count], outputs=[self.face_slave])
@@ -167,6 +184,8 @@ class ContactStage:
             inputs = [X, u, v, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest, dt, self.spring]
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
+        if self.sides > 1:
+            slaves = [self.slave, self.slave_face, *self.around_slave, self.stiffness]
         inputs = [X, u, v, self.u_search, *slaves, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
@@ -176,4 +195,4 @@ class ContactStage:
 
     def max_depth(self, scene: int) -> float:
         """Largest penetration so far of a slave of a scene [m]."""
-        return float(self.spring.depth.numpy()[self.slaves[scene] : self.slaves[scene + 1]].max())
+        return float(self.spring.depth.numpy()[self.springs[scene] : self.springs[scene + 1]].max())

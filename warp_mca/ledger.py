@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then eight for each contact pass (`kernels.contact.sum_springs`).
+# Columns of a record, then eight for each contact pass (`kernels.spring.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
 PASS_COLUMNS = 8
 OVERLAP = 0.01  # share of the energy at the start, in contact springs, that is worth a word when a guard stops the run

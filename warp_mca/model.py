@@ -13,7 +13,7 @@ from warp_mca.bindings import Hinge, check_bindings, constraints, join_bodies
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.layout import Layout
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes, face_geometry
+from warp_mca.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.timestep import StableStep
 
 Array = NDArray[np.float64]
@@ -125,9 +125,9 @@ def _tangent(normal: Array) -> Array:
     return tangent / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
 
 
-def _mean_normal(X: Array, faces: Faces) -> Array | None:
+def _mean_normal(faces: Faces) -> Array | None:
     """Normals of a surface's faces, added up by their area [m^2], or None where it is closed: then they cancel."""
-    normal = face_geometry(X, faces.node)[1].sum(axis=0)
+    normal = faces.normal.sum(axis=0)
     return None if np.linalg.norm(normal) < CLOSED * faces.area.sum() else normal
 
 
@@ -137,10 +137,10 @@ def _surface_axes(X: Array, slave: Faces, master: Faces) -> tuple[Array, Array]:
     A closed master has no one normal, but where it is touched it faces the slave: its tangent is that of the slave's
     surface turned round or, where that is closed too, of its own faces where the bodies are nearest to each other.
     """
-    normal = _mean_normal(X, master)
+    normal = _mean_normal(master)
     if normal is not None:
         return normal / np.linalg.norm(normal), _tangent(normal)
-    other = _mean_normal(X, slave)
+    other = _mean_normal(slave)
     return np.zeros(3), _tangent(_nearest_normal(X, slave, master) if other is None else -other)
 
 
@@ -155,9 +155,9 @@ def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
     distance, _ = samples.query(nodes)
     reach = distance.min() + 0.25 * np.sqrt(np.median(master.area))
     near = np.concatenate(samples.query_ball_point(nodes[distance <= reach], reach)).astype(np.int32)
-    area, normal = face_geometry(X, master.node[np.unique(near // len(a))])
-    mean = normal.sum(axis=0)
-    return mean if np.linalg.norm(mean) > CLOSED * area.sum() else np.array([0.0, 1.0, 0.0])
+    touched = np.unique(near // len(a))
+    mean = master.normal[touched].sum(axis=0)
+    return mean if np.linalg.norm(mean) > CLOSED * master.area[touched].sum() else np.array([0.0, 1.0, 0.0])
 
 
 def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array], V: Mapping[str, Array]) -> Model:

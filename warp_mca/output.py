@@ -131,7 +131,7 @@ class Output:
         if CONTACT in needs:
             first = 0
             for stage in s.contacts:
-                inputs = [s.X, s.u, stage.slave, stage.mu, first, stage.spring]
+                inputs = [s.X, s.u, stage.slave, stage.mu, stage.sides, first, stage.spring]
                 outputs = list(self.arrays[CONTACT].values())
                 wp.launch(output.contact_points, len(stage.slave), inputs=inputs, outputs=outputs)
                 first += len(stage.slave)

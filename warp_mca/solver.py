@@ -30,7 +30,7 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
-from warp_mca.kernels import constraint, contact, ledger, node, output, search, subnormals
+from warp_mca.kernels import constraint, contact, ledger, node, output, search, spring, subnormals
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
 from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
@@ -208,7 +208,7 @@ class Solver:
         with wp.ScopedStream(self.sums):
             for touching in self.contacts:
                 springs = [touching.column, touching.first, touching.spring]
-                self._sum(contact.sum_springs, int(np.diff(touching.slaves).max()), springs)
+                self._sum(spring.sum_springs, int(np.diff(touching.springs).max()), springs)
             self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
         self._advance(split, self.v_before)
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
@@ -262,7 +262,7 @@ class Solver:
 
     def _kernels(self) -> list[tuple[list[Any], int | None]]:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
-        sums = [ledger.record_motion, contact.sum_springs, self.sum_elements_kernel]
+        sums = [ledger.record_motion, spring.sum_springs, self.sum_elements_kernel]
         sums += [output.nodal_stress] if self._shows_stress else []
         sums += [] if self.side else [subnormals.begin_flush]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.scene import Contact, RigidPlane
+from warp_mca.sides import find_sides, stiffest_fold
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -27,12 +28,16 @@ class Faces:
             their last one twice.
         element: that each face bounds, shape (face_count,), int32.
         area: [m^2], shape (face_count,), float64.
+        normal: outwards, as long as the area [m^2], shape (face_count, 3), float64.
+        middle: mean of the corners [m], shape (face_count, 3), float64.
         stiffness: K A^2 / V of each face [N/m], shape (face_count,), float64.
     """
 
     node: Index
     element: Index
     area: Array
+    normal: Array
+    middle: Array
     stiffness: Array
 
     @property
@@ -49,10 +54,14 @@ class ContactPass:
         slave: node indices, shape (slave_count,), int32.
         stiffness: penalty stiffness of each [N/m], shape (slave_count,), float64.
         mu: coefficient of friction [-].
+        slave_face, slave_offset, face_of_slave: the slave's faces, and those around each slave node, compressed rows,
+            int32.
         sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact.
         contact: which of the scene's contacts this belongs to.
         plane: the rigid plane, or None.
         face: master faces, shape (face_count, 4), int32.
+        side: of the master that each face belongs to, shape (face_count,), int32; see `warp_mca.sides`.
+        at_once: how many times stiffer than one spring those of all sides are on a slave node, at most [-].
         master: their nodes, shape (master_count,), int32.
         face_offset, face_of_node: faces around each master node, compressed rows, int32.
         margin: that the search looks ahead [m].
@@ -68,6 +77,11 @@ class ContactPass:
     contact: int
     plane: RigidPlane | None = None
     face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32))
+    side: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    at_once: float = 1.0
+    slave_face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32))
+    slave_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
+    face_of_slave: Index = field(default_factory=lambda: np.zeros(0, np.int32))
     master: Index = field(default_factory=lambda: np.zeros(0, np.int32))
     face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
     face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32))
@@ -75,6 +89,11 @@ class ContactPass:
     longest: float = 0.0
     room: int = LIST_LENGTH
     deepest: float = 0.0
+
+    @property
+    def sides(self) -> int:
+        """How many sides the master has."""
+        return int(self.side.max(initial=0)) + 1
 
 
 def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
@@ -91,8 +110,8 @@ def make_faces(X: Array, face: Index, element: Index, K: Array, volume: Array) -
         X: positions [m], shape (node_count, 3). face: shape (face_count, 4). element: of each face.
         K: bulk modulus [Pa] and volume: [m^3] of every element, shape (element_count,).
     """
-    area, _ = face_geometry(X, face)
-    return Faces(face, element, area, K[element] * area**2 / volume[element])
+    area, normal = face_geometry(X, face)
+    return Faces(face, element, area, normal, X[face].mean(axis=1), K[element] * area**2 / volume[element])
 
 
 def _node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
@@ -118,26 +137,40 @@ def _room(slave: Faces, master: Faces, margin: float) -> int:
     return min(LIST_LENGTH * math.ceil(most / LIST_LENGTH), LONGEST_LIST)
 
 
+def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
+    """Faces around each of the `nodes` of a surface, as compressed rows: their offsets, and the faces, int32."""
+    corner = face.ravel()
+    order = np.argsort(corner, kind="stable")
+    again = np.zeros(face.shape, dtype=bool)
+    again[:, 3] = face[:, 2] == face[:, 3]
+    order = order[~again.ravel()[order]]  # a triangle's last corner counts once
+    offset = np.searchsorted(corner[order], np.append(nodes, nodes[-1] + 1))
+    return offset.astype(np.int32), (order // 4).astype(np.int32)
+
+
 def _surface_pass(contact: Contact, index: int, slave: Faces, master: Faces, sign: float) -> ContactPass:
     penalty = 0.5 * contact.penalty if contact.two_way else contact.penalty
     nodes, masters = slave.nodes, master.nodes
     softest = float(master.stiffness.min())
-    corner = master.node.ravel()
-    order = np.argsort(corner, kind="stable")
-    again = np.zeros(master.node.shape, dtype=bool)
-    again[:, 3] = master.node[:, 2] == master.node[:, 3]
     margin = SEARCH_MARGIN * float(np.sqrt(master.area.min()))
-    order = order[~again.ravel()[order]]  # a triangle's last corner gathers once
+    side = find_sides(master.node, master.normal)
+    offset, around = _faces_around(masters, master.node)
+    slave_offset, around_slave = _faces_around(nodes, slave.node)
     return ContactPass(
         slave=nodes,
         stiffness=penalty * np.minimum(_node_mean(nodes, slave, slave.stiffness), softest),
         mu=contact.mu,
+        slave_face=slave.node,
+        slave_offset=slave_offset,
+        face_of_slave=around_slave,
         sign=sign,
         contact=index,
         face=master.node,
+        side=side,
+        at_once=stiffest_fold(master.node, master.normal, master.middle) if side.any() else 1.0,
         master=masters,
-        face_offset=np.searchsorted(corner[order], np.append(masters, masters[-1] + 1)).astype(np.int32),
-        face_of_node=(order // 4).astype(np.int32),
+        face_offset=offset,
+        face_of_node=around,
         margin=margin,
         longest=float(np.sqrt(master.area.max())),
         room=_room(slave, master, margin),
@@ -166,13 +199,13 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
 def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, mass: Array) -> tuple[Index, Array]:
     """What a pass can add to the largest eigenvalue at its nodes [1/s^2]: row sums of M^-1 K of its springs.
 
-    A slave's row sums to k (1 + sum N) / m = 2 k / m, or k / m against a plane; a master node's to as much, times the
-    number of slave nodes that share its area.
+    A slave's row sums to k (1 + sum N) / m = 2 k / m, or k / m against a plane, and to more where sides of the master
+    press it at once; a master node's to as much, times the number of slave nodes that share its area.
     """
     if master is None:
         return item.slave, item.stiffness / mass[item.slave]
-    k = float(item.stiffness.max())
+    slave_k, k = item.at_once * item.stiffness, item.at_once * float(item.stiffness.max())
     slave_area = 4.0 * np.median(_node_mean(item.slave, slave, slave.area / 4.0))
     shared = np.maximum(1.0, 4.0 * _node_mean(item.master, master, master.area / 4.0) / slave_area)
     nodes = np.concatenate([item.slave, item.master])
-    return nodes, np.concatenate([2.0 * item.stiffness / mass[item.slave], 2.0 * k * shared / mass[item.master]])
+    return nodes, np.concatenate([2.0 * slave_k / mass[item.slave], 2.0 * k * shared / mass[item.master]])

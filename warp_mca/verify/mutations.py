@@ -46,7 +46,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "contact_soft": Mutation(
         "contact springs are ten times too soft",
-        "kernels/contact.py",
+        "kernels/spring.py",
         "Fn = -k * gap",
         "Fn = -wp.float64(0.1) * k * gap",
     ),
@@ -58,13 +58,13 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "friction_limit_doubled": Mutation(
         "friction may reach 2 mu F_n",
-        "kernels/contact.py",
+        "kernels/spring.py",
         "normal, mu * Fn, k)",
         "normal, wp.float64(2.0) * mu * Fn, k)",
     ),
     "friction_limit_halved": Mutation(
         "friction may reach only mu F_n / 2",
-        "kernels/contact.py",
+        "kernels/spring.py",
         "normal, mu * Fn, k)",
         "normal, wp.float64(0.5) * mu * Fn, k)",
     ),

@@ -1,0 +1,139 @@
+"""Owns the springs between slave nodes and what they touch: their state, forces, bookkeeping and sums."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.friction import release, stick_slip
+from warp_mca.kernels.ledger import run_of
+
+wp.set_module_options({"enable_backward": False})
+
+FAR = 1e30  # further than anything [m]
+ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
+
+
+@wp.struct
+class Spring:
+    """State of every slave node's springs; arrays have shape (slave_count,).
+
+    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1.
+    weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
+    far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
+    force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
+    penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
+    in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
+    """
+
+    tangential: wp.array(dtype=wp.vec3d)
+    force: wp.array(dtype=wp.vec3d)
+    face: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.vec4d)
+    energy: wp.array(dtype=wp.float64)
+    friction: wp.array(dtype=wp.float64)
+    drive: wp.array(dtype=wp.float64)
+    impulse: wp.array(dtype=wp.vec3d)
+    normal_impulse: wp.array(dtype=wp.float64)
+    stick_impulse: wp.array(dtype=wp.float64)
+    depth: wp.array(dtype=wp.float64)
+    held: wp.array(dtype=wp.float64)
+
+
+@cache
+def spring_function(friction: bool) -> Any:
+    """The function that turns a gap into force and bookkeeping; without `friction` it has no tangential part."""
+
+    @wp.func
+    def press(s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k: wp.float64, mu: wp.float64, spring: Spring):
+        # all is read before anything is written, so that a GPU waits for memory once
+        impulse = spring.impulse[s]
+        normal_impulse = spring.normal_impulse[s]
+        depth = spring.depth[s]
+        Fn = -k * gap
+        force = Fn * normal
+        squares = Fn * Fn
+        if wp.static(friction):
+            friction_work = spring.friction[s]
+            stick_impulse = spring.stick_impulse[s]
+            Ft, work, stick = stick_slip(spring.tangential[s], du, normal, mu * Fn, k)
+            force += Ft
+            squares += wp.dot(Ft, Ft)
+            spring.tangential[s] = Ft
+            spring.friction[s] = friction_work + work
+            if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
+                spring.stick_impulse[s] = stick_impulse + Fn
+        spring.energy[s] = wp.float64(0.5) * squares / k
+        spring.force[s] = force
+        spring.impulse[s] = impulse + force
+        spring.normal_impulse[s] = normal_impulse + Fn
+        spring.depth[s] = wp.max(depth, -gap)
+        return force
+
+    return press
+
+
+@cache
+def open_function(friction: bool) -> Any:
+    """The function that clears the springs of a node that lost its contact."""
+
+    @wp.func
+    def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):
+        if wp.static(friction):
+            spring.friction[s] = spring.friction[s] + release(spring.tangential[s], du, k)
+            spring.tangential[s] = wp.vec3d()
+        spring.energy[s] = wp.float64(0.0)
+        spring.force[s] = wp.vec3d()
+        spring.face[s] = -1
+
+    return open_contact
+
+
+@wp.kernel(enable_backward=False)
+def sum_springs(
+    row: wp.array(dtype=wp.int32),
+    column: int,
+    first: wp.array(dtype=wp.int32),
+    spring: Spring,
+    partial_out: wp.array4d(dtype=wp.float64),
+):
+    """Sums over the slaves of each scene, which begin at `first`, into eight columns, as `kernels.ledger` sums.
+
+    What is summed over the record interval then starts afresh.
+    """
+    scene, k, lane = wp.tid()
+    energy = wp.float64(0.0)
+    friction = wp.float64(0.0)
+    drive = wp.float64(0.0)
+    impulse = wp.vec3d()
+    normal = wp.float64(0.0)
+    stick = wp.float64(0.0)
+    begin, end = run_of(first[scene], first[scene + 1], k)
+    for s in range(begin + lane, end, wp.block_dim()):
+        energy += spring.energy[s]
+        friction += spring.friction[s]
+        drive += spring.drive[s]
+        impulse += spring.impulse[s]
+        normal += spring.normal_impulse[s]
+        stick += spring.stick_impulse[s]
+        spring.impulse[s] = wp.vec3d()
+        spring.normal_impulse[s] = wp.float64(0.0)
+        spring.stick_impulse[s] = wp.float64(0.0)
+    energy_sum = wp.tile_sum(wp.tile(energy))
+    friction_sum = wp.tile_sum(wp.tile(friction))
+    drive_sum = wp.tile_sum(wp.tile(drive))
+    x_sum = wp.tile_sum(wp.tile(impulse[0]))
+    y_sum = wp.tile_sum(wp.tile(impulse[1]))
+    z_sum = wp.tile_sum(wp.tile(impulse[2]))
+    normal_sum = wp.tile_sum(wp.tile(normal))
+    stick_sum = wp.tile_sum(wp.tile(stick))
+    if lane == 0:
+        r = row[0]
+        partial_out[r, scene, column, k] = energy_sum[0]
+        partial_out[r, scene, column + 1, k] = friction_sum[0]
+        partial_out[r, scene, column + 2, k] = drive_sum[0]
+        partial_out[r, scene, column + 3, k] = x_sum[0]
+        partial_out[r, scene, column + 4, k] = y_sum[0]
+        partial_out[r, scene, column + 5, k] = z_sum[0]
+        partial_out[r, scene, column + 6, k] = normal_sum[0]
+        partial_out[r, scene, column + 7, k] = stick_sum[0]

@@ -1,0 +1,151 @@
+"""Masters whose sides meet at sharp edges: folds, edges of solids, and bodies that lie flush."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sharp_edges import STEEL, bars, frame, in_frame, roof
+
+import warp_mca as mca
+from warp_mca.sides import MOST, find_sides, stiffest_fold
+from warp_mca.solver import Solver
+from warp_mca.surfaces import face_geometry
+
+
+def sides(mesh: mca.Mesh, nodes: str = "boundary") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each face of a surface the side, and the directions of the normals; and the faces."""
+    face, _ = mesh.surface(nodes)
+    area, normal = face_geometry(mesh.points, face)
+    return find_sides(face, normal), normal / area[:, None], face
+
+
+@pytest.fixture
+def velocity(monkeypatch):
+    """Gives the mean velocity [m/s] that the last run left the first body with."""
+    last = {}
+
+    def keep(self, scene):
+        end = list(self.model.node_start.values())[1]
+        mass = self.model.mass[:end, None]
+        last["v"] = (mass * self.v.numpy()[:end]).sum(axis=0) / mass.sum()
+        return 0.0
+
+    monkeypatch.setattr(Solver, "max_plastic_strain", keep)
+    return lambda scene, **options: (mca.run(scene, **options), last["v"])
+
+
+def test_a_box_has_three_sides_and_a_ball_one():
+    side, normal, _ = sides(mca.Box(size=(0.03, 0.02, 0.01), divisions=(3, 2, 2)).build())
+    axis = np.abs(normal).argmax(axis=1)
+    assert sorted(set(zip(axis.tolist(), side.tolist(), strict=True))) == sorted(
+        (k, side[axis == k][0]) for k in range(3)
+    )
+    assert set(side) == {0, 1, 2}
+    assert not sides(mca.Sphere(radius=0.01, section=2, ring=2, pole_layers=2).build())[0].any()
+
+
+def test_sides_of_tetrahedra_and_of_a_surface_as_rough_as_can_be():
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(4, 4, 4))
+    body = mca.Body(name="box", geometry=box, material=STEEL, element="tet4")
+    mesh = mca.mesh(mca.Scene(name="tets", bodies=(body,), impact=mca.ImpactPhase(duration=1.0)))["box"]
+    side, normal, _ = sides(mesh)
+    assert len(side) == 12 * 16
+    assert all(len(set(side[np.abs(normal[:, k]) > 0.9])) == 1 for k in range(3))
+    fan = np.random.default_rng(1).normal(size=(40, 3))
+    rough = find_sides(np.array([[0, k + 1, k + 2, k + 2] for k in range(40)], np.int32), fan)
+    assert rough.max() < MOST
+
+
+@pytest.mark.parametrize(("kind", "expected"), [("L", 1.0), ("U", 1.0)])
+def test_springs_of_a_right_fold_add_no_stiffness(kind: str, expected: float):
+    mesh = frame(kind)
+    face, _ = mesh.surface("every")
+    normal = face_geometry(mesh.points, face)[1]
+    assert stiffest_fold(face, normal, mesh.points[face].mean(axis=1)) == pytest.approx(expected)
+
+
+def test_springs_of_a_narrow_groove_add_up():
+    """Walls at 30 degrees to each other face each other nearly; across its upper edges solids stand, no fold."""
+    X = np.array([[x, y, z] for z in (0.0, 1.0) for x, y in ((-2, 2), (-np.tan(np.radians(15.0)) * 2, 2), (0, 0))])
+    X = np.concatenate([X, X[[1, 4]] * [-1.0, 1.0, 1.0]])
+    face = np.array([[0, 3, 4, 1], [1, 4, 5, 2], [2, 5, 7, 6]], np.int32)
+    normal = face_geometry(X, face)[1]
+    assert (normal[0] / np.linalg.norm(normal[0])).tolist() == [0.0, 1.0, 0.0]
+    assert stiffest_fold(face, normal, X[face].mean(axis=1)) == pytest.approx(1.0 + np.cos(np.radians(30.0)))
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {},
+        {"cells": 1},
+        {"cells": 2, "penalty": 10.0},
+        {"aside": 3.3e-3},
+        {"aside": 1e-6},
+        {"width": 0.02},
+        {"along": 3.0},
+        {"along": 3.0, "mu": 0.3, "two_way": True},
+    ],
+    ids=str,
+)
+def test_closed_bars_that_meet_end_on_part_as_open_ones_do(scene: dict, velocity):
+    """Nodes on the rim went over to the sides: bars of one cell passed into each other, of three kept 0.87 m/s."""
+    (open_one, v), (closed, w) = (velocity(bars(closed, **scene)) for closed in (False, True))
+    assert w == pytest.approx(v, abs=0.01)
+    assert closed.F_n == pytest.approx(open_one.F_n, abs=0.01 * open_one.F_n.max())
+    assert not any("sharp edge" in warning for warning in closed.warnings)
+
+
+@pytest.mark.parametrize("contact", [{}, {"mu": 0.3}], ids=str)
+@pytest.mark.parametrize(
+    ("kind", "masters", "v"),
+    [
+        ("L", ("floor", "left"), (-3.0, -3.0, 0.0)),
+        ("U", ("floor", "left", "right"), (0.0, -3.0, 0.0)),
+        ("C", ("floor", "left", "back"), (-3.0, -3.0, -3.0)),
+    ],
+)
+def test_sides_of_one_surface_press_as_contacts_with_each_do(kind, masters, v, contact, velocity):
+    """In an exact fit, 16 % of the energy was lost."""
+    (apart, each), (one, all_of_it) = (velocity(in_frame(kind, m, v, **contact)) for m in (masters, ("every",)))
+    assert np.linalg.norm(each) > 2.0
+    assert all_of_it == pytest.approx(each, abs=0.01)
+    assert one.summary["energy_error"] < 2e-3 + apart.summary["energy_error"]
+    assert one.summary["max_penetration"] == pytest.approx(apart.summary["max_penetration"], rel=0.02)
+
+
+@pytest.mark.parametrize("degrees", [55.0, 72.0, 90.0, 110.0])
+def test_nodes_that_slide_over_an_edge_keep_the_energy(degrees: float, velocity):
+    sliding = roof(degrees, position=(0.012, 1e-5, 0.0), velocity=(20.0, -3.0, 0.0))
+    result, v = velocity(sliding)
+    assert result.summary["energy_error"] < 1e-3
+    assert v[0] == pytest.approx(20.0, abs=0.03)
+    assert v[1] == pytest.approx(2.52, abs=0.01)
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(48.0, True), (55.0, False)])
+def test_nodes_that_go_round_an_edge_within_a_side_are_told(degrees: float, told: bool):
+    result = mca.run(roof(degrees, position=(0.012, 1e-5, 0.0), velocity=(20.0, -3.0, 0.0)))
+    assert any("around a sharp edge" in warning for warning in result.warnings) == told
+
+
+def test_an_edge_that_drags_over_a_plane_does_not_catch_on_its_nodes(velocity):
+    """Nodes of the plane run into the side of the edge, and are nearer to its other side then."""
+    tilted = roof(90.0, position=(0.02, 2e-3, 0.001), velocity=(0.0, -3.0, 0.0), rotation=0.15, two_way=True)
+    longer = replace(tilted, impact=replace(tilted.impact, duration=1.5e-3))
+    result, v = velocity(longer)
+    assert result.summary["energy_error"] < 5e-3
+    assert np.linalg.norm(v) < 0.3
+
+
+def test_scenes_of_a_batch_with_unlike_numbers_of_sides_give_the_bits_that_they_give_alone():
+    scenes = [bars(True), bars(False), bars(True, aside=1e-3)]
+    alone = [mca.run(scene, threads=1) for scene in scenes]
+    for one, other in zip(mca.run_batch(scenes, threads=1), alone, strict=True):
+        assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in other.history)
+
+
+def test_threads_and_frames_do_not_change_a_bit():
+    scene = in_frame("U", ("every",), (0.0, -3.0, 0.0), mu=0.3, two_way=True)
+    one, two = (mca.run(scene, threads=count) for count in (1, 2))
+    assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one.history)

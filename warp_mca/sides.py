@@ -1,0 +1,78 @@
+"""Owns the sides of a surface: its smooth parts, told apart where they meet at a sharp edge."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+SHARP = math.cos(math.radians(50.0))  # between the normals of faces that meet at a sharp edge, at most
+MOST = 6  # sides; faces of a surface as rough as to need more share them
+
+
+def _neighbours(face: Index) -> tuple[Index, Index]:
+    """Pairs of faces that share an edge, two arrays of shape (pair_count,)."""
+    corner, following = face.ravel(), np.roll(face, -1, axis=1).ravel()
+    edge = np.sort(np.column_stack([corner, following]), axis=1)
+    owner = np.repeat(np.arange(len(face), dtype=np.int32), 4)
+    real = corner != following  # a triangle has three
+    edge, owner = edge[real], owner[real]
+    order = np.lexsort((edge[:, 1], edge[:, 0]))
+    edge, owner = edge[order], owner[order]
+    same = (edge[1:] == edge[:-1]).all(axis=1)
+    return owner[:-1][same], owner[1:][same]
+
+
+def _edges(face: Index, normal: Array) -> tuple[Index, Index, Array]:
+    """Pairs of faces that share an edge, and the cosine between their normals, shape (pair_count,)."""
+    first, second = _neighbours(face)
+    unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return first, second, (unit[first] * unit[second]).sum(axis=1)
+
+
+def find_sides(face: Index, normal: Array) -> Index:
+    """Side of each face, shape (face_count,), int32, from 0 on; all are 0 where no edge is sharp.
+
+    Faces that share an edge are on one side, unless their normals differ by more than 50 degrees. Parts that meet at
+    such an edge get different numbers; those that do not meet may get the same, as opposite ones of a box do, so that
+    three or four numbers are enough, and never more than `MOST`.
+
+    Args:
+        face: corners of each face, shape (face_count, 4), int32; triangles have their last one twice.
+        normal: of each face, of any length, shape (face_count, 3).
+    """
+    first, second, cosine = _edges(face, normal)
+    sharp = cosine < SHARP
+    if not sharp.any():
+        return np.zeros(len(face), dtype=np.int32)
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    smooth = np.ones(int((~sharp).sum())), (first[~sharp], second[~sharp])
+    count, part = connected_components(coo_array(smooth, shape=(len(face), len(face))), directed=False)
+    meets: list[set[int]] = [set() for _ in range(count)]
+    for a, b in zip(part[first[sharp]].tolist(), part[second[sharp]].tolist(), strict=True):
+        if a != b:
+            meets[a].add(b)
+            meets[b].add(a)
+    number = np.full(count, -1, dtype=np.int32)
+    for p in np.argsort(-np.bincount(part), kind="stable"):
+        taken = {int(number[q]) for q in meets[p]}
+        number[p] = next((k for k in range(MOST) if k not in taken), p % MOST)
+    return number[part]
+
+
+def stiffest_fold(face: Index, normal: Array, middle: Array) -> float:
+    """How many times stiffer than one spring the two that press a node in a fold are together: 1 + |n1 . n2|, at most.
+
+    Args:
+        face, normal: as of `find_sides`.
+        middle: mean of the corners of each face [m], shape (face_count, 3).
+    """
+    first, second, cosine = _edges(face, normal)
+    fold = (cosine < SHARP) & (((middle[second] - middle[first]) * normal[first]).sum(axis=1) > 0.0)
+    return 1.0 + float(np.abs(cosine[fold]).max(initial=0.0))
