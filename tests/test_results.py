@@ -199,6 +199,31 @@ def test_of_two_runs_that_save_at_once_the_first_keeps_its_results(
     assert list(tmp_path.iterdir()) == [folder]
 
 
+@pytest.mark.parametrize("other_first", [False, True])
+def test_a_new_folder_appears_with_all_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other_first: bool):
+    """A kill at any time leaves the whole results or none; a folder that another run makes meanwhile is theirs."""
+    rename, seen = Path.rename, []
+
+    def spied(self: Path, target: Path) -> Path:
+        seen.append((target.exists(), sorted(file.name for file in self.iterdir())))
+        if other_first:
+            target.mkdir()
+            (target / "summary.json").write_text("{}")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", spied)
+    if other_first:
+        with pytest.raises(RequestError, match="it holds results already"):
+            save(Result({"mu": 1}, history()), tmp_path / "new")
+        assert [file.name for file in (tmp_path / "new").iterdir()] == ["summary.json"]
+    else:
+        assert load(save(Result({"mu": 1}, history()), tmp_path / "new").path).summary["mu"] == 1
+    assert seen == [(False, sorted(FILES))]
+    assert [file.name for file in tmp_path.iterdir()] == ["new"]
+    (tmp_path / "plain").mkdir()
+    assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
 def test_what_a_killed_save_left_goes_with_a_later_one(tmp_path: Path):
     old, new = tmp_path / ".warp_mca-old", tmp_path / ".warp_mca-new"
     for folder in (old, new):

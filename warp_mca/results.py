@@ -205,28 +205,23 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     from warp_mca.report.paths import save_path_figures
 
     path = check_output(directory, force=force)
-    # Written beside the folder first: a run that fails half-way leaves nothing behind.
+    # Written beside the folder first: a run that fails or is killed half-way leaves nothing behind.
     staging = None
     try:
         staging = Path(tempfile.mkdtemp(prefix=STAGING, dir=nearest(path)))
+        written = staging / "results"
+        written.mkdir()
         begun = time.perf_counter()
-        _write_history(staging / "history.csv", result.history)
-        save_forces(staging / "forces.png", result)
-        save_energies(staging / "energies.png", result)
+        _write_history(written / "history.csv", result.history)
+        save_forces(written / "forces.png", result)
+        save_energies(written / "energies.png", result)
         if result.paths:
-            save_paths(staging / "paths.npz", result.time, result.paths)
-            save_path_figures(staging, result)
+            save_paths(written / "paths.npz", result.time, result.paths)
+            save_path_figures(written, result)
         result = _with_output_time(result, path, time.perf_counter() - begun)
         summary = {**result.summary, "warnings": list(result.warnings)}
-        (staging / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
-        path.mkdir(parents=True, exist_ok=True)
-        if not force:
-            _claim(path)
-        for name in FILES + PATH_FILES:
-            if (staging / name).exists():
-                (staging / name).replace(path / name)
-            else:  # left by a run of another scene
-                (path / name).unlink(missing_ok=True)
+        (written / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
+        _move(written, path, force)
         _clear(path)
     except OSError as error:
         raise McaError(f"the results could not be written to {path}: {error.strerror or error}") from error
@@ -234,6 +229,27 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         if staging:
             shutil.rmtree(staging, ignore_errors=True)
     return result
+
+
+def _move(written: Path, path: Path, force: bool) -> None:
+    """Move the folder `written` to `path`: at once where there is none yet, otherwise file by file.
+
+    Raises:
+        RequestError: another run was first.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.exists():
+        with suppress(OSError):  # another run made it meanwhile
+            written.rename(path)
+            return
+    path.mkdir(exist_ok=True)
+    if not force:
+        _claim(path)
+    for name in FILES + PATH_FILES:
+        if (written / name).exists():
+            (written / name).replace(path / name)
+        else:  # left by a run of another scene
+            (path / name).unlink(missing_ok=True)
 
 
 def _claim(path: Path) -> None:
