@@ -41,13 +41,18 @@ def test_mesh_file_binary_msh_with_physical_groups(tmp_path: Path):
     assert np.array_equal(mesh.cell_sets["physical_2"], np.arange(10, 24))
 
 
-def test_mesh_file_written_by_gmsh_itself(tmp_path: Path):
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("floor", ["floor", "column"])
+def test_mesh_file_written_by_gmsh_itself(tmp_path: Path, version: float, binary: int, floor: str):
+    """A surface may have the name of the volume: the sets of nodes and of cells then share it."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("Mesh.Binary", 1)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
         square = gmsh.model.occ.addRectangle(0.0, 0.0, 0.0, 1.0, 1.0)
         swept = gmsh.model.occ.extrude([(2, square)], 0.0, 0.0, 2.0, numElements=[3], recombine=True)
         gmsh.model.occ.synchronize()
@@ -55,7 +60,7 @@ def test_mesh_file_written_by_gmsh_itself(tmp_path: Path):
             gmsh.model.mesh.setTransfiniteCurve(curve, 3)
         gmsh.model.mesh.setTransfiniteSurface(square)
         gmsh.model.mesh.setRecombine(2, square)
-        gmsh.model.addPhysicalGroup(2, [square], name="floor")
+        gmsh.model.addPhysicalGroup(2, [square], name=floor)
         gmsh.model.addPhysicalGroup(3, [swept[1][1]], name="column")
         gmsh.model.mesh.generate(3)
         gmsh.write(str(tmp_path / "column.msh"))
@@ -64,7 +69,8 @@ def test_mesh_file_written_by_gmsh_itself(tmp_path: Path):
     mesh = MeshFile(path=str(tmp_path / "column.msh")).build()
     check(mesh, "column")
     assert volumes(mesh).sum() == pytest.approx(2.0)
-    assert area(mesh, "floor") == pytest.approx(1.0)
+    assert area(mesh, floor) == pytest.approx(1.0)
+    assert not any(name.startswith("physical") for name in (*mesh.node_sets, *mesh.cell_sets))
     assert np.array_equal(mesh.cell_sets["column"], np.arange(len(mesh.hexahedra)))
 
 

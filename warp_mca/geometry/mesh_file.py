@@ -59,7 +59,7 @@ class MeshFile:
                 raise self._bad(f"its elements use nodes beyond its {len(points)} points; repair the mesh")
         hexahedra = [cells["hexahedron"]]
         hexahedra += [oriented(points, cells[kind], kind)[:, order] for kind, order in AS_HEXAHEDRON.items()]
-        node_sets, cell_sets = _sets(read)
+        node_sets, cell_sets = _sets(read, self._physical_names())
         tetrahedra = oriented(points, cells["tetra"], "tetra")
         return compact(Mesh(points, np.concatenate(hexahedra), node_sets, cell_sets, tetrahedra))
 
@@ -83,6 +83,21 @@ class MeshFile:
             what = f"meshio cannot read it ({reason})" if reason else "meshio cannot read it"
             remedy = "in gmsh's format 4.1 with Mesh.SaveAll off" if suffix == ".msh" else "as binary .msh"
             raise self._bad(f"{what}; save it {remedy} or as .vtu") from error
+
+    def _physical_names(self) -> dict[tuple[int, int], str]:
+        """Names of the physical groups of gmsh's file by number and dimension: a surface and a volume may share one,
+        of which meshio keeps the last."""
+        names: dict[tuple[int, int], str] = {}
+        if Path(self.path).suffix.lower() == ".msh":
+            with Path(self.path).open("rb") as lines:
+                for line in lines:
+                    if line.strip() == b"$PhysicalNames":
+                        for _ in range(int(next(lines))):
+                            dim, number, name = next(lines).decode(errors="replace").split(maxsplit=2)
+                            names[int(number), int(dim)] = name.strip().strip('"')
+                    if line.strip() in (b"$EndPhysicalNames", b"$Nodes"):
+                        break
+        return names
 
     def _check_abaqus(self) -> None:
         """Refuses what meshio passes over: it keeps the last block of nodes only, and places no instance."""
@@ -121,12 +136,14 @@ class MeshFile:
         return bad_value("MeshFile.path", str(self.path), remedy)
 
 
-def _sets(read: meshio.Mesh) -> tuple[dict[str, NDArray[np.int32]], dict[str, NDArray[np.int32]]]:
-    """Node sets and cell sets by name; cells are counted as in `Mesh`."""
+def _sets(
+    read: meshio.Mesh, names: dict[tuple[int, int], str]
+) -> tuple[dict[str, NDArray[np.int32]], dict[str, NDArray[np.int32]]]:
+    """Node sets and cell sets by name; cells are counted as in `Mesh`, and `names` are those of physical groups."""
     nodes = {name: [np.asarray(members)] for name, members in read.point_sets.items()}
     cells: dict[str, list[NDArray]] = {}
     firsts = _first_cells(read)
-    for name, by_block in _groups(read).items():
+    for name, by_block in _groups(read, names).items():
         for block, first, members in zip(read.cells, firsts, by_block, strict=False):
             if members is not None and len(members):
                 members = np.asarray(members, dtype=np.int64)
@@ -149,13 +166,14 @@ def _first_cells(read: meshio.Mesh) -> list[int]:
     return firsts
 
 
-def _groups(read: meshio.Mesh) -> dict[str, list]:
-    """Members of each named group, block by block: meshio's cell sets and gmsh's physical groups."""
+def _groups(read: meshio.Mesh, names: dict[tuple[int, int], str]) -> dict[str, list]:
+    """Members of each named group, block by block: meshio's cell sets and gmsh's physical groups, with their names."""
     groups: dict[str, list] = {
         name: by_block for name, by_block in read.cell_sets.items() if not name.startswith("gmsh:")
     }
     physical = read.cell_data.get("gmsh:physical", [])
-    names = {(int(number), int(dim)): name for name, (number, dim) in read.field_data.items()} if physical else {}
+    if physical:
+        names = {(int(number), int(dim)): name for name, (number, dim) in read.field_data.items()} | names
     for index, (block, numbers) in enumerate(zip(read.cells, physical, strict=False)):
         for number in np.unique(numbers):
             if number:
