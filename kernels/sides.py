@@ -91,6 +91,7 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
     """
     settle, let_go = settle_functions(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
+    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 
     @wp.func
     def pressure(e: int, spring: Spring):
@@ -166,16 +167,19 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
             near = near or count[e] > 0 or held > wp.float64(0.0)
         along = wp.vec3f(pressed)
         front = wp.float64(FAR)
-        front_face = int(-1)
+        open_gap = Gaps()  # of each side, to the nearest face that has the node in front of it, and that face
+        open_face = Faces()
+        for p in range(wp.static(sides)):
+            open_gap[p] = wp.float64(FAR)
         if listed > 1:
             newcomer = -1
             for e in range(begin, end):
-                _f, _gap, _normal, _at, _beside, _area, ahead, open_face = nearest_face(
+                _f, _gap, _normal, _at, _beside, _area, ahead, ahead_face = nearest_face(
                     X, u, face, candidate, e, count[e], x, along
                 )
-                if ahead < front:
-                    front = ahead
-                    front_face = open_face
+                open_gap[e - begin] = ahead
+                open_face[e - begin] = ahead_face
+                front = wp.min(front, ahead)
         leaver = int(-1)
         first_face = int(-1)  # that takes a free node, and its normal
         first_normal = wp.vec3d()
@@ -185,28 +189,28 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
         # where there are more sides, first to see which of them may take the node, then to press it
         for turn in range(wp.where(listed > 1, 0, wp.where(near, 1, 2)), 2):
             for e in range(begin, end):
-                f, gap, normal, at, beside, area, ahead, open_face = nearest_face(
+                f, gap, normal, at, beside, area, ahead, _face = nearest_face(
                     X, u, face, candidate, e, count[e], x, along
                 )
-                if ahead < front:
-                    front = ahead
-                    front_face = open_face
+                front = wp.min(front, ahead)
                 depth = spring.held[e]
                 if f >= 0:
                     weight = weights_at(at, face[f, 2] == face[f, 3])
                     du = dt * (v[i] - master_velocity(v, face, f, weight))
                     approach = -wp.dot(du, normal)
                     edge = wp.float64(2.0) * wp.sqrt(area)
-                    touches = reachable(-gap, depth, front, approach, edge)
-                    if lost > wp.float64(0.0) and not holding:  # as deep as where it was let go, no fold allowed for
+                    fold = wp.where(spring.face[e] >= 0, front, wp.float64(0.0))  # none for a side that comes anew
+                    touches = reachable(-gap, depth, fold, approach, edge)
+                    if lost > wp.float64(0.0) and not holding:  # as deep as where it was let go
                         touches = touches or reachable(-gap, lost, wp.float64(0.0), approach, edge)
-                    if passes_by(bool(True), wp.max(depth, lost), front, edge):
-                        across = area_vector(X, u, face, front_face)
-                        if is_edge(X, u, face, f, front_face, across):  # which of the two does it meet?
-                            mine = opposition(X, u, slave_face, slave_offset, face_of_slave, s, normal)
-                            its = opposition(X, u, slave_face, slave_offset, face_of_slave, s, across)
-                            if mine < wp.float64(_BETTER) or (beside and mine < its + wp.float64(_BETTER)):
-                                touches = bool(False)
+                    for p in range(wp.static(sides)):
+                        if passes_by(bool(True), wp.max(depth, lost), open_gap[p], edge):
+                            across = area_vector(X, u, face, open_face[p])
+                            if is_edge(X, u, face, f, open_face[p], across):  # which of the two does it meet?
+                                mine = opposition(X, u, slave_face, slave_offset, face_of_slave, s, normal)
+                                its = opposition(X, u, slave_face, slave_offset, face_of_slave, s, across)
+                                if mine < wp.float64(_BETTER) or (beside and mine < its + wp.float64(_BETTER)):
+                                    touches = bool(False)
                     if turn == 0:
                         before = wp.max(-gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
                         if not holding:
@@ -222,7 +226,7 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
                                 holder = pressure(other, spring)
                                 better = opposition(X, u, slave_face, slave_offset, face_of_slave, s, normal)
                                 better -= opposition(X, u, slave_face, slave_offset, face_of_slave, s, holder)
-                                if better > wp.float64(-_BETTER) and -gap <= spring.held[other]:
+                                if better > wp.float64(-_BETTER) and -gap <= spring.held[other] and not beside:
                                     newcomer = e
                                     leaver = other
                     else:

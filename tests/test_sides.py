@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sharp_edges import STEEL, bars, frame, in_frame, roof
+from sharp_edges import HARD, SOFT, STEEL, H, bars, frame, in_frame, roof
 
 import warp_mca as mca
 from warp_mca.sides import MOST, find_sides, stiffest_fold
@@ -136,6 +136,32 @@ def test_an_edge_that_drags_over_a_plane_does_not_catch_on_its_nodes(velocity):
     result, v = velocity(longer)
     assert result.summary["energy_error"] < 5e-3
     assert np.linalg.norm(v) < 0.3
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("gap", [5e-7, 5e-6, 4e-5])
+@pytest.mark.parametrize("speed", [5.0, 100.0])
+def test_a_block_flies_past_a_box_flush_with_its_flanks(speed: float, gap: float, element: str):
+    """The flank, at no distance, hid that the top has the node in front of it as well: its edge was struck."""
+    bodies = tuple(
+        mca.Body(
+            name=name,
+            geometry=mca.Box(size=(H * n, 4 * H, 4 * H), divisions=(n, 4, 4), origin=origin),
+            material=material,
+            velocity=(v, 0.0, 0.0),
+            element=element,
+        )
+        for name, n, origin, material, v in (
+            ("block", 4, (-0.0605, gap, -2 * H), SOFT, speed),
+            ("box", 8, (-8 * H, -4 * H, -2 * H), HARD, 0.0),
+        )
+    )
+    meet = mca.Contact(
+        slave=mca.Surface(body="block", nodes="boundary"), master=mca.Surface(body="box", nodes="boundary")
+    )
+    impact = mca.ImpactPhase(duration=0.03 / speed, output_interval=3e-4 / speed)
+    result = mca.run(mca.Scene(name="flight", bodies=bodies, contacts=(meet,), impact=impact))
+    assert (result.F_n == 0.0).all()
 
 
 def test_scenes_of_a_batch_with_unlike_numbers_of_sides_give_the_bits_that_they_give_alone():
