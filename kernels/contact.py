@@ -10,7 +10,15 @@ from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_prev
 from warp_mca.kernels.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, TURNED, moved_too_far
 from warp_mca.kernels.shared_memory import shared_functions
-from warp_mca.kernels.spring import ANY_DEPTH, FAR, Spring, open_function, spring_function
+from warp_mca.kernels.spring import (
+    ANY_DEPTH,
+    FAR,
+    Spring,
+    open_function,
+    rest_function,
+    spring_function,
+    stiffness_function,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -127,10 +135,12 @@ def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float6
 
 
 @cache
-def settle_functions(friction: bool) -> tuple[Any, Any]:
+def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
     """The functions that press a node on the face found, if it `touches` that, and that let one go which found none."""
     press = spring_function(friction)
     open_contact = open_function(friction)
+    gap_from_rest = rest_function(stress_free)
+    spring_stiffness = stiffness_function(friction)
 
     @wp.func
     def settle(
@@ -146,7 +156,8 @@ def settle_functions(friction: bool) -> tuple[Any, Any]:
         front: wp.float64,
         held: wp.float64,
         along: wp.vec3f,
-        stiffness: wp.float64,
+        own: wp.float64,
+        limit: wp.float64,
         mu: wp.float64,
         spring: Spring,
         flag_out: wp.array2d(dtype=wp.int32),
@@ -154,11 +165,13 @@ def settle_functions(friction: bool) -> tuple[Any, Any]:
         # a spring with neither gap nor normal has no force, and is released as an open one
         gap_kept = wp.where(touches, gap, wp.float64(0.0))
         normal_kept = wp.where(touches, normal, wp.vec3d())
-        force = press(s, gap_kept, normal_kept, du, stiffness, mu, spring)
+        gap_pressed = gap_from_rest(s, gap_kept, spring)
+        stiffness = spring_stiffness(s, gap_pressed, du, own, limit, touches, spring)
+        force = press(s, gap_pressed, normal_kept, du, stiffness, mu, spring)
         spring.face[s] = wp.where(touches, f, -1)
         spring.weight[s] = weight
         spring.held[s] = wp.where(touches or front < wp.float64(FAR), -gap_kept, held)
-        if gap_kept * gap_kept > area:
+        if gap_pressed * gap_pressed > area:
             flag_out[scene, TOO_DEEP] = 1
         turn = wp.dot(wp.vec3f(normal_kept), along)
         if touches and (turn < 0.0 or turn * turn < wp.static(_SHARP**2) * wp.dot(along, along)):
@@ -174,12 +187,12 @@ def settle_functions(friction: bool) -> tuple[Any, Any]:
         dt: wp.float64,
         front: wp.float64,
         held: wp.float64,
-        stiffness: wp.float64,
         spring: Spring,
     ):
         if spring.face[s] >= 0:
             du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
-            open_contact(s, du, stiffness, spring)
+            open_contact(s, du, spring.stiffness[s], spring)
+            gap_from_rest(s, wp.float64(0.0), spring)
         if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(FAR)):
             spring.held[s] = wp.float64(0.0)
 
@@ -187,15 +200,19 @@ def settle_functions(friction: bool) -> tuple[Any, Any]:
 
 
 @cache
-def surface_kernel(friction: bool, each: bool) -> Any:
+def surface_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
 
     Slaves are those from `first` on. With `each`, scenes of a batch have values of their own, and slaves know their
     scene. Of the faces below which a node lies the shallowest counts, if it is `reachable`; no deeper one is then.
     Where there is none, the deepest of those that it lies beside does, as a concave fold asks for. None does that would
     press the node back where the last one did not let it go: the other side of a thin body.
+
+    The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls where
+    the node slides on to a softer face, and what the spring then loses is booked; it never rises before the spring opens.
+    `stress_free`: springs of bodies that overlap at the start begin without force.
     """
-    settle, let_go = settle_functions(friction)
+    settle, let_go = settle_functions(friction, stress_free)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
@@ -207,6 +224,7 @@ def surface_kernel(friction: bool, each: bool) -> Any:
         u_search: wp.array(dtype=wp.vec3d),
         slave: wp.array(dtype=wp.int32),
         stiffness: wp.array(dtype=wp.float64),
+        face_stiffness: wp.array(dtype=wp.float64),
         face: wp.array2d(dtype=wp.int32),
         count: wp.array(dtype=wp.int32),
         candidate: wp.array2d(dtype=wp.int32),
@@ -253,12 +271,13 @@ def surface_kernel(friction: bool, each: bool) -> Any:
                 held,
                 along,
                 stiffness[s],
+                face_stiffness[best],
                 of(mu, k),
                 spring,
                 flag_out,
             )
         else:
-            let_go(s, i, v, face, dt, front, held, stiffness[s], spring)
+            let_go(s, i, v, face, dt, front, held, spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
@@ -329,10 +348,11 @@ react_kernel(False, 1)  # belongs to this module, so it is made before that is l
 
 
 @cache
-def plane_kernel(friction: bool, each: bool) -> Any:
+def plane_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
     press = spring_function(friction)
     open_contact = open_function(friction)
+    gap_from_rest = rest_function(stress_free)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -361,7 +381,7 @@ def plane_kernel(friction: bool, each: bool) -> Any:
         k = of(scene, s)
         normal = of(plane_normal, k)
         velocity = of(plane_velocity, k)
-        gap = wp.dot(X[i] - of(plane_point, k) + u[i], normal)
+        gap = gap_from_rest(s, wp.dot(X[i] - of(plane_point, k) + u[i], normal), spring)
         before = spring.tangential[s]
         du = dt * (v[i] - velocity)
         if gap < -of(deepest, k):

@@ -82,14 +82,14 @@ def opposition(
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = False) -> Any:
     """Kernel: as `kernels.contact.surface_kernel`, for a master of so many sides.
 
     Springs and lists are those of slave 0 with each side, then of slave 1, and so on. A node that no side presses is
     taken by the one behind which it was least before the step, of equals by that which it ran into fastest. It may be
     as deep there as it was in the side that let it go, for it may have slid over an edge.
     """
-    settle, let_go = settle_functions(friction)
+    settle, let_go = settle_functions(friction, stress_free)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 
@@ -129,6 +129,7 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
         slave_offset: wp.array(dtype=wp.int32),
         face_of_slave: wp.array(dtype=wp.int32),
         stiffness: wp.array(dtype=wp.float64),
+        face_stiffness: wp.array(dtype=wp.float64),
         face: wp.array2d(dtype=wp.int32),
         count: wp.array(dtype=wp.int32),
         candidate: wp.array2d(dtype=wp.int32),
@@ -255,12 +256,13 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
                             depth,
                             last,
                             stiffness[s],
+                            face_stiffness[f],
                             of(mu, k),
                             spring,
                             flag_out,
                         )
                 elif turn == 1:
-                    let_go(e, i, v, face, dt, front, depth, stiffness[s], spring)
+                    let_go(e, i, v, face, dt, front, depth, spring)
         if near:
             contact_force_out[i] = contact_force_out[i] + total
         if moved_too_far(u[i], u_search[i], of(margin, k)):

@@ -24,6 +24,8 @@ class Spring:
     force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
     penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
     in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
+    stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
+    became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -38,6 +40,64 @@ class Spring:
     stick_impulse: wp.array(dtype=wp.float64)
     depth: wp.array(dtype=wp.float64)
     held: wp.array(dtype=wp.float64)
+    stiffness: wp.array(dtype=wp.float64)
+    lost: wp.array(dtype=wp.float64)
+    rest: wp.array(dtype=wp.float64)
+
+
+@cache
+def rest_function(stress_free: bool) -> Any:
+    """The function that measures a gap from where a spring is free of force: the face, or the overlap at the start.
+
+    That overlap shrinks as the node moves outwards, and does not grow again.
+    """
+
+    @wp.func
+    def gap_from_rest(s: int, gap: wp.float64, spring: Spring):
+        if wp.static(stress_free):
+            rest = wp.min(spring.rest[s], wp.max(-gap, wp.float64(0.0)))
+            spring.rest[s] = rest
+            gap += rest
+        return gap
+
+    return gap_from_rest
+
+
+@cache
+def stiffness_function(friction: bool) -> Any:
+    """The function that gives a spring its stiffness: that of its first face, or of a softer one that it slides on to."""
+
+    @wp.func
+    def soften(s: int, gap: wp.float64, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring):
+        # The work of the mean force of two steps, less the change of k g^2 / 2, is (k_old - k) g_old g / 2. Along the
+        # surface the spring keeps its length, f / k.
+        pressed = spring.force[s]
+        lost = wp.float64(0.0)
+        if wp.static(friction):
+            pressed -= spring.tangential[s]
+            lost = (wp.float64(1.0) - k / k_old) * release(spring.tangential[s], du, k_old)
+            spring.tangential[s] = (k / k_old) * spring.tangential[s]
+        lost -= wp.float64(0.5) * (wp.float64(1.0) - k / k_old) * wp.length(pressed) * gap
+        spring.lost[s] = spring.lost[s] + lost
+
+    @wp.func
+    def spring_stiffness(
+        s: int, gap: wp.float64, du: wp.vec3d, own: wp.float64, limit: wp.float64, touches: bool, spring: Spring
+    ):
+        """Stiffness [N/m] of a spring whose node allows for `own`, and the face for `limit`."""
+        k_old = spring.stiffness[s]
+        if spring.face[s] < 0:
+            k_old = own
+        k = k_old
+        if touches:
+            k = wp.min(k_old, limit)
+            if k < k_old:
+                if spring.face[s] >= 0:
+                    soften(s, gap, du, k_old, k, spring)
+            spring.stiffness[s] = k
+        return k
+
+    return spring_stiffness
 
 
 @cache
@@ -97,7 +157,7 @@ def sum_springs(
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves of each scene, which begin at `first`, into eight columns, as `kernels.ledger` sums.
+    """Sums over the slaves of each scene, which begin at `first`, into nine columns, as `kernels.ledger` sums.
 
     What is summed over the record interval then starts afresh.
     """
@@ -108,6 +168,7 @@ def sum_springs(
     impulse = wp.vec3d()
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
+    lost = wp.float64(0.0)
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         energy += spring.energy[s]
@@ -116,6 +177,7 @@ def sum_springs(
         impulse += spring.impulse[s]
         normal += spring.normal_impulse[s]
         stick += spring.stick_impulse[s]
+        lost += spring.lost[s]
         spring.impulse[s] = wp.vec3d()
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
@@ -127,6 +189,7 @@ def sum_springs(
     z_sum = wp.tile_sum(wp.tile(impulse[2]))
     normal_sum = wp.tile_sum(wp.tile(normal))
     stick_sum = wp.tile_sum(wp.tile(stick))
+    lost_sum = wp.tile_sum(wp.tile(lost))
     if lane == 0:
         r = row[0]
         partial_out[r, scene, column, k] = energy_sum[0]
@@ -137,3 +200,4 @@ def sum_springs(
         partial_out[r, scene, column + 5, k] = z_sum[0]
         partial_out[r, scene, column + 6, k] = normal_sum[0]
         partial_out[r, scene, column + 7, k] = stick_sum[0]
+        partial_out[r, scene, column + 8, k] = lost_sum[0]

@@ -48,7 +48,13 @@ def build(
         name="rolling_sphere",
         bodies=(ball,),
         contacts=(
-            mca.Contact(slave=mca.Surface(body="ball", nodes="pole"), master=mca.RigidPlane(), mu=mu, penalty=penalty),
+            mca.Contact(
+                slave=mca.Surface(body="ball", nodes="pole"),
+                master=mca.RigidPlane(),
+                mu=mu,
+                penalty=penalty,
+                initial_overlap="press",
+            ),
         ),
         fixed=(mca.Fixed(body="ball", nodes="zmin", axes="z"),),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / 300.0),

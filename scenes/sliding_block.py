@@ -46,7 +46,7 @@ def build(
     return mca.Scene(
         name="sliding_block",
         bodies=(block,),
-        contacts=(mca.Contact(slave=sole, master=mca.RigidPlane(), mu=mu, penalty=penalty),),
+        contacts=(mca.Contact(slave=sole, master=mca.RigidPlane(), mu=mu, penalty=penalty, initial_overlap="press"),),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / 240.0),
         gravity=(0.0, -g, 0.0),
         tip=mca.Point(body="block", at=(0.5 * size[0], 0.5 * size[1], 0.5 * size[2])),

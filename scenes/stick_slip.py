@@ -61,7 +61,11 @@ def build(
         ),
         contacts=(
             mca.Contact(
-                slave=mca.Surface(body="bar", nodes="sole"), master=mca.RigidPlane(velocity=(v, 0.0, 0.0)), mu=mu
+                slave=mca.Surface(body="bar", nodes="sole"),
+                master=mca.RigidPlane(velocity=(v, 0.0, 0.0)),
+                mu=mu,
+                penalty=1.0,
+                initial_overlap="press",
             ),
         ),
         fixed=tuple(mca.Fixed(body="bar", nodes=nodes, axes="yz") for nodes in ("ymin", "ymax")),

@@ -261,7 +261,7 @@ class Assembly:
         node, element = self.meshes[surface.body].surface(surface.nodes)
         node = (node + self.node_start[surface.body]).astype(np.int32)
         element = (element + self.element_start[surface.body]).astype(np.int32)
-        return make_faces(self.X, node, element, self.K, self.volume)
+        return make_faces(self.X, node, element, self.K, self.G, self.volume)
 
     def nearest(self, point: Point | None) -> int:
         """Node nearest to a point, or GROUND.

@@ -59,16 +59,17 @@ class ContactStage:
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = _numbers([item.mu for item in items])
-        self._make_springs()
+        self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
+        self.spring = self._new_springs()
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each)
+            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free)
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each)
+            contact.surface_kernel(friction, self.each, self.stress_free)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides)
+            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
@@ -89,16 +90,27 @@ class ContactStage:
             wp.array(np.concatenate(numbers), dtype=wp.int32),
         )
 
-    def _make_springs(self) -> None:
-        count = int(self.springs[-1])
-        self.spring = spring.Spring()
+    def _new_springs(self) -> spring.Spring:
+        """Springs that no face presses; where some are stress-free, their resting depth is 0."""
+        count, found = int(self.springs[-1]), spring.Spring()
         for name in ("tangential", "force", "impulse"):
-            setattr(self.spring, name, wp.zeros(count, dtype=wp.vec3d))
-        for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth"):
-            setattr(self.spring, name, wp.zeros(count, dtype=wp.float64))
-        self.spring.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
-        self.spring.face = wp.full(count, -1, dtype=wp.int32)
-        self.spring.weight = wp.zeros(count, dtype=wp.vec4d)
+            setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
+        for name in (
+            "energy",
+            "friction",
+            "drive",
+            "normal_impulse",
+            "stick_impulse",
+            "depth",
+            "lost",
+            "stiffness",
+        ):
+            setattr(found, name, wp.zeros(count, dtype=wp.float64))
+        found.rest = wp.zeros(count if self.stress_free else 0, dtype=wp.float64)
+        found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
+        found.face = wp.full(count, -1, dtype=wp.int32)
+        found.weight = wp.zeros(count, dtype=wp.vec4d)
+        return found
 
     def _make_planes(self) -> None:
         planes = [item.plane for item in self.items if item.plane is not None]
@@ -115,6 +127,7 @@ class ContactStage:
         self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
         self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
         self.face = wp.array(self._join("face"), dtype=wp.int32)
+        self.face_stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
         self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
@@ -186,7 +199,7 @@ class ContactStage:
             return
         if self.sides > 1:
             slaves = [self.slave, self.slave_face, *self.around_slave, self.stiffness]
-        inputs = [X, u, v, self.u_search, *slaves, self.face, self.count, self.candidate]
+        inputs = [X, u, v, self.u_search, *slaves, self.face_stiffness, self.face, self.count, self.candidate]
         inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then eight for each contact pass (`kernels.spring.sum_springs`).
+# Columns of a record, then nine for each contact pass (`kernels.spring.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 8
+PASS_COLUMNS = 9
 OVERLAP = 0.01  # share of the energy at the start, in contact springs, that is worth a word when a guard stops the run
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
@@ -124,6 +124,7 @@ class Ledger:
             "hourglass": sums[..., HOURGLASS],
             "contact": springs[..., 0].sum(axis=-1),
             "friction": springs[..., 1].sum(axis=-1),
+            "contact_loss": springs[..., 8].sum(axis=-1),
             "damping": np.zeros(sums.shape[:-1]),
             "joint": np.zeros(sums.shape[:-1]),
             "external_work": work - self.initial_work,

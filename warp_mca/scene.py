@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from warp_mca.geometry.recipe import Recipe
 
 Vec3 = tuple[float, float, float]
+OVERLAP_CHOICES = ("refuse", "stress_free", "press")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,21 +186,27 @@ class Contact:
         slave: surface whose nodes are kept out of the master.
         master: surface of another body, or a rigid plane.
         mu: coefficient of friction [-]; 0 runs no friction at all.
-        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]; K grows without bound as nu nears 0.5, and 0.1
-            suits nu = 0.49 or 0.499.
+        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None chooses k = c E / (1 - nu^2) A^2 / V, with c
+            = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1.
         two_way: the master's nodes are also kept out of the slave's faces.
+        initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
+            with springs that count depth from there; or "press", with the springs' full force.
     """
 
     slave: Surface
     master: Surface | RigidPlane
     mu: float = 0.0
-    penalty: float = 1.0
+    penalty: float | None = None
     two_way: bool = False
+    initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
 
     def __post_init__(self) -> None:
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
-        validate.positive("Contact", penalty=self.penalty)
+        if self.penalty is not None:
+            validate.positive("Contact", penalty=self.penalty)
+        if self.initial_overlap not in OVERLAP_CHOICES:
+            raise bad_value("Contact.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")
         if not (validate.is_number(self.mu) and self.mu >= 0.0):
             raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
         if self.two_way and isinstance(self.master, RigidPlane):

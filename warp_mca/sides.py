@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 SHARP = math.cos(math.radians(50.0))  # between the normals of faces that meet at a sharp edge, at most
+BENT = math.cos(math.radians(0.1))  # between the normals of neighbouring faces of a flat surface, at least
 MOST = 6  # sides; faces of a surface as rough as to need more share them
 
 
@@ -64,6 +65,16 @@ def find_sides(face: Index, normal: Array) -> Index:
         taken = {int(number[q]) for q in meets[p]}
         number[p] = next((k for k in range(MOST) if k not in taken), p % MOST)
     return number[part]
+
+
+def is_curved(face: Index, normal: Array) -> bool:
+    """Whether neighbouring faces of a surface differ in their normals by more than BENT without a sharp edge between.
+
+    Args:
+        face, normal: as of `find_sides`.
+    """
+    _, _, cosine = _edges(face, normal)
+    return bool(((cosine >= SHARP) & (cosine < BENT)).any())
 
 
 def stiffest_fold(face: Index, normal: Array, middle: Array) -> float:
