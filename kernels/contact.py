@@ -208,8 +208,9 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any
     Where there is none, the deepest of those that it lies beside does, as a concave fold asks for. None does that would
     press the node back where the last one did not let it go: the other side of a thin body.
 
-    The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls where
-    the node slides on to a softer face, and what the spring then loses is booked; it never rises before the spring opens.
+    The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls
+    where the node slides on to a softer face, and what the spring then loses is booked; it does not rise until the
+    spring opens.
     `stress_free`: springs of bodies that overlap at the start begin without force.
     """
     settle, let_go = settle_functions(friction, stress_free)

@@ -65,7 +65,7 @@ def rest_function(stress_free: bool) -> Any:
 
 @cache
 def stiffness_function(friction: bool) -> Any:
-    """The function that gives a spring its stiffness: that of its first face, or of a softer one that it slides on to."""
+    """The function that sets a spring's stiffness at first touch, and lowers it where the node meets a softer face."""
 
     @wp.func
     def soften(s: int, gap: wp.float64, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring):
@@ -157,7 +157,7 @@ def sum_springs(
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves of each scene, which begin at `first`, into nine columns, as `kernels.ledger` sums.
+    """Sums over the slaves of each scene, which begin at `first`, into ten columns, as `kernels.ledger` sums.
 
     What is summed over the record interval then starts afresh.
     """
@@ -169,6 +169,7 @@ def sum_springs(
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
     lost = wp.float64(0.0)
+    pressed = wp.float64(0.0)
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         energy += spring.energy[s]
@@ -178,6 +179,8 @@ def sum_springs(
         normal += spring.normal_impulse[s]
         stick += spring.stick_impulse[s]
         lost += spring.lost[s]
+        if spring.energy[s] > wp.float64(0.0):
+            pressed += wp.float64(1.0)
         spring.impulse[s] = wp.vec3d()
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
@@ -190,6 +193,7 @@ def sum_springs(
     normal_sum = wp.tile_sum(wp.tile(normal))
     stick_sum = wp.tile_sum(wp.tile(stick))
     lost_sum = wp.tile_sum(wp.tile(lost))
+    pressed_sum = wp.tile_sum(wp.tile(pressed))
     if lane == 0:
         r = row[0]
         partial_out[r, scene, column, k] = energy_sum[0]
@@ -201,3 +205,4 @@ def sum_springs(
         partial_out[r, scene, column + 6, k] = normal_sum[0]
         partial_out[r, scene, column + 7, k] = stick_sum[0]
         partial_out[r, scene, column + 8, k] = lost_sum[0]
+        partial_out[r, scene, column + 9, k] = pressed_sum[0]

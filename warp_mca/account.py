@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.contact_checks import contact_warnings
 from warp_mca.geometry import Box, Plate, Rod, Sphere
 from warp_mca.geometry.quality import doubled_nodes
 from warp_mca.ledger import Ledger
@@ -93,7 +94,7 @@ class Account:
         history = self.ledger.history()
         facts = self._facts(solver, wall, stopped is not None)
         paths = path_histories(self.ready.probes, self.rings)
-        return Result(summarise(history, facts), history, None, (*self._warnings(), *said), paths, stopped)
+        return Result(summarise(history, facts), history, None, (*self._warnings(solver), *said), paths, stopped)
 
     def _facts(self, solver: Solver, wall: Mapping[str, float], cut_short: bool) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
@@ -177,7 +178,7 @@ class Account:
         slave, master = (face_geometry(mesh.points, mesh.surface(nodes)[0])[0] for mesh, nodes in sides)
         return math.sqrt(min(slave.min() / master.min(), np.median(slave) / np.median(master)))
 
-    def _warnings(self) -> list[str]:
+    def _warnings(self, solver: Solver) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found: list[str] = []
         small = [body.name for body in scene.bodies if body.kinematics == "corotational"]
@@ -200,6 +201,7 @@ class Account:
                 "nodes that a master pressed went over to a face of it around a sharp edge, where single nodes do not "
                 "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
             )
+        found += contact_warnings(scene.contacts, self.ready.model, ledger, solver, self.index)
         found += self._mesh_warnings()
         if scene.rigid and scene.rigid.inertia == "slender":
             found.append(

@@ -62,6 +62,7 @@ def run_batch(
     Raises:
         RequestError: the request cannot be carried out; nothing was written.
     """
+    from warp_mca.initial_overlap import settle_initial_overlap
     from warp_mca.output import Output
     from warp_mca.solver import Solver, check_device
     from warp_mca.threads import thread_count
@@ -84,6 +85,7 @@ def run_batch(
     if len(probes.corner):
         solver.output = Output(solver, {}, probes, frozenset())
     solver.compile()
+    settle_initial_overlap(ready, solver)
     clock.lap("compile")
     first = offsets([len(item.probes.corner) for item in ready])
     accounts = [Account(item, steps, solver, k, int(first[k])) for k, item in enumerate(ready)]

@@ -90,7 +90,7 @@ class ContactStage:
             wp.array(np.concatenate(numbers), dtype=wp.int32),
         )
 
-    def _new_springs(self) -> spring.Spring:
+    def _new_springs(self) -> Any:
         """Springs that no face presses; where some are stress-free, their resting depth is 0."""
         count, found = int(self.springs[-1]), spring.Spring()
         for name in ("tangential", "force", "impulse"):
@@ -206,6 +206,24 @@ class ContactStage:
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
 
-    def max_depth(self, scene: int) -> float:
-        """Largest penetration so far of a slave of a scene [m]."""
-        return float(self.spring.depth.numpy()[self.springs[scene] : self.springs[scene + 1]].max())
+    def initial_depths(
+        self, X: wp.array, u: wp.array, v: wp.array, force: wp.array, flag: wp.array
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Depth [m] and energy [J] of each spring before the first step, shape (spring_count,), after the first search.
+
+        The springs themselves stay as they are; `force` and `flag` are written to.
+        """
+        held = wp.clone(self.spring.held)
+        self.touch(X, u, v, 0.0, force, flag)
+        depth, energy = self.spring.depth.numpy(), self.spring.energy.numpy()
+        self.spring = self._new_springs()
+        self.spring.held = held
+        return depth, energy
+
+    def rest_at(self, depth: NDArray[np.float64]) -> None:
+        """Let springs be free of force at these depths [m], shape (spring_count,)."""
+        self.spring.rest = wp.array(depth, dtype=wp.float64)
+
+    def depths(self, scene: int) -> NDArray[np.float64]:
+        """Largest penetration so far of each spring of a scene [m], those of slave 0 first, shape (spring_count,)."""
+        return self.spring.depth.numpy()[self.springs[scene] : self.springs[scene + 1]]

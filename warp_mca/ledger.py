@@ -15,10 +15,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then nine for each contact pass (`kernels.spring.sum_springs`).
+# Columns of a record, then ten for each contact pass (`kernels.spring.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 9
-OVERLAP = 0.01  # share of the energy at the start, in contact springs, that is worth a word when a guard stops the run
+PASS_COLUMNS = 10
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
@@ -48,7 +47,6 @@ class Ledger:
         self.velocities: list[Array] = []
         self.count = 0
         self.turned = False
-        self._hint = ""  # at what else may be wrong
         self.energy_error = 0.0
         self.max_strain = 0.0
         self.initial_energy: float | None = None
@@ -68,14 +66,12 @@ class Ledger:
             GuardError: a record breaks a guard.
         """
         sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
-        if self.count == 0 and written:
-            self._hint = self._overlap(sums[0])
         *flags, turned = records["flag"]
         self.turned = bool(turned)
         for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
                 end = (self.count + written) * self.interval
-                raise GuardError(f"stopped before t = {end:.4g} s: {message}{self._hint}")
+                raise GuardError(f"stopped before t = {end:.4g} s: {message}")
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
         share = self._balance(sums[:good])
@@ -91,20 +87,12 @@ class Ledger:
             raise GuardError(
                 f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
                 f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
-                f"tolerance if that much is acceptable{self._hint}"
+                f"tolerance if that much is acceptable"
             )
         if good < written and not np.isfinite(sums[good]).all():
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
         if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
-
-    def _overlap(self, first: Array) -> str:
-        """What to say where the first record has contact springs that are pressed; nothing where it has none."""
-        energy = self._energies(first)
-        pressed, total = energy["contact"], sum(energy.values()) - energy["external_work"]
-        if not pressed > OVERLAP * total:
-            return ""
-        return f"; bodies overlap at the start, where contact springs hold {pressed:.3g} J: move them apart"
 
     def _sums(self, partial: Array) -> Array:
         """Columns of each record from its partial sums, shape (row_count, column_count)."""
@@ -163,6 +151,20 @@ class Ledger:
         """
         scale = max(self.exchanged, LEAST * self.energy_scale)
         return self.imbalance / scale if scale > 0.0 else 0.0
+
+    @property
+    def greatest_contact_share(self) -> float:
+        """Greatest energy of all contact springs in a record as a share of `exchanged` [-]; 0 where hardly any was."""
+        if not self.columns or self.exchanged <= LEAST * self.energy_scale:
+            return 0.0
+        return float(self._energies(np.array(self.columns))["contact"].max()) / self.exchanged
+
+    def pressed_at_peak(self, k: int) -> int:
+        """Springs of contact pass k that were pressed in the record in which their normal forces were greatest."""
+        if not self.columns:
+            return 0
+        springs = np.array(self.columns)[:, PASS + PASS_COLUMNS * k :]
+        return int(springs[int(springs[:, 6].argmax()), 9])
 
     def energy(self) -> dict[str, float]:
         """The ledger at the end [J]; not numbers where no record was taken in."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.bindings import Hinge, check_bindings, constraints, join_bodies
+from warp_mca.contact_checks import check_spacing
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.layout import Layout
 from warp_mca.scene import RigidPlane, Scene
@@ -95,7 +96,7 @@ class Model:
         return len(self.element_of)
 
 
-def _contacts(parts: Assembly) -> tuple[tuple[ContactPass, ...], Array, Array]:
+def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...], Array, Array]:
     """Passes, the axes along which each contact's force is reported, and what the springs add at each node."""
     passes: list[ContactPass] = []
     axes = np.zeros((len(parts.scene.contacts), 2, 3))
@@ -103,6 +104,7 @@ def _contacts(parts: Assembly) -> tuple[tuple[ContactPass, ...], Array, Array]:
     for index, contact in enumerate(parts.scene.contacts):
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
+        check_spacing(contact, parts.X, velocity, slave, master)
         for item in contact_passes(contact, index, slave, master):
             sides = (slave, master) if item.sign > 0.0 else (master, slave)
             assert sides[0] is not None
@@ -172,7 +174,7 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
     check_bindings(held, first, second)
-    passes, axes, added = _contacts(parts)
+    passes, axes, added = _contacts(parts, velocity)
     stable = parts.stable(added)
     return Model(
         X=parts.X,

@@ -186,8 +186,8 @@ class Contact:
         slave: surface whose nodes are kept out of the master.
         master: surface of another body, or a rigid plane.
         mu: coefficient of friction [-]; 0 runs no friction at all.
-        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None chooses k = c E / (1 - nu^2) A^2 / V, with c
-            = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1.
+        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes k = c E / (1 - nu^2) A^2 / V, with
+            c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1.
         two_way: the master's nodes are also kept out of the slave's faces.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
             with springs that count depth from there; or "press", with the springs' full force.

@@ -254,6 +254,7 @@ def run(
         RequestError: the request cannot be carried out; nothing was written.
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
+    from warp_mca.initial_overlap import settle_initial_overlap
     from warp_mca.output import Output
     from warp_mca.recorders.frames import Recording, check_files, skins
     from warp_mca.solver import Solver, check_device
@@ -280,6 +281,7 @@ def run(
     if recorders or scene.paths:
         solver.output = Output(solver, surfaces, ready.probes, frozenset().union(*(r.needs for r in recorders)))
     solver.compile()
+    settle_initial_overlap([ready], solver)
     clock.lap("compile")
     account = Account(ready, steps, solver)
     recording = Recording(recorders, info, steps.intervals, steps.per_interval, solver.output)

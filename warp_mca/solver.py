@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.bonds import BondStage
 from warp_mca.contact_stage import ContactStage, per_scene
@@ -280,10 +281,16 @@ class Solver:
             for stage in self.contacts:
                 stage.search(self.X, self.u, self.flag)
 
+    def initial_depths(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Of each contact, depth [m] and energy [J] of every spring at the start; nothing of the state changes."""
+        with wp.ScopedDevice(self.device):
+            force, flag = wp.zeros_like(self.contact_force), wp.zeros_like(self.flag)
+            return [stage.initial_depths(self.X, self.u, self.v, force, flag) for stage in self.contacts]
+
     def start(self) -> None:
         """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
 
-        Bodies are free of stress then, and none presses on another.
+        Bodies are free of stress then.
         """
         with wp.ScopedDevice(self.device):
             self._integrate(-0.5 * self.dt, 0.0, self.bonds.at_rest)
@@ -344,7 +351,7 @@ class Solver:
 
     def max_penetration(self, scene: int = 0) -> float:
         """Greatest depth that a slave node of a scene reached below its master [m]."""
-        return max((stage.max_depth(scene) for stage in self.contacts), default=0.0)
+        return max((float(stage.depths(scene).max()) for stage in self.contacts), default=0.0)
 
     def joint_impulses(self, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each joint of a scene gave to its first body [N s], by name."""

@@ -17,8 +17,8 @@ Index = NDArray[np.int32]
 SEARCH_MARGIN = 0.25  # of the smallest face: how far a slave looks for faces beyond those that it touches
 LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
 LONGEST_LIST = 4096  # slave nodes near a face at most
-# Default spring stiffness over E* A^2 / V, with E* = E / (1 - nu^2). At nu = 0.3 they are penalty = 1 and 5. A few nodes
-# carry a curved contact, so that softer springs lower its force peak; docs/theory.md has the measurement.
+# Default spring stiffness over E* A^2 / V, with E* = E / (1 - nu^2): at nu = 0.3 as penalty = 1 and 5. Few nodes carry
+# a curved contact, so softer springs lower its force peak; docs/theory.md has the measurement.
 FLAT, CURVED = 0.7583, 3.792
 
 
@@ -34,7 +34,7 @@ class Faces:
         normal: outwards, as long as the area [m^2], shape (face_count, 3), float64.
         middle: mean of the corners [m], shape (face_count, 3), float64.
         bulk: K A^2 / V of each face [N/m], shape (face_count,), float64.
-        contact: E* A^2 / V of each face with the contact modulus E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
+        contact: E* A^2 / V of each face, with E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
     """
 
     node: Index
@@ -98,6 +98,11 @@ class ContactPass:
     room: int = LIST_LENGTH
     deepest: float = 0.0
     initial_overlap: str = "refuse"
+
+    @property
+    def smallest_area(self) -> float:
+        """Area of the smallest master face [m^2], from the margin of the search."""
+        return (self.margin / SEARCH_MARGIN) ** 2
 
     @property
     def sides(self) -> int:
@@ -206,11 +211,16 @@ def _surface_pass(
     )
 
 
+def is_curved_contact(X: Array, item: ContactPass) -> bool:
+    """Whether one of the surfaces of a pass is curved; a plane is not. X: positions [m], shape (node_count, 3)."""
+    return any(is_curved(face, face_geometry(X, face)[1]) for face in (item.slave_face, item.face) if len(face))
+
+
 def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | None) -> list[ContactPass]:
     """One pass, or two when the contact is two-way: then each carries half the stiffness.
 
-    The spring of a slave node has the stiffness of the node's own faces or of the master face that it touches, whichever
-    is lower; `kernels.contact` says what happens where the node slides on to a softer face.
+    The spring of a slave node has the stiffness of the node's own faces or of the master face that it touches,
+    whichever is lower; `kernels.contact` says what happens where the node slides on to a softer face.
     """
     factor, own, other = spring_stiffness(contact, slave, master)
     if master is None:
@@ -221,6 +231,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
             ContactPass(
                 slave=nodes,
                 stiffness=factor * _node_mean(nodes, slave, own),
+                slave_face=slave.node,
                 mu=contact.mu,
                 sign=1.0,
                 contact=index,

@@ -1,0 +1,16 @@
+"""Owns how deep points lie inside a closed surface."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel(enable_backward=False)
+def depths_inside(
+    mesh: wp.uint64, point: wp.array(dtype=wp.vec3f), reach: float, depth_out: wp.array(dtype=wp.float32)
+):
+    """Distance of each point to the surface [m], negative outside and no more than `reach`."""
+    i = wp.tid()
+    found = wp.mesh_query_point_sign_winding_number(mesh, point[i], reach)
+    at = wp.mesh_eval_position(mesh, found.face, found.u, found.v)
+    depth_out[i] = wp.where(found.result, -found.sign * wp.length(point[i] - at), -reach)
