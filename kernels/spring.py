@@ -157,7 +157,7 @@ def sum_springs(
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves of each scene, which begin at `first`, into ten columns, as `kernels.ledger` sums.
+    """Sums over the slaves of each scene, which begin at `first`, into eleven columns, as `kernels.ledger` sums.
 
     What is summed over the record interval then starts afresh.
     """
@@ -169,7 +169,8 @@ def sum_springs(
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
     lost = wp.float64(0.0)
-    pressed = wp.float64(0.0)
+    pressure = wp.float64(0.0)
+    squares = wp.float64(0.0)
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         energy += spring.energy[s]
@@ -179,8 +180,9 @@ def sum_springs(
         normal += spring.normal_impulse[s]
         stick += spring.stick_impulse[s]
         lost += spring.lost[s]
-        if spring.energy[s] > wp.float64(0.0):
-            pressed += wp.float64(1.0)
+        normal_force = spring.force[s] - spring.tangential[s]
+        pressure += wp.length(normal_force)
+        squares += wp.dot(normal_force, normal_force)
         spring.impulse[s] = wp.vec3d()
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
@@ -193,7 +195,8 @@ def sum_springs(
     normal_sum = wp.tile_sum(wp.tile(normal))
     stick_sum = wp.tile_sum(wp.tile(stick))
     lost_sum = wp.tile_sum(wp.tile(lost))
-    pressed_sum = wp.tile_sum(wp.tile(pressed))
+    pressure_sum = wp.tile_sum(wp.tile(pressure))
+    squares_sum = wp.tile_sum(wp.tile(squares))
     if lane == 0:
         r = row[0]
         partial_out[r, scene, column, k] = energy_sum[0]
@@ -205,4 +208,5 @@ def sum_springs(
         partial_out[r, scene, column + 6, k] = normal_sum[0]
         partial_out[r, scene, column + 7, k] = stick_sum[0]
         partial_out[r, scene, column + 8, k] = lost_sum[0]
-        partial_out[r, scene, column + 9, k] = pressed_sum[0]
+        partial_out[r, scene, column + 9, k] = pressure_sum[0]
+        partial_out[r, scene, column + 10, k] = squares_sum[0]

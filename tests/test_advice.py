@@ -10,7 +10,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca import scene_file
-from warp_mca.errors import GuardError, RequestError
+from warp_mca.errors import RequestError
 from warp_mca.geometry import Mesh
 from warp_mca.geometry.quality import doubled_nodes
 
@@ -59,18 +59,6 @@ def test_parts_of_a_mesh_that_only_touch_are_pointed_out():
     (said,) = mca.run(alone(touching)).warnings
     assert said.startswith("9 nodes of body it lie where others of it do")
     assert not mca.run(alone(one)).warnings
-
-
-@pytest.mark.parametrize(("gap", "overlaps"), [(-1e-3, True), (-2e-5, True), (1e-3, False)])
-def test_a_guard_that_stops_bodies_which_overlap_says_so(gap: float, overlaps: bool):
-    scene = stacked(4, 4, gap)
-    if not overlaps:
-        scene = replace(scene, impact=replace(SHORT, time_step_scale=1.0, duration=1e-4))
-        fast = replace(scene.bodies[1], velocity=(0.0, -400.0, 0.0))
-        scene = replace(scene, bodies=(scene.bodies[0], fast))
-    with pytest.raises(GuardError) as stopped:
-        mca.run(scene)
-    assert ("bodies overlap at the start, where contact springs hold" in str(stopped.value)) == overlaps
 
 
 def test_strain_of_one_kind_of_body_is_not_laid_to_the_other():

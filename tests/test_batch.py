@@ -161,7 +161,7 @@ def test_bars_of_a_batch_follow_wave_theory_each_with_its_own_speed():
         return mca.Scene(
             name="bar",
             bodies=(body,),
-            contacts=(mca.Contact(slave=mca.Surface(body="bar", nodes="xmax"), master=wall),),
+            contacts=(mca.Contact(slave=mca.Surface(body="bar", nodes="xmax"), master=wall, penalty=1.0),),
             impact=mca.ImpactPhase(duration=7e-5),
         )
 

@@ -134,7 +134,7 @@ def sliding_block(mu, *, velocity=(1.0, 0.0, 0.0), belt=(0.0, 0.0, 0.0), duratio
     return mca.Scene(
         name="block",
         bodies=(mca.Body(name="block", geometry=box, material=SOFT, velocity=velocity),),
-        contacts=(mca.Contact(slave=surface, master=plane, mu=mu, penalty=PENALTY),),
+        contacts=(mca.Contact(slave=surface, master=plane, mu=mu, penalty=PENALTY, initial_overlap="press"),),
         gravity=(0.0, -GRAVITY, 0.0),
         impact=mca.ImpactPhase(duration=duration, output_interval=2e-5),
         tip=mca.Point(body="block", at=(0.01, 0.005, 0.01)),
@@ -193,6 +193,7 @@ def test_force_is_smooth_where_a_node_slides_from_face_to_face(mu):
             master=mca.Surface(body="plate", nodes="ymax"),
             mu=mu,
             penalty=PENALTY,
+            initial_overlap="press",
         )
         scene = mca.Scene(
             name="crossing",
@@ -216,7 +217,7 @@ def test_force_is_smooth_where_a_node_slides_from_face_to_face(mu):
 
 def test_without_friction_nothing_tangential_is_left(monkeypatch):
     asked, kernel = [], solver.contact.plane_kernel
-    note = lambda friction, each: (asked.append(friction), kernel(friction, each))[1]  # noqa: E731
+    note = lambda friction, *more: (asked.append(friction), kernel(friction, *more))[1]  # noqa: E731
     monkeypatch.setattr(solver.contact, "plane_kernel", note)
     result = mca.run(sliding_block(0.0, duration=1e-3))
     assert np.abs(result.F_t).max() == 0.0
@@ -268,7 +269,7 @@ def test_closed_surface_pushes_as_the_face_that_is_touched(gap):
 
 def test_bodies_that_overlap_from_the_start_are_pushed_apart():
     """So are those that begin deeper than any slack; later, nobody can be there."""
-    scene = bars("boundary", gap=-5e-4, ratio=3)
+    scene = bars("boundary", gap=-5e-4, ratio=3, initial_overlap="press")
     scene = mca.Scene(**{**vars(scene), "impact": mca.ImpactPhase(duration=2e-5, energy_tolerance=10.0)})
     result = mca.run(scene)
     assert result.summary["max_penetration"] == pytest.approx(5e-4, rel=0.2)
@@ -316,7 +317,9 @@ def test_mesh_six_times_as_fine_touches():
 def test_room_of_lists_follows_from_the_meshes(ratio, room):
     def faces(h):
         X = h * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-        return make_faces(X, np.array([[0, 1, 2, 3]], np.int32), np.zeros(1, np.int32), np.ones(1), np.ones(1))
+        return make_faces(
+            X, np.array([[0, 1, 2, 3]], np.int32), np.zeros(1, np.int32), np.ones(1), np.ones(1), np.ones(1)
+        )
 
     contact = bars("xmin").contacts[0]
     (item,) = contact_passes(contact, 0, faces(1.0), faces(float(ratio)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SOFT = 0.5  # share of the exchanged energy in contact springs from which on they decide the answer
-PATCH = 7  # nodes of a curved contact that is three cells across: pi / 4 times 3 squared
-POINT = 3  # nodes that a flat contact rests on at least; fewer are a corner or an edge of one cell
+PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
+POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
 FACING = 0.1  # cosine between a face's normal and the direction of approach from which on the face may strike
 BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
 
@@ -69,10 +70,17 @@ def _spacing(X: Array, V: Array, side: Faces, other: Faces) -> float:
 
 
 def _width(X: Array, side: Faces) -> float:
-    """Middle one of the three extents of a surface along its principal axes [m]: a plate's width, a rod's diameter."""
+    """Width of a surface across its longest principal axis [m]: of a plate its width, of a rod its diameter.
+
+    It is the longer side of the smallest rectangle around the surface, seen along that axis.
+    """
     points = X[side.nodes] - X[side.nodes].mean(axis=0)
     _, _, axes = np.linalg.svd(points, full_matrices=False)
-    return float(np.sort(np.ptp(points @ axes.T, axis=0))[-2])
+    across = points @ axes[1:].T
+    angle = np.radians(np.arange(90.0))
+    sides = np.stack([np.cos(angle), np.sin(angle), -np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
+    extents = np.array([np.ptp(across @ turned.T, axis=0) for turned in sides])
+    return float(extents[extents.prod(axis=1).argmin()].max())
 
 
 def contact_warnings(
@@ -104,13 +112,15 @@ def _soft(ledger: Ledger) -> Iterator[str]:
 
 
 def _small_patch(contact: Contact, model: Model, item: ContactPass, ledger: Ledger, k: int) -> Iterator[str]:
-    count = ledger.pressed_at_peak(k)
+    planes = sum(bool((model.fixed_axes[item.slave] >> axis & 1).any()) for axis in range(3))
+    # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
+    count = ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes
     curved = is_curved_contact(model.X, item)
-    if 0 < count < (PATCH if curved else POINT):
+    if 0.0 < count < (PATCH if curved else POINT):
         at_all = "less than three cells across" if curved else "a corner or an edge"
         yield (
-            f"when the force on {contact.slave.body} was greatest, {count} of its nodes were pressed, {at_all}: force "
-            "and duration depend on the mesh; refine both bodies where they touch"
+            f"when the force on {contact.slave.body} was greatest, it acted on {count:.1f} nodes, {at_all}: force and "
+            "duration depend on the mesh; refine both bodies where they touch"
         )
 
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then ten for each contact pass (`kernels.spring.sum_springs`).
+# Columns of a record, then eleven for each contact pass (`kernels.spring.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 10
+PASS_COLUMNS = 11
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
@@ -159,12 +159,13 @@ class Ledger:
             return 0.0
         return float(self._energies(np.array(self.columns))["contact"].max()) / self.exchanged
 
-    def pressed_at_peak(self, k: int) -> int:
-        """Springs of contact pass k that were pressed in the record in which their normal forces were greatest."""
+    def nodes_at_peak(self, k: int) -> float:
+        """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""
         if not self.columns:
-            return 0
-        springs = np.array(self.columns)[:, PASS + PASS_COLUMNS * k :]
-        return int(springs[int(springs[:, 6].argmax()), 9])
+            return 0.0
+        force, squares = np.array(self.columns)[:, PASS + PASS_COLUMNS * k :][:, 9:11].T
+        peak = int(force.argmax())
+        return float(force[peak] ** 2 / squares[peak]) if squares[peak] > 0.0 else 0.0
 
     def energy(self) -> dict[str, float]:
         """The ledger at the end [J]; not numbers where no record was taken in."""

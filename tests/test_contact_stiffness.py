@@ -1,0 +1,107 @@
+"""Contact springs depend on what touches, and on nothing else; their default suits flat and curved surfaces."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+RUBBER = mca.Elastic(E=5e6, nu=0.3, rho=1000.0)
+
+
+def block_on_plate(plate: mca.Mesh, far: mca.Elastic = STEEL, *, speed: float = 0.0, start: float = 0.05, **contact):
+    """A block of 10 mm falls on a plate of 60 mm at 1 m/s, near its left end; cells right of `start` are of `far`."""
+    right = plate.points[plate.hexahedra].mean(axis=1)[:, 0] > start
+    plate = mca.Mesh(plate.points, plate.hexahedra, plate.node_sets, {"far": np.flatnonzero(right).astype(np.int32)})
+    block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(4, 4, 4))
+    falling = {"position": (0.002, 0.01, 0.005), "velocity": (speed, -1.0, 0.0)}
+    slave, master = mca.Surface(body="block", nodes="ymin"), mca.Surface(body="plate", nodes="ymax")
+    return mca.Scene(
+        name="block",
+        bodies=(
+            mca.Body(name="plate", geometry=plate, material={"far": far, "*": STEEL}),
+            mca.Body(name="block", geometry=block, material=STEEL, **falling),
+        ),
+        contacts=(mca.Contact(slave=slave, master=master, **contact),),
+        fixed=(mca.Fixed(body="plate", nodes="ymin"),),
+        impact=mca.ImpactPhase(duration=1.5e-5, output_interval=1e-7),
+    )
+
+
+PLATE = mca.Box(size=(0.06, 0.01, 0.02), divisions=(12, 2, 4)).build()
+
+
+@pytest.fixture(scope="module")
+def alone() -> mca.Result:
+    return mca.run(block_on_plate(PLATE))
+
+
+def test_soft_cells_far_away_do_not_soften_the_contact(alone: mca.Result):
+    """Springs took the softest face of the whole master: 13 times less force."""
+    result = mca.run(block_on_plate(PLATE, RUBBER))
+    assert result.summary["dt"] == alone.summary["dt"]
+    assert result.F_n == pytest.approx(alone.F_n, rel=1e-3, abs=1e-3 * alone.F_n.max())
+
+
+def test_narrow_cells_far_away_do_not_soften_the_contact(alone: mca.Result):
+    points = PLATE.points.copy()
+    points[np.isclose(points[:, 0], 0.055), 0] = 0.0595
+    narrow = mca.Mesh(points, PLATE.hexahedra, PLATE.node_sets)
+    assert mca.run(block_on_plate(narrow)).F_n.max() == pytest.approx(alone.F_n.max(), rel=0.02)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_what_a_spring_loses_on_a_softer_face_is_booked(mu: float):
+    """The block slides from steel on to a plastic, whose springs are a hundredth as stiff, while it is pressed."""
+    plastic = mca.Elastic(E=2e9, nu=0.3, rho=1000.0)
+    result = mca.run(block_on_plate(PLATE, plastic, speed=200.0, start=0.012, mu=mu), precision="float64")
+    energy = result.summary["energy"]
+    assert energy["contact_loss"] > 20.0 * abs(energy["error"])
+    assert energy["contact_loss"] > 0.01 * 0.5 * 7850.0 * 1e-6  # of the kinetic energy of the fall
+
+
+@pytest.mark.parametrize("cells", [10, 40])
+def test_bars_of_flat_cells_swap_their_speeds(cells: int):
+    """Springs of whole skins were those of the cells' narrow sides, the softer the finer the mesh."""
+    bar = mca.Box(size=(0.1, 0.02, 0.02), divisions=(cells, 2, 2))
+    material = replace(STEEL, nu=0.0)
+    bodies = (
+        mca.Body(name="one", geometry=bar, material=material, velocity=(1.0, 0.0, 0.0)),
+        mca.Body(name="other", geometry=bar, material=material, position=(0.1, 0.0, 0.0)),
+    )
+    skin = mca.Contact(
+        slave=mca.Surface(body="one", nodes="boundary"), master=mca.Surface(body="other", nodes="boundary")
+    )
+    impact = mca.ImpactPhase(duration=6e-5, output_interval=2e-7)
+    scene = mca.Scene(name="bars", bodies=bodies, contacts=(skin,), impact=impact)
+    result = mca.run(scene)
+    impulse = result.F_n.sum() * result.time[1]
+    mass = 7850.0 * 0.1 * 4e-4
+    assert impulse == pytest.approx(mass, rel=0.01)  # the first bar stops, the second takes its speed
+    assert result.summary["contact_duration"] == pytest.approx(0.2 / np.sqrt(210e9 / 7850.0), rel=0.08)
+
+
+@pytest.mark.parametrize("target", ["plane", "block"])
+def test_default_on_a_curved_tip_is_near_the_limit_of_stiff_springs(target: str):
+    """With penalty = 1 the peak was 3 to 4 % low, the contact 3 to 8 % long."""
+    ball = mca.make_scene("hertz_sphere", target=target, section=4, pole_size=2e-4)
+    stiff, usual = (
+        mca.run(replace(ball, contacts=(replace(ball.contacts[0], penalty=penalty),))) for penalty in (15.0, None)
+    )
+    assert usual.summary["F_n_max"] == pytest.approx(stiff.summary["F_n_max"], rel=0.015)
+    assert usual.summary["contact_duration"] == pytest.approx(stiff.summary["contact_duration"], rel=0.02)
+
+
+def test_default_on_flat_surfaces_is_a_penalty_of_one_for_steel(alone: mca.Result):
+    given = mca.run(block_on_plate(PLATE, penalty=1.0))
+    assert given.F_n == pytest.approx(alone.F_n, rel=1e-3, abs=1e-3 * alone.F_n.max())
+
+
+@pytest.mark.parametrize("nu", [-0.9, 0.0, 0.499])
+def test_default_suits_any_poissons_ratio(nu: float):
+    """A penalty takes the bulk modulus, which is E / 8.4 at nu = -0.9 and 167 E at 0.499."""
+    ball = mca.make_scene("hertz_sphere", nu=nu, section=4, pole_size=2e-4)
+    result = mca.run(replace(ball, contacts=(replace(ball.contacts[0], penalty=None),)))
+    assert result["E_contact"].max() < 0.1 * result["E_internal"].max()

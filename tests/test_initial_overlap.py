@@ -1,0 +1,97 @@
+"""Bodies that overlap before the first step are refused, start free of stress or are pressed apart."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.recorders import UsdFile
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+
+
+def falling(depth: float, *, plane: bool = False, nodes: str = "ymin", master: str = "ymax", speed=1.0, **contact):
+    """A block at 1 m/s, at the start `depth` [m] inside a plate or a plane."""
+    block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(4, 4, 4))
+    plate = mca.Box(size=(0.06, 0.01, 0.03), divisions=(12, 2, 6))
+    start = {"position": (0.021, 0.01 - depth, 0.011), "velocity": (0.0, -speed, 0.0)}
+    bodies = (mca.Body(name="block", geometry=block, material=STEEL, **start),)
+    ground: mca.Surface | mca.RigidPlane = mca.RigidPlane(point=(0.0, 0.01, 0.0))
+    if not plane:
+        bodies += (mca.Body(name="plate", geometry=plate, material=STEEL),)
+        ground = mca.Surface(body="plate", nodes=master)
+    return mca.Scene(
+        name="falling",
+        bodies=bodies,
+        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes=nodes), master=ground, **contact),),
+        fixed=() if plane else (mca.Fixed(body="plate", nodes="ymin"),),
+        impact=mca.ImpactPhase(duration=2e-5, output_interval=1e-7),
+    )
+
+
+@pytest.mark.parametrize("plane", [False, True])
+def test_overlap_is_refused_with_place_depth_and_energy(plane: bool, tmp_path: Path):
+    pattern = r"initial_overlap = 'refuse': .*25 of them, up to 0\.0001 m deep at .* would hold 54\.7 J"
+    with pytest.raises(mca.RequestError, match=pattern):
+        mca.run(falling(1e-4, plane=plane), out=tmp_path / "out", recorders=[UsdFile(tmp_path / "a.usdc")])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("nodes", ["ymin", "boundary"])
+def test_overlap_deeper_than_faces_reach_is_refused(nodes: str):
+    """Faces find nodes up to one edge behind them; these lie 6 mm below cells of 5 mm, and met nothing."""
+    with pytest.raises(mca.RequestError, match=r"lie inside .* up to 0\.00[46]"):
+        mca.run(falling(6e-3, nodes=nodes, master="ymax" if nodes == "ymin" else "boundary"))
+
+
+def test_overlap_of_one_scene_of_a_batch_names_the_scene():
+    with pytest.raises(mca.RequestError, match=r"^scenes\[1\]: Contact of block with body plate: initial_overlap"):
+        mca.run_batch([falling(0.0), falling(1e-4)])
+
+
+@pytest.mark.parametrize("plane", [False, True])
+@pytest.mark.parametrize("depth", [0.0, 1e-12, -1e-12])
+def test_rounding_is_no_overlap(plane: bool, depth: float):
+    apart = mca.run(falling(-1e-7, plane=plane))
+    result = mca.run(falling(depth, plane=plane))
+    assert result.F_n.max() == pytest.approx(apart.F_n.max(), rel=1e-3)
+    assert not any("inside" in warning for warning in result.warnings)
+
+
+@pytest.mark.parametrize("plane", [False, True])
+def test_stress_free_overlap_strikes_as_bodies_that_touch(plane: bool):
+    touching = mca.run(falling(0.0, plane=plane), precision="float64")
+    result = mca.run(falling(1e-4, plane=plane, initial_overlap="stress_free"), precision="float64")
+    assert result.F_n[0] == 0.0 == result["E_contact"][0]
+    rise = slice(0, int(touching.F_n.argmax()) + 5)
+    assert result.F_n[rise] == pytest.approx(touching.F_n[rise], abs=0.03 * touching.F_n.max())
+    assert result.summary["energy_error"] < 2e-3
+    assert result["E_kinetic"].max() <= result["E_kinetic"][0]
+
+
+def test_stress_free_nodes_that_left_come_back_to_the_surface():
+    """The resting depth shrinks as a node moves out: a block that left strikes the plane where it is."""
+    scene = falling(2e-6, plane=True, initial_overlap="stress_free", speed=-1.0)
+    scene = replace(scene, gravity=(0.0, -1e5, 0.0), impact=mca.ImpactPhase(duration=4e-5, output_interval=1e-7))
+    result = mca.run(scene, precision="float64")
+    first = result.time[np.argmax(result.F_n > 1.0)]
+    assert first == pytest.approx((1.0 + np.sqrt(1.0 - 2.0 * 1e5 * 2e-6)) / 1e5, abs=3e-7)  # y = v t - g t^2 / 2
+
+
+def test_pressed_overlap_throws_the_bodies_apart():
+    scene = falling(1e-6, plane=True, initial_overlap="press", penalty=1.0)
+    result = mca.run(scene)
+    springs = 16 * STEEL.bulk_modulus * 0.01 / 4.0  # K A^2 / V: 25 nodes, of cells with edges of 10 mm / 4
+    assert result["E_contact"][0] == pytest.approx(0.5 * 25 / 16 * springs * 1e-12, rel=0.02)
+
+
+def test_a_body_at_rest_above_a_plane_has_nothing_said_of_overlap():
+    scene = falling(-1e-9, plane=True, speed=0.0)
+    assert mca.run(replace(scene, gravity=(0.0, -9.81, 0.0))).warnings == ()
+
+
+def test_unknown_choice_is_refused():
+    with pytest.raises(mca.RequestError, match=r"Contact\.initial_overlap = 'ignore': choose refuse or stress_free"):
+        falling(0.0, initial_overlap="ignore")
