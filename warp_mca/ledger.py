@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.contact_history import ContactHistory
 from warp_mca.errors import GuardError
 
 if TYPE_CHECKING:
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then eight for each contact pass (`kernels.spring.sum_springs`).
+# Columns of a record, then PASS_COLUMNS for each contact pass (`kernels.spring.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 8
+PASS_COLUMNS = 13
 OVERLAP = 0.01  # share of the energy at the start, in contact springs, that is worth a word when a guard stops the run
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
@@ -113,9 +114,13 @@ class Ledger:
         sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
         return sums
 
+    def _springs(self, sums: Array) -> Array:
+        """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
+        return sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
-        springs = sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+        springs = self._springs(sums)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
         return {
             "kinetic": sums[..., KINETIC],
@@ -177,8 +182,7 @@ class Ledger:
         Forces are means over the interval before.
         """
         table = np.array(self.columns[first:]).reshape(-1, self._width)
-        energy = self._energies(table)
-        springs = table[:, PASS:].reshape(len(table), len(self.model.passes), PASS_COLUMNS)
+        energy, springs = self._energies(table), self._springs(table)
         share = self.dt / self.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
@@ -209,4 +213,35 @@ class Ledger:
             "E_contact": energy["contact"],
             "E_friction": energy["friction"],
             "E_total_error": balance - (self.initial_energy or 0.0),
+            "tip_vz": velocity[:, 0, 2],
+            "plate_vy": velocity[:, 1, 1],
+            "plate_vz": velocity[:, 1, 2],
+            "closing_speed": _closing_speed(springs),
         }
+
+    def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
+        """Each contact by itself, with these `names`."""
+        table = np.array(self.columns).reshape(-1, self._width)
+        springs, share = self._springs(table), self.dt / self.interval
+        found: list[ContactHistory] = []
+        for index, name in enumerate(names):
+            own = [k for k, item in enumerate(self.model.passes) if item.contact == index]
+            sign = np.array([self.model.passes[k].sign for k in own])
+            found.append(
+                ContactHistory(
+                    name=name,
+                    force=share * np.einsum("p,rpc->rc", sign, springs[:, own, 3:6]),
+                    pressure=share * springs[:, own, 6].sum(axis=1),
+                    normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, 8:11]),
+                    closing_speed=_closing_speed(springs[:, own]),
+                )
+            )
+        return tuple(found)
+
+
+def _closing_speed(springs: Array) -> Array:
+    """As in `ContactHistory`, from columns of `sum_springs`, shape (row_count, pass_count, PASS_COLUMNS)."""
+    pressure, power = springs[:, :, 11].sum(axis=1), springs[:, :, 12].sum(axis=1)
+    speed: Array = np.full(len(springs), np.nan)
+    np.divide(power, pressure, out=speed, where=pressure > 0.0)
+    return speed

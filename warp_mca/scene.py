@@ -188,6 +188,13 @@ class Contact:
         penalty: factor f of the penalty stiffness k = f K A^2 / V [-]; K grows without bound as nu nears 0.5, and 0.1
             suits nu = 0.49 or 0.499.
         two_way: the master's nodes are also kept out of the slave's faces.
+        name: unique in the scene; None for the bodies' names, "slave–master" or "slave–plane", numbered where a pair
+            has several contacts. Results list forces by it.
+        normal: direction of the force on the slave that F_n_N reports [-], of any length. None takes the master's mean
+            normal at hand-off, or adds up the normal forces as they are where the master is closed. Give it where the
+            master turns before the impact, or where only a part of a curved master is touched.
+        tangent: direction that F_t_N reports [-], made perpendicular to the normal. None takes normal x z, or the
+            perpendicular nearest to +x where the normal is within 20 degrees of the z axis.
     """
 
     slave: Surface
@@ -195,6 +202,9 @@ class Contact:
     mu: float = 0.0
     penalty: float = 1.0
     two_way: bool = False
+    name: str | None = None
+    normal: Vec3 | None = None
+    tangent: Vec3 | None = None
 
     def __post_init__(self) -> None:
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
@@ -206,6 +216,14 @@ class Contact:
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
             raise bad_value("Contact.master.body", self.master.body, "name a body other than the slave's")
+        if self.name is not None:
+            validate.texts("Contact", name=self.name)
+        for axis in ("normal", "tangent"):
+            value = getattr(self, axis)
+            if value is not None:
+                validate.vectors("Contact", **{axis: value})
+                if not any(value):
+                    raise bad_value(f"Contact.{axis}", value, "give a direction other than zero")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -402,8 +420,8 @@ class Scene:
         joints, contacts, fixed, prescribed: what binds the bodies.
         gravity: [m/s^2].
         paths: lines along which stress is recorded.
-        tip: point whose velocity the history lists as tip_vx, tip_vy.
-        target: point whose velocity the history lists as plate_vx.
+        tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
+        target: point whose velocity the history lists as plate_vx, plate_vy, plate_vz.
         parameters: the values that a built-in scene was made from, for the record.
     """
 
@@ -437,6 +455,9 @@ class Scene:
         paths = [path.name for path in self.paths]
         if len(set(paths)) != len(paths):
             raise bad_value("Scene.paths", paths, "give each path a name of its own")
+        contacts = [contact.name for contact in self.contacts if contact.name is not None]
+        if len(set(contacts)) != len(contacts):
+            raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
         pairs = [(item.slave, _plain(item.master)) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.history import Interval, contact_intervals, intervals, smoothed, stick_intervals
+from warp_mca.history import Interval, contact_intervals, intervals, phases, stick_intervals
 from warp_mca.report.style import BLACK, BLUE, STICK, VERMILION, legend_beside, new_figure, save_png, tidy
 
 if TYPE_CHECKING:
@@ -22,23 +22,22 @@ if TYPE_CHECKING:
     from warp_mca.results import Result
 
 COMPRESSION, RESTITUTION = "#5A5A5A", "#BDBDBD"
+REST = 1e-9  # share of the greatest energy of a run; contact forces that do less work are rounded at rest
 STRIP = 0.035  # height of the strip of phases, as a share of the axes
 
 
 def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
-    """Times of compression and of restitution [s].
+    """Times of compression and of restitution [s], see `history.phases`.
 
-    In contact, the bodies are compressed while the tip moves towards the plate, tip_vy < 0; otherwise they restitute.
-    Both lists are empty when the scene has no tip.
+    Both lists are empty where contact forces do no more work than REST of the energy of the run, and for results that
+    were saved without closing speeds.
     """
-    time, velocity = result.time, result["tip_vy"]
-    if len(time) < 2 or not np.isfinite(velocity).all():
+    time, energy = result.time, sum(result[name] for name in ("E_kinetic", "E_internal", "E_contact"))
+    if len(time) < 2 or "closing_speed" not in result.history:
         return [], []
-    touching = np.zeros(len(time), dtype=bool)
-    for start, end in contact_intervals(time, result.F_n):
-        touching |= (time > start) & (time <= end)
-    closing = smoothed(time, velocity) < 0.0
-    return intervals(time, touching & closing, 0.0), intervals(time, touching & ~closing, 0.0)
+    least = REST * float(np.max(energy)) / float(time[-1] - time[-2])
+    compression, restitution = phases(result.F_n, result["closing_speed"], least)
+    return intervals(time, compression), intervals(time, restitution)
 
 
 def plot_forces(result: Result) -> Figure:
