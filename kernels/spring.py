@@ -7,7 +7,6 @@ import warp as wp
 
 from warp_mca.kernels.friction import release, stick_slip
 from warp_mca.kernels.ledger import run_of
-from warp_mca.kernels.projection import interpolate
 
 wp.set_module_options({"enable_backward": False})
 
@@ -90,35 +89,18 @@ def open_function(friction: bool) -> Any:
     return open_contact
 
 
-@wp.func
-def point_velocity(
-    v: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int, weight: wp.vec4d, plane: wp.vec3d
-) -> wp.vec3d:
-    """Velocity [m/s] of the touched point: of face f at these shape functions, or of the plane where are no faces."""
-    if face.shape[0] == 0:
-        return plane
-    return interpolate(weight, v[face[f, 0]], v[face[f, 1]], v[face[f, 2]], v[face[f, 3]])
-
-
 @wp.kernel(enable_backward=False)
 def sum_springs(
     row: wp.array(dtype=wp.int32),
     column: int,
     first: wp.array(dtype=wp.int32),
-    sides: int,
-    slave: wp.array(dtype=wp.int32),
-    face: wp.array2d(dtype=wp.int32),
-    plane_velocity: wp.array(dtype=wp.vec3d),
-    v_before: wp.array(dtype=wp.vec3d),
-    v: wp.array(dtype=wp.vec3d),
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the springs of each scene, which begin at `first`, into PASS_COLUMNS columns, as `kernels.ledger` sums.
+    """Sums over the slaves of each scene, which begin at `first`, into PASS_COLUMNS columns, as `kernels.ledger` sums.
 
-    What is summed over the record interval then starts afresh. The last five columns are taken at the record: the
-    vector sum of the normal forces Fn n [N], their sum Fn [N], and the sum of Fn (v_master - v_slave) . n [W], with the
-    mean velocities of the half steps around t(n). Each slave has a spring for each of the `sides` of the master.
+    What is summed over the record interval then starts afresh. The last five columns are of the state at the record:
+    the vector sum of the normal forces [N], their sum [N], and the energy that the normal springs hold [J].
     """
     scene, k, lane = wp.tid()
     energy = wp.float64(0.0)
@@ -129,10 +111,18 @@ def sum_springs(
     stick = wp.float64(0.0)
     pressed = wp.vec3d()
     pressure = wp.float64(0.0)
-    power = wp.float64(0.0)
+    pressed_energy = wp.float64(0.0)
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
-        energy += spring.energy[s]
+        held = spring.energy[s]
+        energy += held
+        if held > wp.float64(0.0):
+            Ft = spring.tangential[s]
+            Fn = spring.force[s] - Ft
+            squares = wp.dot(Fn, Fn)
+            pressed += Fn
+            pressure += wp.sqrt(squares)
+            pressed_energy += held * (squares / (squares + wp.dot(Ft, Ft)))
         friction += spring.friction[s]
         drive += spring.drive[s]
         impulse += spring.impulse[s]
@@ -141,17 +131,6 @@ def sum_springs(
         spring.impulse[s] = wp.vec3d()
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
-        f = spring.face[s]
-        if f >= 0:
-            Fn = spring.force[s] - spring.tangential[s]
-            i = slave[s // sides]
-            plane = plane_velocity[scene]
-            weight = spring.weight[s]
-            twice = point_velocity(v_before, face, f, weight, plane) + point_velocity(v, face, f, weight, plane)
-            twice -= v_before[i] + v[i]
-            pressed += Fn
-            pressure += wp.length(Fn)
-            power += wp.float64(0.5) * wp.dot(Fn, twice)
     energy_sum = wp.tile_sum(wp.tile(energy))
     friction_sum = wp.tile_sum(wp.tile(friction))
     drive_sum = wp.tile_sum(wp.tile(drive))
@@ -164,7 +143,7 @@ def sum_springs(
     pressed_y_sum = wp.tile_sum(wp.tile(pressed[1]))
     pressed_z_sum = wp.tile_sum(wp.tile(pressed[2]))
     pressure_sum = wp.tile_sum(wp.tile(pressure))
-    power_sum = wp.tile_sum(wp.tile(power))
+    pressed_energy_sum = wp.tile_sum(wp.tile(pressed_energy))
     if lane == 0:
         r = row[0]
         partial_out[r, scene, column, k] = energy_sum[0]
@@ -179,4 +158,4 @@ def sum_springs(
         partial_out[r, scene, column + 9, k] = pressed_y_sum[0]
         partial_out[r, scene, column + 10, k] = pressed_z_sum[0]
         partial_out[r, scene, column + 11, k] = pressure_sum[0]
-        partial_out[r, scene, column + 12, k] = power_sum[0]
+        partial_out[r, scene, column + 12, k] = pressed_energy_sum[0]

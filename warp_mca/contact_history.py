@@ -31,9 +31,9 @@ class ContactHistory:
         pressure: normal forces of all slave nodes, added up as they are, mean over the interval [N], shape
             (row_count,), float64.
         normal_force: vector sum of the normal forces at the end of the interval [N], shape (row_count, 3), float64.
-        closing_speed: of the touching surfaces along their normal at the end of the interval, mean over the nodes that
-            touch, weighted with their normal forces [m/s], shape (row_count,), float64; positive where the surfaces
-            approach each other, nan where they do not touch.
+        closing_speed: speed at which the touching surfaces approach each other along their normal, mean over the
+            interval and over the nodes that touch, weighted with their normal forces [m/s], shape (row_count,),
+            float64; negative while they part, nan where nothing touched and in the first row.
     """
 
     name: str
@@ -107,9 +107,10 @@ def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[st
     if contacts and not any(contact.touched for contact in contacts):
         found.append("no contact closed in the simulated time: give a longer duration, or check positions and speeds")
     if names := [contact.name for contact in contacts if contact.unfinished]:
+        which = f"contact {names[0]} was" if len(names) == 1 else f"contacts {', '.join(names)} were"
         found.append(
-            f"when the run ended contact was still in progress ({', '.join(names)}): impulse, duration and peaks are "
-            "those so far; give a longer duration, if it is to end"
+            f"{which} still in progress when the run ended: impulse, duration and peaks are those so far; give a "
+            "longer duration if it should end"
         )
     for contact, (normal, tangent) in zip(contacts, axes, strict=True):
         if contact.normal is not None:

@@ -65,7 +65,6 @@ class ContactStage:
             self.kernel = contact.plane_kernel(friction, self.each)
             self._make_planes()
             return
-        self.plane_velocity = wp.zeros(len(items), dtype=wp.vec3d)
         self.kernel = (
             contact.surface_kernel(friction, self.each)
             if self.sides == 1
@@ -107,8 +106,6 @@ class ContactStage:
         unit = [normal / np.linalg.norm(normal) for normal in normals]
         self.planes = [_vectors([p.point for p in planes]), _vectors(unit), _vectors([p.velocity for p in planes])]
         self.deepest = _numbers([item.deepest for item in self.items])
-        self.plane_velocity = wp.array([plane.velocity for plane in planes], dtype=wp.vec3d)
-        self.face = wp.zeros((0, 4), dtype=wp.int32)
 
     def _make_faces(self, model: Model) -> None:
         lists, faces = int(self.springs[-1]), offsets([len(item.face) for item in self.items])
@@ -195,11 +192,6 @@ class ContactStage:
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
-
-    def sum_inputs(self, v_before: wp.array, v: wp.array) -> list[Any]:
-        """What `kernels.spring.sum_springs` takes of this pass, with the velocities before and after t(n) [m/s]."""
-        springs = [self.column, self.first, self.sides, self.slave, self.face, self.plane_velocity]
-        return [*springs, v_before, v, self.spring]
 
     def max_depth(self, scene: int) -> float:
         """Largest penetration so far of a slave of a scene [m]."""

@@ -188,25 +188,25 @@ def _peak_rows(F_n: Array, rows: Rows, smooth: Array, prominence: float) -> list
 def phases(F_n: Array, closing_speed: Array, least: float) -> tuple[list[Rows], list[Rows]]:
     """Rows of compression and of restitution.
 
-    The contact forces do work on the deformation at the rate F_n v, where v is the speed at which the surfaces close.
-    Bodies are compressed while this work, added up from the beginning of a contact, rises, and restitute while it
-    falls; to and fro by less than 5 % of its range in the contact belong to the phase around them.
+    The surfaces press on each other with the power F_n v, where v is the speed at which they close. A contact is
+    compressed while the work of this power since its beginning rises, and restitutes while it falls. The power is
+    smoothed as in `force_peaks`, and turns of less than 5 % of the range of the work belong to the phase around them.
 
     Args:
         F_n: normal force [N], shape (row_count,).
-        closing_speed: [m/s], shape (row_count,); nan where nothing touches.
+        closing_speed: as in `ContactHistory` [m/s], shape (row_count,).
         least: work over the interval between rows [W]; a contact that does no more is at rest and has no phases.
     """
     found: tuple[list[Rows], list[Rows]] = [], []
     power = F_n * np.nan_to_num(closing_speed)
     for first, end in contact_rows(F_n):
-        work = np.concatenate([[0.0], np.cumsum(power[first:end])])
-        if not np.ptp(work) > least:
-            continue
-        turns = _turns(work, TURN * float(np.ptp(work)))
-        bounds = [0, *turns[1:-1], end - first]
-        for start, stop, a, b in zip(bounds, bounds[1:], turns, turns[1:], strict=False):
-            found[int(work[b] < work[a])].append((first + start, first + stop))
+        work = np.concatenate([[0.0], np.cumsum(smoothed(power, (first, end)))])
+        size = float(np.ptp(work))
+        if size > least:
+            turns = _turns(work, TURN * size)
+            bounds = [first, *(first + turn for turn in turns[1:-1]), end]
+            for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
+                found[int(work[turns[k + 1]] < work[turns[k]])].append((start, stop))
     return found
 
 

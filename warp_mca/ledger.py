@@ -216,13 +216,12 @@ class Ledger:
             "tip_vz": velocity[:, 0, 2],
             "plate_vy": velocity[:, 1, 1],
             "plate_vz": velocity[:, 1, 2],
-            "closing_speed": _closing_speed(springs),
+            "closing_speed": self._closing_speed(first),
         }
 
     def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
         """Each contact by itself, with these `names`."""
-        table = np.array(self.columns).reshape(-1, self._width)
-        springs, share = self._springs(table), self.dt / self.interval
+        springs, share = self._springs(np.array(self.columns).reshape(-1, self._width)), self.dt / self.interval
         found: list[ContactHistory] = []
         for index, name in enumerate(names):
             own = [k for k, item in enumerate(self.model.passes) if item.contact == index]
@@ -233,15 +232,21 @@ class Ledger:
                     force=share * np.einsum("p,rpc->rc", sign, springs[:, own, 3:6]),
                     pressure=share * springs[:, own, 6].sum(axis=1),
                     normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, 8:11]),
-                    closing_speed=_closing_speed(springs[:, own]),
+                    closing_speed=self._closing_speed(0, own),
                 )
             )
         return tuple(found)
 
+    def _closing_speed(self, first: int, passes: Sequence[int] | slice = slice(None)) -> Array:
+        """As in `ContactHistory`, of some passes, from row `first` on.
 
-def _closing_speed(springs: Array) -> Array:
-    """As in `ContactHistory`, from columns of `sum_springs`, shape (row_count, pass_count, PASS_COLUMNS)."""
-    pressure, power = springs[:, :, 11].sum(axis=1), springs[:, :, 12].sum(axis=1)
-    speed: Array = np.full(len(springs), np.nan)
-    np.divide(power, pressure, out=speed, where=pressure > 0.0)
-    return speed
+        Normal forces do the work dE = sum(F_n v dt) on their springs. So the gain of these in an interval, over the
+        normal impulse by the trapezoidal rule, is the mean of v over nodes and time that is weighted with F_n.
+        """
+        rows = np.array(self.columns[max(first - 1, 0) :]).reshape(-1, self._width)
+        springs = self._springs(rows)[:, passes].sum(axis=1)
+        gain, rise = np.diff(springs[:, 12]), np.diff(springs[:, 11])
+        impulse = self.dt * (springs[1:, 6] - 0.5 * rise)
+        speed: Array = np.full(len(rows), np.nan)
+        np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
+        return speed[min(first, 1) :]

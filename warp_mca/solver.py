@@ -4,11 +4,11 @@
 |---|---|---|
 | 1 element forces | `hex8_patch_force`, `tet4_force`, … | every step, for each block of like elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
-| 3 record at t(n) | `hex8_energy`, …, `sum_elements` | first step of each output interval |
+| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval |
 | 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | the same, where a scene has paths or a frame is due |
 | 4 gather and integrate | `integrate` | every step |
 | 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
-| 5 record of motion | `record_motion`, `sum_springs` | first step of each output interval |
+| 5 record of motion | `record_motion` | first step of each output interval |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
 between two searches raise a flag, which stops the run. On the CPU, stages 1, 2 and 4 and energies of stage 3 are cut
@@ -206,13 +206,11 @@ class Solver:
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
         with wp.ScopedStream(self.sums):
+            for touching in self.contacts:
+                springs = [touching.column, touching.first, touching.spring]
+                self._sum(spring.sum_springs, int(np.diff(touching.springs).max()), springs)
             self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
         self._advance(split, self.v_before)
-        if self.contacts:
-            with wp.ScopedStream(self.sums):
-                for touching in self.contacts:
-                    springs = touching.sum_inputs(self.v_before, self.v)
-                    self._sum(spring.sum_springs, int(np.diff(touching.springs).max()), springs)
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
         motion += [self.bonds.work, self.bonds.driven_first, self.point_node]
         self._sum(ledger.record_motion, self.most_nodes, motion, self.point_velocity)
