@@ -67,6 +67,7 @@ def test_results_without_closing_speeds_have_no_phases():
 def test_velocities_are_those_along_the_axes_in_which_the_tip_moves():
     run = result(3000.0)
     run.history.update({f"{point}_v{axis}": np.zeros(len(TIME)) for point in ("tip", "plate") for axis in "xyz"})
+    run.history["plate_vx"] = run.history["plate_vz"] = np.ones(len(TIME))
     run.history["tip_vz"] = np.linspace(-1.0, 1.0, len(TIME))
     run.history["closing_speed"] = np.cos(np.pi * TIME / 4e-4)
     labels = [line.get_label() for line in plot_forces(run).axes[1].lines[1:]]

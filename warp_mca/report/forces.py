@@ -117,7 +117,8 @@ def _draw_velocities(axes: Axes, result: Result) -> None:
     time, shown = 1e3 * result.time, _moving_axes(result)
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     for column, label, colour, style, width in VELOCITIES:
-        if column in result.history and (column[-1] in shown or column == "closing_speed"):
+        wanted = column[-1] in shown or column == "closing_speed"
+        if wanted and np.nan_to_num(result.history.get(column, np.zeros(1))).any():
             axes.plot(time, result[column], color=colour, linestyle=style, label=label, linewidth=width)
     axes.margins(y=0.08)
     axes.set_ylabel("velocity [m/s]")
