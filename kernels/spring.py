@@ -157,9 +157,11 @@ def sum_springs(
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves of each scene, which begin at `first`, into eleven columns, as `kernels.ledger` sums.
+    """Sums over the slaves of each scene, which begin at `first`, into PASS_COLUMNS columns, as `kernels.ledger` sums.
 
-    What is summed over the record interval then starts afresh.
+    What is summed over the record interval then starts afresh. The last columns are of the state at the record: the
+    vector sum of the normal forces [N], their sum [N], the energy that the normal springs hold [J], the energy that
+    springs lost as they became softer [J], and the sum of the squares of the normal forces [N^2].
     """
     scene, k, lane = wp.tid()
     energy = wp.float64(0.0)
@@ -168,21 +170,29 @@ def sum_springs(
     impulse = wp.vec3d()
     normal = wp.float64(0.0)
     stick = wp.float64(0.0)
-    lost = wp.float64(0.0)
+    pressed = wp.vec3d()
     pressure = wp.float64(0.0)
+    pressed_energy = wp.float64(0.0)
+    lost = wp.float64(0.0)
     squares = wp.float64(0.0)
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
-        energy += spring.energy[s]
+        held = spring.energy[s]
+        energy += held
+        if held > wp.float64(0.0):
+            Ft = spring.tangential[s]
+            Fn = spring.force[s] - Ft
+            square = wp.dot(Fn, Fn)
+            pressed += Fn
+            pressure += wp.sqrt(square)
+            pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
+            squares += square
         friction += spring.friction[s]
         drive += spring.drive[s]
         impulse += spring.impulse[s]
         normal += spring.normal_impulse[s]
         stick += spring.stick_impulse[s]
         lost += spring.lost[s]
-        normal_force = spring.force[s] - spring.tangential[s]
-        pressure += wp.length(normal_force)
-        squares += wp.dot(normal_force, normal_force)
         spring.impulse[s] = wp.vec3d()
         spring.normal_impulse[s] = wp.float64(0.0)
         spring.stick_impulse[s] = wp.float64(0.0)
@@ -194,8 +204,12 @@ def sum_springs(
     z_sum = wp.tile_sum(wp.tile(impulse[2]))
     normal_sum = wp.tile_sum(wp.tile(normal))
     stick_sum = wp.tile_sum(wp.tile(stick))
-    lost_sum = wp.tile_sum(wp.tile(lost))
+    pressed_x_sum = wp.tile_sum(wp.tile(pressed[0]))
+    pressed_y_sum = wp.tile_sum(wp.tile(pressed[1]))
+    pressed_z_sum = wp.tile_sum(wp.tile(pressed[2]))
     pressure_sum = wp.tile_sum(wp.tile(pressure))
+    pressed_energy_sum = wp.tile_sum(wp.tile(pressed_energy))
+    lost_sum = wp.tile_sum(wp.tile(lost))
     squares_sum = wp.tile_sum(wp.tile(squares))
     if lane == 0:
         r = row[0]
@@ -207,6 +221,10 @@ def sum_springs(
         partial_out[r, scene, column + 5, k] = z_sum[0]
         partial_out[r, scene, column + 6, k] = normal_sum[0]
         partial_out[r, scene, column + 7, k] = stick_sum[0]
-        partial_out[r, scene, column + 8, k] = lost_sum[0]
-        partial_out[r, scene, column + 9, k] = pressure_sum[0]
-        partial_out[r, scene, column + 10, k] = squares_sum[0]
+        partial_out[r, scene, column + 8, k] = pressed_x_sum[0]
+        partial_out[r, scene, column + 9, k] = pressed_y_sum[0]
+        partial_out[r, scene, column + 10, k] = pressed_z_sum[0]
+        partial_out[r, scene, column + 11, k] = pressure_sum[0]
+        partial_out[r, scene, column + 12, k] = pressed_energy_sum[0]
+        partial_out[r, scene, column + 13, k] = lost_sum[0]
+        partial_out[r, scene, column + 14, k] = squares_sum[0]

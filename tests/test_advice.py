@@ -45,7 +45,7 @@ def stacked(lower: int, upper: int, gap: float = 0.0, **contact) -> mca.Scene:
 )
 def test_a_slave_coarser_than_its_master_is_pointed_out(lower: int, upper: int, two_way: bool, told: bool):
     said = mca.run(stacked(lower, upper, two_way=two_way)).warnings
-    assert ["slave upper are 2 times as wide" in warning for warning in said] == [True] * told
+    assert sum("slave upper are 2 times as wide" in warning for warning in said) == told
 
 
 def test_parts_of_a_mesh_that_only_touch_are_pointed_out():
@@ -67,7 +67,7 @@ def test_strain_of_one_kind_of_body_is_not_laid_to_the_other():
     drive = mca.Prescribed(body="upper", nodes="ymax", axis="y", times=(0.0,), velocities=(200.0,))
     held = mca.Fixed(body="upper", nodes="ymin")
     pulled = replace(scene, bodies=(scene.bodies[0], stretched), prescribed=(drive,), fixed=(held,))
-    (said,) = mca.run(replace(pulled, impact=mca.ImpactPhase(duration=2.5e-5, energy_tolerance=1.0))).warnings
+    said, _ = mca.run(replace(pulled, impact=mca.ImpactPhase(duration=2.5e-5, energy_tolerance=1.0))).warnings
     assert said.endswith("choose kinematics='finite', if that was in lower")
 
 

@@ -9,7 +9,7 @@ import warp_mca as mca
 from warp_mca.batch import check_alike
 from warp_mca.kernels.lanes import LANES
 from warp_mca.patches import PATCH, make_patches
-from warp_mca.results import FILES, PATH_FILES
+from warp_mca.results import ALL_FILES
 from warp_mca.solver import Solver
 
 
@@ -221,7 +221,7 @@ def test_every_scene_has_its_folder(tmp_path):
     results = mca.run_batch(scenes, out=tmp_path / "sweep")
     for name, result in zip(("0", "1"), results, strict=True):
         assert result.path == tmp_path / "sweep" / name
-        assert {file.name for file in result.path.iterdir()} == {*FILES, *PATH_FILES}
+        assert {file.name for file in result.path.iterdir()} == set(ALL_FILES)
         read = mca.load(result.path)
         assert np.array_equal(read.F_t, result.F_t)
         assert np.array_equal(read.paths[0].stress, result.paths[0].stress)

@@ -43,18 +43,35 @@ def test_sticking_is_shaded_in_both_panels():
         assert shade.get_width() == pytest.approx(0.1)
 
 
-def test_compression_and_restitution_follow_the_tip_s_velocity():
+def test_compression_and_restitution_follow_the_closing_speed():
     run = result(3000.0)
-    run.history["tip_vy"] = -np.cos(2 * np.pi * TIME / 4e-4)  # towards the plate before 0.1 and after 0.3 ms
+    run.history["closing_speed"] = np.cos(np.pi * TIME / 2e-4)  # towards the plate before 0.1 and after 0.3 ms
+    run.history["closing_speed"][450:] = np.nan
     compression, restitution = compression_phases(run)
     assert compression == [pytest.approx((0.0, 1e-4), abs=2e-6), pytest.approx((3e-4, 4e-4), abs=2e-6)]
     assert restitution == [pytest.approx((1e-4, 3e-4), abs=2e-6)]
 
 
-def test_without_a_tip_there_are_no_phases():
+def test_bodies_at_rest_have_no_phases():
+    """Rounded motion of a body that weighs on another, and of one that glides along it."""
     run = result(3000.0)
-    run.history["tip_vy"] = np.full(len(TIME), np.nan)
+    run.history["closing_speed"] = 1e-9 * np.random.default_rng(0).normal(size=len(TIME))
+    run.history["E_kinetic"] = np.full(len(TIME), 1.0)
     assert compression_phases(run) == ([], [])
+
+
+def test_results_without_closing_speeds_have_no_phases():
+    assert compression_phases(result(3000.0)) == ([], [])
+
+
+def test_velocities_are_those_along_the_axes_in_which_the_tip_moves():
+    run = result(3000.0)
+    run.history.update({f"{point}_v{axis}": np.zeros(len(TIME)) for point in ("tip", "plate") for axis in "xyz"})
+    run.history["plate_vx"] = run.history["plate_vz"] = np.ones(len(TIME))
+    run.history["tip_vz"] = np.linspace(-1.0, 1.0, len(TIME))
+    run.history["closing_speed"] = np.cos(np.pi * TIME / 4e-4)
+    labels = [line.get_label() for line in plot_forces(run).axes[1].lines[1:]]
+    assert labels == ["plate $v_z$", "tip $v_z$", "closing speed"]
 
 
 def test_equal_runs_give_equal_files(tmp_path: Path):

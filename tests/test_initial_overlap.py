@@ -47,7 +47,7 @@ def test_overlap_deeper_than_faces_reach_is_refused(nodes: str):
 
 
 def test_overlap_of_one_scene_of_a_batch_names_the_scene():
-    with pytest.raises(mca.RequestError, match=r"^scenes\[1\]: Contact of block with body plate: initial_overlap"):
+    with pytest.raises(mca.RequestError, match=r"^scenes\[1\]: Contact block–plate: initial_overlap"):
         mca.run_batch([falling(0.0), falling(1e-4)])
 
 
@@ -89,7 +89,8 @@ def test_pressed_overlap_throws_the_bodies_apart():
 
 def test_a_body_at_rest_above_a_plane_has_nothing_said_of_overlap():
     scene = falling(-1e-9, plane=True, speed=0.0)
-    assert mca.run(replace(scene, gravity=(0.0, -9.81, 0.0))).warnings == ()
+    warnings = mca.run(replace(scene, gravity=(0.0, -9.81, 0.0))).warnings
+    assert not any("overlap" in warning for warning in warnings)
 
 
 def test_unknown_choice_is_refused():

@@ -78,7 +78,13 @@ def everything() -> mca.Scene:
         joints=(mca.Revolute(name="O", body="a", at=(0.0, 0.0, 0.0)),),
         contacts=(
             mca.Contact(slave=mca.Surface(body="a", nodes="ymin"), master=top, mu=0.3, two_way=True),
-            mca.Contact(slave=mca.Surface(body="a", nodes="ymin"), master=mca.RigidPlane()),
+            mca.Contact(
+                slave=mca.Surface(body="a", nodes="ymin"),
+                master=mca.RigidPlane(),
+                name="floor",
+                normal=(0.0, 1.0, 0.1),
+                tangent=(1.0, 0.0, 0.0),
+            ),
         ),
         fixed=(mca.Fixed(body="b", nodes="ymin", axes="yz"),),
         prescribed=(mca.Prescribed(body="b", nodes="xmin", axis="x", times=(0.0, 1.0), velocities=(0.0, 2.0)),),

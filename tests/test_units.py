@@ -40,5 +40,10 @@ def test_units_do_not_matter(element, units):
         force = getattr(found, key) * M * L / T**2
         # forces of elements are rounded to 3e-5 of their greatest, with both signs; hex8r shows 3e-6 of the contact's
         assert force == pytest.approx(getattr(known, key), abs=5e-6 * np.abs(known.F_n).max())
+    peaks = [[t * T, F * M * L / T**2] for t, F in found.summary["F_n_peaks"]]
+    assert np.array(peaks) == pytest.approx(np.array(known.summary["F_n_peaks"]), rel=1e-5)
+    for key in ("contacts", "sticks"):
+        assert T * np.array(found.summary[key]) == pytest.approx(np.array(known.summary[key]), rel=1e-9)
+    assert found["closing_speed"] * L / T == pytest.approx(known["closing_speed"], abs=1e-3, nan_ok=True)
     assert known.summary["max_plastic_strain"] > 1e-3
     assert found.summary["max_plastic_strain"] == pytest.approx(known.summary["max_plastic_strain"], rel=1e-5)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.contact_checks import contact_warnings
+from warp_mca.contact_checks import resolution_warnings
+from warp_mca.contact_history import contact_names, contact_warnings
 from warp_mca.geometry import Box, Plate, Rod, Sphere
 from warp_mca.geometry.quality import doubled_nodes
 from warp_mca.ledger import Ledger
@@ -92,9 +93,12 @@ class Account:
     ) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
         history = self.ledger.history()
+        contacts = self.ledger.contacts(contact_names(self.ready.scene.contacts))
         facts = self._facts(solver, wall, stopped is not None)
         paths = path_histories(self.ready.probes, self.rings)
-        return Result(summarise(history, facts), history, None, (*self._warnings(solver), *said), paths, stopped)
+        summary = summarise(history, facts, contacts)
+        warnings = (*self._warnings(solver), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
+        return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
 
     def _facts(self, solver: Solver, wall: Mapping[str, float], cut_short: bool) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
@@ -201,7 +205,7 @@ class Account:
                 "nodes that a master pressed went over to a face of it around a sharp edge, where single nodes do not "
                 "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
             )
-        found += contact_warnings(scene.contacts, self.ready.model, ledger, solver, self.index)
+        found += resolution_warnings(scene.contacts, self.ready.model, ledger, solver, self.index)
         found += self._mesh_warnings()
         if scene.rigid and scene.rigid.inertia == "slender":
             found.append(

@@ -19,7 +19,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.join import join_models, join_probes
 from warp_mca.layout import offsets
 from warp_mca.paths import Found
-from warp_mca.results import FILES, PATH_FILES, Result, check_output, folder_path, save
+from warp_mca.results import ALL_FILES, Result, check_output, folder_path, save
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.simulation import Clock, advance, divide_alike, prepare
 
@@ -132,7 +132,7 @@ def _remove(folders: Iterable[Path]) -> None:
     """Remove the files of results from folders, and these if nothing else is in them."""
     for folder in folders:
         try:
-            for name in FILES + PATH_FILES:
+            for name in ALL_FILES:
                 (folder / name).unlink(missing_ok=True)
         except OSError as error:
             raise McaError(f"old results in {folder} could not be removed: {error.strerror or error}") from error

@@ -301,7 +301,7 @@ def _with(scene: Scene, element: str | None, scale: float | None) -> Scene:
 
 def _run(args: argparse.Namespace) -> None:
     from warp_mca.report.console import print_summary, progress_bar
-    from warp_mca.results import FILES, PATH_FILES
+    from warp_mca.results import CONTACT_FILES, FILES, PATH_FILES
 
     if args.sweeps:
         _sweep(args)
@@ -325,7 +325,7 @@ def _run(args: argparse.Namespace) -> None:
             recorders=recorders,
             progress=progress,
         )
-    written = [*FILES, *(PATH_FILES if result.paths else ())]
+    written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
     recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
     print_summary(result, [*(str(out / name) for name in written), *recorded])
     as_designed = not args.settings and args.duration is None and args.time_step_scale is None

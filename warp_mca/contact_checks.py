@@ -83,7 +83,7 @@ def _width(X: Array, side: Faces) -> float:
     return float(extents[extents.prod(axis=1).argmin()].max())
 
 
-def contact_warnings(
+def resolution_warnings(
     contacts: tuple[Contact, ...], model: Model, ledger: Ledger, solver: Solver, scene: int
 ) -> list[str]:
     """What a run's contact leaves in doubt, one sentence each.

@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.contact_history import contact_names
 from warp_mca.errors import RequestError, bad_value
 from warp_mca.kernels.inside import depths_inside
 from warp_mca.scene import OVERLAP_CHOICES, RigidPlane
@@ -126,8 +127,7 @@ def _depths_inside(points: Array, body: Array, quads: NDArray[np.int32]) -> Arra
 
 def _refusal(ready: Sequence[Prepared], scene: int, contact: int, found: Overlap, at: Array) -> RequestError:
     item: Contact = ready[scene].scene.contacts[contact]
-    master = "the plane" if isinstance(item.master, RigidPlane) else f"body {item.master.body}"
-    field = f"Contact of {item.slave.body} with {master}: initial_overlap"
+    field = f"Contact {contact_names(ready[scene].scene.contacts)[contact]}: initial_overlap"
     others = ", ".join(repr(choice) for choice in OVERLAP_CHOICES[1:])
     remedy = (
         f"nodes of one body lie inside the other before the first step ({found.count} of them, up to {found.depth:.3g} "

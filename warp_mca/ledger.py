@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.contact_history import ContactHistory
 from warp_mca.errors import GuardError
 
 if TYPE_CHECKING:
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then eleven for each contact pass (`kernels.spring.sum_springs`).
+# Columns of a record, then PASS_COLUMNS for each contact pass (`kernels.spring.sum_springs`).
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 11
+PASS_COLUMNS = 15
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 
 _FLAGS = (
@@ -101,9 +102,13 @@ class Ledger:
         sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
         return sums
 
+    def _springs(self, sums: Array) -> Array:
+        """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
+        return sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
-        springs = sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+        springs = self._springs(sums)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
         return {
             "kinetic": sums[..., KINETIC],
@@ -112,7 +117,7 @@ class Ledger:
             "hourglass": sums[..., HOURGLASS],
             "contact": springs[..., 0].sum(axis=-1),
             "friction": springs[..., 1].sum(axis=-1),
-            "contact_loss": springs[..., 8].sum(axis=-1),
+            "contact_loss": springs[..., 13].sum(axis=-1),
             "damping": np.zeros(sums.shape[:-1]),
             "joint": np.zeros(sums.shape[:-1]),
             "external_work": work - self.initial_work,
@@ -163,7 +168,8 @@ class Ledger:
         """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""
         if not self.columns:
             return 0.0
-        force, squares = np.array(self.columns)[:, PASS + PASS_COLUMNS * k :][:, 9:11].T
+        springs = self._springs(np.array(self.columns))[:, k]
+        force, squares = springs[:, 11], springs[:, 14]
         peak = int(force.argmax())
         return float(force[peak] ** 2 / squares[peak]) if squares[peak] > 0.0 else 0.0
 
@@ -181,8 +187,7 @@ class Ledger:
         Forces are means over the interval before.
         """
         table = np.array(self.columns[first:]).reshape(-1, self._width)
-        energy = self._energies(table)
-        springs = table[:, PASS:].reshape(len(table), len(self.model.passes), PASS_COLUMNS)
+        energy, springs = self._energies(table), self._springs(table)
         share = self.dt / self.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
@@ -213,4 +218,40 @@ class Ledger:
             "E_contact": energy["contact"],
             "E_friction": energy["friction"],
             "E_total_error": balance - (self.initial_energy or 0.0),
+            "tip_vz": velocity[:, 0, 2],
+            "plate_vy": velocity[:, 1, 1],
+            "plate_vz": velocity[:, 1, 2],
+            "closing_speed": self._closing_speed(first),
         }
+
+    def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
+        """Each contact by itself, with these `names`."""
+        springs, share = self._springs(np.array(self.columns).reshape(-1, self._width)), self.dt / self.interval
+        found: list[ContactHistory] = []
+        for index, name in enumerate(names):
+            own = [k for k, item in enumerate(self.model.passes) if item.contact == index]
+            sign = np.array([self.model.passes[k].sign for k in own])
+            found.append(
+                ContactHistory(
+                    name=name,
+                    force=share * np.einsum("p,rpc->rc", sign, springs[:, own, 3:6]),
+                    pressure=share * springs[:, own, 6].sum(axis=1),
+                    normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, 8:11]),
+                    closing_speed=self._closing_speed(0, own),
+                )
+            )
+        return tuple(found)
+
+    def _closing_speed(self, first: int, passes: Sequence[int] | slice = slice(None)) -> Array:
+        """As in `ContactHistory`, of some passes, from row `first` on.
+
+        Normal forces do the work dE = sum(F_n v dt) on their springs. So the gain of these in an interval, over the
+        normal impulse by the trapezoidal rule, is the mean of v over nodes and time that is weighted with F_n.
+        """
+        rows = np.array(self.columns[max(first - 1, 0) :]).reshape(-1, self._width)
+        springs = self._springs(rows)[:, passes].sum(axis=1)
+        gain, rise = np.diff(springs[:, 12]), np.diff(springs[:, 11])
+        impulse = self.dt * (springs[1:, 6] - 0.5 * rise)
+        speed: Array = np.full(len(rows), np.nan)
+        np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
+        return speed[min(first, 1) :]

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from warp_mca.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.bindings import Hinge, check_bindings, constraints, join_bodies
 from warp_mca.contact_checks import check_spacing
+from warp_mca.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.layout import Layout
-from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene import Contact, RigidPlane, Scene
 from warp_mca.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.timestep import StableStep
 
@@ -23,6 +24,8 @@ Index = NDArray[np.int32]
 __all__ = ["GROUND", "Block", "Model", "body_cells", "body_materials", "build_model", "nodal_masses"]
 
 CLOSED = 1e-6  # share of a surface's area below which its normals cancel
+PARALLEL = 1e-6  # sine of the angle between directions that count as one
+NEAR_Z = 0.342  # sine of the angle from the z axis, below which tangents are not taken along n x z
 _SAMPLES = np.array([0.125, 0.375, 0.625, 0.875])  # along both edges of a face, where its distance is taken
 
 
@@ -44,8 +47,8 @@ class Model:
         joint_first, joint_second: tied nodes, shape (pair_count,), int32; GROUND has no second node.
         hinges: the joints that own the pairs.
         passes: contact passes; those of each scene in turn.
-        contact_axes: normal and tangent of each contact [-], shape (contact_count, 2, 3), float64; a closed master has
-            no normal, which is zero then: normal forces add up as they are.
+        contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
+            3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
         gravity: of each scene [m/s^2], shape (scene_count, 3), float64.
         points: nodes whose velocity is recorded (tip, target; those of each scene in turn), shape (2 scene_count,),
             int32; GROUND where there is none.
@@ -111,20 +114,53 @@ def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...]
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, value)
             passes.append(item)
-        if isinstance(contact.master, RigidPlane):
-            normal = np.asarray(contact.master.normal, dtype=float)
-            axes[index] = normal / np.linalg.norm(normal), _tangent(normal)
-        else:
-            assert master is not None
-            axes[index] = _surface_axes(parts.X, slave, master)
+        axes[index] = _axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added
 
 
+def _axes(X: Array, contact: Contact, slave: Faces, master: Faces | None) -> tuple[Array, Array]:
+    """Normal and tangent of a contact, as `Model.contact_axes`.
+
+    Raises:
+        RequestError: the tangent asked for is along the normal.
+    """
+    if contact.normal is not None:
+        normal = along = np.array(contact.normal, dtype=float)
+    elif master is None:
+        assert isinstance(contact.master, RigidPlane)
+        normal = along = np.array(contact.master.normal, dtype=float)
+    else:
+        normal, along = _surface_normals(X, slave, master)
+    size = np.linalg.norm(normal)
+    unit = normal / size if size > 0.0 else normal
+    if contact.tangent is None:
+        return unit, _tangent(along)
+    try:
+        return unit, perpendicular(np.array(contact.tangent, dtype=float), along)
+    except ValueError as error:
+        remedy = f"the contact's normal is along it; give a direction across {tuple(along.tolist())}"
+        raise bad_value("Contact.tangent", contact.tangent, remedy) from error
+
+
+def perpendicular(direction: Array, normal: Array) -> Array:
+    """Unit vector along the part of a direction that is perpendicular to the normal.
+
+    Raises:
+        ValueError: there is none.
+    """
+    n, d = normal / np.linalg.norm(normal), direction / np.linalg.norm(direction)
+    across = d - (d @ n) * n
+    size = np.linalg.norm(across)
+    if size < PARALLEL:
+        raise ValueError(direction)
+    return across / size
+
+
 def _tangent(normal: Array) -> Array:
-    """Unit vector along n x z, or +x where n is along z."""
+    """Unit vector along n x z; within 20 degrees of the z axis, where that turns with any tilt of n, nearest to +x."""
     tangent = np.cross(normal / np.linalg.norm(normal), [0.0, 0.0, 1.0])
     size = np.linalg.norm(tangent)
-    return tangent / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
+    return tangent / size if size > NEAR_Z else perpendicular(np.array([1.0, 0.0, 0.0]), normal)
 
 
 def _mean_normal(faces: Faces) -> Array | None:
@@ -133,17 +169,18 @@ def _mean_normal(faces: Faces) -> Array | None:
     return None if np.linalg.norm(normal) < CLOSED * faces.area.sum() else normal
 
 
-def _surface_axes(X: Array, slave: Faces, master: Faces) -> tuple[Array, Array]:
-    """Normal and tangent of a contact, as `Model.contact_axes`.
+def _surface_normals(X: Array, slave: Faces, master: Faces) -> tuple[Array, Array]:
+    """Normal of a master, of any length, and the direction across which tangential force is reported.
 
-    A closed master has no one normal, but where it is touched it faces the slave: its tangent is that of the slave's
-    surface turned round or, where that is closed too, of its own faces where the bodies are nearest to each other.
+    A closed master has no one normal, which is 0 then, but where it is touched it faces the slave: the direction is
+    that of the slave's mean normal turned round or, where the slave is closed too, of the master's own faces where the
+    bodies are nearest to each other.
     """
     normal = _mean_normal(master)
     if normal is not None:
-        return normal / np.linalg.norm(normal), _tangent(normal)
+        return normal, normal
     other = _mean_normal(slave)
-    return np.zeros(3), _tangent(_nearest_normal(X, slave, master) if other is None else -other)
+    return np.zeros(3), _nearest_normal(X, slave, master) if other is None else -other
 
 
 def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:

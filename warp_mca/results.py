@@ -8,7 +8,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import chain
@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from warp_mca.contact_history import ContactHistory, load_contacts, save_contacts
 from warp_mca.errors import McaError, RequestError, bad_value
 from warp_mca.files import check_folder, given_path, nearest
-from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals
+from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
 from warp_mca.paths import PathHistory, load_paths, save_paths
 from warp_mca.validate import DAMAGE
 
@@ -37,9 +38,11 @@ HISTORY_COLUMNS = (
     "E_contact",
     "E_friction",
     "E_total_error",
-)
+)  # of every history.csv; a run adds some, see docs/outputs.md
 FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
+CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
+ALL_FILES = FILES + CONTACT_FILES + PATH_FILES
 STAGING = ".warp_mca-"  # begins the names of folders that results are written in at first
 LONGEST_SAVE = 3600.0  # far more than any takes [s]
 
@@ -54,6 +57,7 @@ class Result:
         path: folder that it was saved in or loaded from, or None.
         warnings: what the run noticed without stopping, one sentence each.
         paths: stress along the scene's paths, with one row for each row of the history.
+        contacts: forces of each of the scene's contacts by itself, with one row for each row of the history.
         stopped: which guard stopped this scene of a batch, in one sentence; None if none did. Rows end before it.
         failed: names of recorders that failed: what they write is missing or ends too early.
     """
@@ -65,6 +69,7 @@ class Result:
     paths: tuple[PathHistory, ...] = ()
     stopped: str | None = None
     failed: tuple[str, ...] = ()
+    contacts: tuple[ContactHistory, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -73,12 +78,12 @@ class Result:
 
     @property
     def F_n(self) -> Array:
-        """Normal force on the tip's body [N], mean over each output interval, shape (row_count,)."""
+        """Normal force on the slaves [N], mean over each output interval, shape (row_count,)."""
         return self.history["F_n_N"]
 
     @property
     def F_t(self) -> Array:
-        """Tangential force on the tip's body [N], mean over each output interval, shape (row_count,)."""
+        """Tangential force on the slaves [N], mean over each output interval, shape (row_count,)."""
         return self.history["F_t_N"]
 
     def __getitem__(self, column: str) -> Array:
@@ -132,12 +137,13 @@ class RunFacts:
     more: Mapping[str, object] = field(default_factory=dict)
 
 
-def summarise(history: Mapping[str, Array], facts: RunFacts) -> dict[str, Any]:
+def summarise(history: Mapping[str, Array], facts: RunFacts, pairs: Sequence[ContactHistory] = ()) -> dict[str, Any]:
     """The contents of `summary.json`: `facts`, and what is read off the history.
 
     Args:
         history: by column, see `HISTORY_COLUMNS`.
         facts: of the run.
+        pairs: the scene's contacts, each by itself.
     """
     from warp_mca import __version__
 
@@ -161,6 +167,9 @@ def summarise(history: Mapping[str, Array], facts: RunFacts) -> dict[str, Any]:
         "F_t_reverses": reverses(F_t),
         "contacts": [list(contact) for contact in contacts],
         "contact_duration": sum(end - start for start, end in contacts),
+        "touched": bool(contacts) or any(pair.touched for pair in pairs),
+        "contact_open_at_end": unfinished(F_n) or any(pair.unfinished for pair in pairs),
+        "contacts_by_pair": [pair.summary(time) for pair in pairs],
         "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],
         "element_steps_per_s": facts.n_elements * facts.n_steps / fe_wall if fe_wall > 0.0 else None,
         "version": __version__,
@@ -176,7 +185,7 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
     """
     path = folder_path("out", directory)
     check_folder("out", path)
-    if not force and any((path / name).exists() for name in FILES + PATH_FILES):
+    if not force and any((path / name).exists() for name in ALL_FILES):
         raise _taken(path)
     return path
 
@@ -215,6 +224,8 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         _write_history(written / "history.csv", result.history)
         save_forces(written / "forces.png", result)
         save_energies(written / "energies.png", result)
+        if result.contacts:
+            save_contacts(written / "forces.npz", result.time, result.contacts)
         if result.paths:
             save_paths(written / "paths.npz", result.time, result.paths)
             save_path_figures(written, result)
@@ -245,7 +256,7 @@ def _move(written: Path, path: Path, force: bool) -> None:
     path.mkdir(exist_ok=True)
     if not force:
         _claim(path)
-    for name in FILES + PATH_FILES:
+    for name in ALL_FILES:
         if (written / name).exists():
             (written / name).replace(path / name)
         else:  # left by a run of another scene
@@ -284,11 +295,12 @@ def load(directory: str | os.PathLike[str]) -> Result:
         warnings = tuple(summary.pop("warnings", ()))
         history = _read_history(path / "history.csv")
         paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
+        contacts = load_contacts(path / "forces.npz") if (path / "forces.npz").exists() else ()
     except FileNotFoundError as error:
         raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
     except DAMAGE as error:
         raise bad_value("results", str(path), "its files are damaged; run again") from error
-    return Result(summary, history, path, warnings, paths)
+    return Result(summary, history, path, warnings, paths, contacts=contacts)
 
 
 def folder_path(field: str, directory: object) -> Path:

@@ -191,6 +191,13 @@ class Contact:
         two_way: the master's nodes are also kept out of the slave's faces.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
             with springs that count depth from there; or "press", with the springs' full force.
+        name: unique in the scene; None for the bodies' names, "slave–master" or "slave–plane", numbered where a pair
+            has several contacts. Results list forces by it.
+        normal: direction of the force on the slave that F_n_N reports [-], of any length. None takes the master's mean
+            normal at hand-off, or adds up the normal forces as they are where the master is closed. Give it where the
+            master turns before the impact, or where only a part of a curved master is touched.
+        tangent: direction that F_t_N reports [-], made perpendicular to the normal. None takes normal x z, or the
+            perpendicular nearest to +x where the normal is within 20 degrees of the z axis.
     """
 
     slave: Surface
@@ -199,6 +206,9 @@ class Contact:
     penalty: float | None = None
     two_way: bool = False
     initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
+    name: str | None = None
+    normal: Vec3 | None = None
+    tangent: Vec3 | None = None
 
     def __post_init__(self) -> None:
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
@@ -213,6 +223,14 @@ class Contact:
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
             raise bad_value("Contact.master.body", self.master.body, "name a body other than the slave's")
+        if self.name is not None:
+            validate.texts("Contact", name=self.name)
+        for axis in ("normal", "tangent"):
+            value = getattr(self, axis)
+            if value is not None:
+                validate.vectors("Contact", **{axis: value})
+                if not any(value):
+                    raise bad_value(f"Contact.{axis}", value, "give a direction other than zero")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -409,8 +427,8 @@ class Scene:
         joints, contacts, fixed, prescribed: what binds the bodies.
         gravity: [m/s^2].
         paths: lines along which stress is recorded.
-        tip: point whose velocity the history lists as tip_vx, tip_vy.
-        target: point whose velocity the history lists as plate_vx.
+        tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
+        target: point whose velocity the history lists as plate_vx, plate_vy, plate_vz.
         parameters: the values that a built-in scene was made from, for the record.
     """
 
@@ -444,6 +462,9 @@ class Scene:
         paths = [path.name for path in self.paths]
         if len(set(paths)) != len(paths):
             raise bad_value("Scene.paths", paths, "give each path a name of its own")
+        contacts = [contact.name for contact in self.contacts if contact.name is not None]
+        if len(set(contacts)) != len(contacts):
+            raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
         pairs = [(item.slave, _plain(item.master)) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:

@@ -28,7 +28,7 @@ from warp_mca.recorders.recorder import (
     Volume,
     file_path,
 )
-from warp_mca.results import FILES, PATH_FILES
+from warp_mca.results import ALL_FILES
 from warp_mca.transfer import Transfer
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | Non
     """
     for k, recorder in enumerate(recorders):
         _check_attributes(f"recorders[{k}]", recorder)
-    known = [Path(out, name).resolve() for name in FILES + PATH_FILES] if out is not None else []
+    known = [Path(out, name).resolve() for name in ALL_FILES] if out is not None else []
     for file in _files(recorders):
         path = file.resolve()
         for other in known:

@@ -23,7 +23,9 @@ PLOTS = (
         (
             ("tip_vx", "tip v_x", 0xD55E00FF),
             ("tip_vy", "tip v_y", 0x56B4E9FF),
+            ("tip_vz", "tip v_z", 0xE69F00FF),
             ("plate_vx", "plate v_x", 0xBBBBBBFF),
+            ("closing_speed", "closing speed", 0x009E73FF),
         ),
     ),
     (

@@ -12,8 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.history import Interval, contact_intervals, intervals, smoothed, stick_intervals
-from warp_mca.report.style import BLACK, BLUE, STICK, VERMILION, legend_beside, new_figure, save_png, tidy
+from warp_mca.history import Interval, contact_intervals, intervals, phases, stick_intervals
+from warp_mca.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    STICK,
+    VERMILION,
+    legend_beside,
+    new_figure,
+    save_png,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,23 +35,34 @@ if TYPE_CHECKING:
     from warp_mca.results import Result
 
 COMPRESSION, RESTITUTION = "#5A5A5A", "#BDBDBD"
+REST = 1e-9  # share of the greatest energy of a run; contact forces that do less work are rounded at rest
+STILL = 0.01  # share of the greatest component of velocity below which another one is not drawn
+# Column, label, colour, line style and width. A node of the surface of the plate rings with every wave: its lines are
+# thin and come first, so that they stay in the background.
+VELOCITIES = (
+    ("plate_vx", r"plate $v_x$", BLACK, "-", 0.7),
+    ("plate_vy", r"plate $v_y$", SKY, "-", 0.7),
+    ("plate_vz", r"plate $v_z$", PURPLE, "-", 0.7),
+    ("tip_vx", r"tip $v_x$", VERMILION, "--", 1.4),
+    ("tip_vy", r"tip $v_y$", BLUE, "-", 1.4),
+    ("tip_vz", r"tip $v_z$", ORANGE, "-.", 1.4),
+    ("closing_speed", "closing speed", GREEN, ":", 1.2),
+)
 STRIP = 0.035  # height of the strip of phases, as a share of the axes
 
 
 def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
-    """Times of compression and of restitution [s].
+    """Times of compression and of restitution [s], see `history.phases`.
 
-    In contact, the bodies are compressed while the tip moves towards the plate, tip_vy < 0; otherwise they restitute.
-    Both lists are empty when the scene has no tip.
+    Both lists are empty where contact forces do no more work than REST of the energy of the run, and for results that
+    were saved without closing speeds.
     """
-    time, velocity = result.time, result["tip_vy"]
-    if len(time) < 2 or not np.isfinite(velocity).all():
+    time, energy = result.time, sum(result[name] for name in ("E_kinetic", "E_internal", "E_contact"))
+    if len(time) < 2 or "closing_speed" not in result.history:
         return [], []
-    touching = np.zeros(len(time), dtype=bool)
-    for start, end in contact_intervals(time, result.F_n):
-        touching |= (time > start) & (time <= end)
-    closing = smoothed(time, velocity) < 0.0
-    return intervals(time, touching & closing, 0.0), intervals(time, touching & ~closing, 0.0)
+    least = REST * float(np.max(energy)) / float(time[-1] - time[-2])
+    compression, restitution = phases(result.F_n, result["closing_speed"], least)
+    return intervals(time, compression), intervals(time, restitution)
 
 
 def plot_forces(result: Result) -> Figure:
@@ -89,14 +113,25 @@ def _draw_forces(axes: Axes, result: Result) -> None:
 
 
 def _draw_velocities(axes: Axes, result: Result) -> None:
-    time = 1e3 * result.time
+    """Velocities of tip and plate along the axes in which the tip moves, and the closing speed of the contact."""
+    time, shown = 1e3 * result.time, _moving_axes(result)
     axes.axhline(0.0, color="0.5", linewidth=0.8)
-    # A node of the plate's surface rings with every wave that passes: thin, so that it stays in the background.
-    axes.plot(time, result["plate_vx"], color=BLACK, label=r"plate $v_x$", linewidth=0.7)
-    axes.plot(time, result["tip_vx"], color=VERMILION, linestyle="--", label=r"tip $v_x$", linewidth=1.4)
-    axes.plot(time, result["tip_vy"], color=BLUE, label=r"tip $v_y$", linewidth=1.4)
+    for column, label, colour, style, width in VELOCITIES:
+        wanted = column[-1] in shown or column == "closing_speed"
+        if wanted and np.nan_to_num(result.history.get(column, np.zeros(1))).any():
+            axes.plot(time, result[column], color=colour, linestyle=style, label=label, linewidth=width)
     axes.margins(y=0.08)
     axes.set_ylabel("velocity [m/s]")
+
+
+def _moving_axes(result: Result) -> str:
+    """Letters of the axes in which the tip moves, or the plate in scenes without a tip; all where neither moves."""
+    for point in ("tip", "plate"):
+        speed = {axis: np.abs(result.history.get(f"{point}_v{axis}", np.zeros(1))) for axis in "xyz"}
+        greatest = {axis: float(np.max(v, initial=0.0, where=np.isfinite(v))) for axis, v in speed.items()}
+        if any(greatest.values()):
+            return "".join(axis for axis in "xyz" if greatest[axis] > STILL * max(greatest.values()))
+    return "xyz"
 
 
 def _title(result: Result) -> str:

@@ -35,8 +35,9 @@ def tidy(axes: Axes) -> None:
 
 
 def legend_beside(axes: Axes) -> None:
-    """The legend on the right of the axes, where it hides no line."""
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    """The legend, if there is anything to name, on the right of the axes, where it hides no line."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
 
 
 def save_png(figure: Figure, path: str | os.PathLike[str]) -> Path:
