@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 from warp_mca.kernels.fused import NOTHING, fused
 from warp_mca.kernels.hexahedron import history_functions, load_function, store_function, stress_function
 from warp_mca.kernels.kinematics import kinematics
@@ -118,6 +119,8 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
+    The first also gives the ratio of volumes J, the second the square of the deviatoric strain.
+
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
     """
     t = scalars(precision)
@@ -139,7 +142,8 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         b, scaled_volume = mean_gradients(x)
         H_world = mean_gradient_of(du, b, scaled_volume)
         W, H = rotated(H_world)
-        return b, R(VOLUME_SCALE) * scaled_volume, W, H, amplitudes(x, du, H_world, W)
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H_world)
+        return b, R(VOLUME_SCALE) * scaled_volume, W, H, J, amplitudes(x, du, H_world, W)
 
     @wp.func
     def stress_and_flow(
@@ -184,7 +188,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
                 # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
                 history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
             Q = kept * Q
-        return P, Q
+        return P, Q, wp.ddot(strain, strain)
 
     @wp.func
     def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
@@ -213,6 +217,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
     store_force = store_function(precision)
+    keep_greatest, _ = keep_functions(R)
 
     # ln(1 + x) of small x needs the rounding that fast math gives away
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -226,13 +231,16 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
         x = to_patterns(load_element(X, conn, e))
         du = to_patterns(load_element(u, conn, e))
-        b, volume, W, H, q = shape_and_strain(x, du)
-        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+        b, volume, W, H, J, q = shape_and_strain(x, du)
+        P, Q, square = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+        keep_greatest(STRAIN_SQUARE, e, square, extreme_out)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
@@ -242,7 +250,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
 
 @cache
 def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
+    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
     t = scalars(precision)
     R, mat33, mat43 = t.real, t.mat33, t.mat43
     to_patterns, _ = pattern_functions(precision)
@@ -265,6 +273,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         yielded: wp.array(dtype=wp.int32),
         history: wp.array2d(dtype=R),
+        extreme: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         first: int,
         energy_out: wp.array2d(dtype=R),
@@ -294,12 +303,11 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                 q_p = read_amplitudes(history, e)
             q = q - q_p
         _Q, stored = hourglass(q, x, volume, K, G)
-        identity = wp.identity(n=3, dtype=R)
         elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * wp.ddot(strain, strain))
-        energy_out[3, first + e] = wp.determinant(identity + H) * wp.determinant(identity + W)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
+        energy_out[3, first + e] = R(1.0) - extreme[VOLUME_LOSS, e]
         energy_out[4, first + e] = stored
 
     return hex8r_energy

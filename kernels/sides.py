@@ -135,9 +135,11 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
         scene: Index,
         mu: Real,
         margin: Real,
+        per_newton: Real,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -256,7 +258,9 @@ def sided_kernel(friction: bool, each: bool, sides: int) -> Any:
                             last,
                             stiffness[s],
                             of(mu, k),
+                            of(per_newton, k),
                             spring,
+                            normal_force_out,
                             flag_out,
                         )
                 elif turn == 1:

@@ -12,6 +12,7 @@ from warp_mca.errors import GuardError
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
+    from warp_mca.steps import Steps
 
 Array = NDArray[np.float64]
 
@@ -31,26 +32,30 @@ _FLAGS = (
 
 
 class Ledger:
-    """Collects one record for each output interval.
+    """Collects the records of one scene: rows of its history, and those that check the run between them.
 
     Attributes:
+        count: rows so far.
+        records: check records so far, rows included.
         energy_error: largest imbalance so far, as a share of initial energy and external work [-].
         exchanged: largest energy so far that was in elements, contact springs and friction, or that motion had gained
             or lost [J].
-        max_strain: largest deviatoric strain so far [-].
+        max_strain: greatest deviatoric strain of any step so far [-].
+        min_jacobian: smallest ratio of volumes so far: at points of elements in records, at their centres in any step [-].
         turned: whether a pressed node went over to a face across a sharp edge.
     """
 
-    def __init__(self, model: Model, dt: float, interval: float, tolerance: float, precision: str) -> None:
-        self.model, self.dt, self.interval, self.tolerance = model, dt, interval, tolerance
+    def __init__(self, model: Model, steps: Steps, tolerance: float, precision: str) -> None:
+        self.model, self.steps, self.tolerance = model, steps, tolerance
         self.precision = precision
         self.columns: list[Array] = []
         self.velocities: list[Array] = []
-        self.count = 0
+        self.count = self.records = 0
         self.turned = False
         self._hint = ""  # at what else may be wrong
         self.energy_error = 0.0
         self.max_strain = 0.0
+        self.min_jacobian = 1.0
         self.initial_energy: float | None = None
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
@@ -68,28 +73,31 @@ class Ledger:
             GuardError: a record breaks a guard.
         """
         sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
-        if self.count == 0 and written:
+        if self.records == 0 and written:
             self._hint = self._overlap(sums[0])
         *flags, turned = records["flag"]
         self.turned = bool(turned)
         for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
-                end = (self.count + written) * self.interval
+                end = self.steps.time(self.records + written)
                 raise GuardError(f"stopped before t = {end:.4g} s: {message}{self._hint}")
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
         share = self._balance(sums[:good])
         over = share > self.tolerance
         end = int(np.argmax(over)) + 1 if over.any() else good
-        self.columns.extend(sums[:end])
-        self.velocities.extend(velocity[:end].copy())
-        self.count += end
+        rows = self.rows(end)
+        self.columns.extend(sums[rows])
+        self.velocities.extend(velocity[rows])
+        self.count += len(rows)
+        self.records += end
         self.max_strain = max(self.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
+        self.min_jacobian = min(self.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
         self.energy_error = max(self.energy_error, float(share[:end].max(initial=0.0)))
-        t = self.count * self.interval
+        t = self.steps.time(self.records)
         if over.any():
             raise GuardError(
-                f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
+                f"energy imbalance {share[end - 1]:.2%} at t = {self.steps.time(self.records - 1):.4g} s exceeds energy_tolerance = "
                 f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
                 f"tolerance if that much is acceptable{self._hint}"
             )
@@ -97,6 +105,10 @@ class Ledger:
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
         if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
+
+    def rows(self, written: int) -> Array:
+        """Which of the next `written` records are rows of the history."""
+        return np.arange(-self.records % self.steps.checks, written, self.steps.checks)
 
     def _overlap(self, first: Array) -> str:
         """What to say where the first record has contact springs that are pressed; nothing where it has none."""
@@ -179,7 +191,7 @@ class Ledger:
         table = np.array(self.columns[first:]).reshape(-1, self._width)
         energy = self._energies(table)
         springs = table[:, PASS:].reshape(len(table), len(self.model.passes), PASS_COLUMNS)
-        share = self.dt / self.interval
+        share = self.steps.dt / self.steps.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
             force = share * item.sign * springs[:, k, 3:6]
@@ -196,7 +208,7 @@ class Ledger:
         stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
         balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
         return {
-            "time_s": self.interval * np.arange(first, self.count, dtype=np.float64),
+            "time_s": self.steps.interval * np.arange(first, self.count, dtype=np.float64),
             "F_n_N": F_n,
             "F_t_N": F_t,
             "stick_fraction": stick,
