@@ -14,15 +14,14 @@ STRAIN_SQUARE, VOLUME_LOSS = 0, 1
 def _keep(index: str, double: bool) -> str:
     """Source of `array[index] = max(array[index], value)` for values of at least 0.
 
-    Floats of one sign are ordered as the integers of their bits, and those below 0 lie below all others. A reduction
-    has no result to wait for.
+    Floats of one sign are ordered as the integers of their bits, and those below 0 lie below all others. An atomic
+    maximum whose result is not used has nothing to wait for.
     """
-    bits, kind, name = ("__double_as_longlong", "s64", "double") if double else ("__float_as_int", "s32", "float")
-    register = "l" if double else "r"
+    bits, kind, name = ("__double_as_longlong", "long long", "double") if double else ("__float_as_int", "int", "float")
     return f"""
     {name}* place = wp::address(greatest_out, {index});
 #if defined(__CUDA_ARCH__)
-    asm volatile("red.global.max.{kind} [%0], %1;" :: "l"(__cvta_generic_to_global(place)), "{register}"({bits}(value)));
+    atomicMax(({kind}*)place, {bits}(value));
 #else
     *place = *place > value ? *place : value;
 #endif
@@ -33,17 +32,17 @@ def _keep(index: str, double: bool) -> str:
 def keep_functions(scalar: Any) -> tuple[Any, Any]:
     """Functions for one scalar type.
 
-    (Keep in greatest_out[k, e] the greatest value so far, from 0 on; the square of the deviatoric strain of an elastic
-    stress S = 2 G e, from S : S.)
+    (Keep in greatest_out[k, e] the greatest value so far, from 0 on; the square e : e of a deviatoric strain, from the
+    invariant J2 = S : S / 2 of its elastic stress S = 2 G e.)
     """
 
     @wp.func_native(_keep("k, e", scalar is wp.float64))
     def keep_greatest(k: int, e: int, value: scalar, greatest_out: wp.array2d(dtype=scalar)): ...
 
     @wp.func
-    def strain_square(stress_square: scalar, G: scalar):
-        half = scalar(0.5) / G
-        return half * (half * stress_square)
+    def strain_square(J2: scalar, G: scalar):
+        compliance = scalar(1.0) / G
+        return (scalar(0.5) * compliance) * (compliance * J2)
 
     return keep_greatest, strain_square
 
@@ -69,18 +68,25 @@ def add_normal_force(k: int, F_n: wp.float64, per_newton: wp.float64, normal_for
     wp.atomic_add(normal_force_out, k, wp.int64(F_n * per_newton))
 
 
-@wp.func
-def keep_normal_force(
-    i: int, count: int, normal_force_out: wp.array2d(dtype=wp.int64), peak_out: wp.array(dtype=wp.int64)
-):
-    """Keep the greatest normal force of a step of each scene, and clear the sums for the next step.
+_KEEP_SUMS = """
+    for (int k = i; k < normal_force_out.shape[1]; k += count) {
+        long long total = 0;
+        #pragma unroll 1
+        for (int r = 1; r < normal_force_out.shape[0]; ++r) {
+            total += *wp::address(normal_force_out, r, k);
+            *wp::address(normal_force_out, r, k) = 0;
+        }
+        if (total > *wp::address(normal_force_out, 0, k))
+            *wp::address(normal_force_out, 0, k) = total;
+    }
+"""
 
-    Thread i of `count` takes every count-th scene. Sums have a row for each range of slaves, which threads of a CPU
-    compute side by side.
+
+@wp.func_native(_KEEP_SUMS)
+def keep_normal_force(i: int, count: int, normal_force_out: wp.array2d(dtype=wp.int64)):
+    """Keep in row 0 the greatest normal force of a step of each scene, and clear the sums for the next step.
+
+    Thread i of `count` takes every count-th scene. There is a row of sums for each range of slaves, which threads of a
+    CPU compute side by side.
     """
-    for k in range(i, peak_out.shape[0], count):
-        total = wp.int64(0)
-        for r in range(normal_force_out.shape[0]):
-            total += normal_force_out[r, k]
-            normal_force_out[r, k] = wp.int64(0)
-        peak_out[k] = wp.max(peak_out[k], total)
+    ...

@@ -93,7 +93,7 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
     element_rotation, local_displacement = frame_functions(precision)
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
-    add_traction, symmetric_gradient, square = stress_functions(precision)
+    add_traction, symmetric_gradient, invariant = stress_functions(precision)
     store_force = store_function(precision)
     keep_greatest, strain_square = keep_functions(R)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
@@ -170,7 +170,7 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
             xy = shear * xy
             yz = shear * yz
             xz = shear * xz
-            largest = wp.max(largest, square(xx, yy, zz, xy, yz, xz))
+            largest = wp.max(largest, invariant(xx, yy, xy, yz, xz))
             S = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
             S, eps_new, p_new = return_map(S, eps_p, p, G, parameters)
             if p_new > p:

@@ -112,12 +112,12 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
     """Functions of one Gauss point.
 
     (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
-    stress and plastic strain of a point, and the square of the stress that it would have without; the history of two
-    points; forces of the edges.)
+    stress and plastic strain of a point, and J2 of the stress that it would have without; the history of two points;
+    forces of the edges.)
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    add_traction, symmetric_gradient, square = stress_functions(precision)
+    add_traction, symmetric_gradient, invariant = stress_functions(precision)
     functions = law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     pair = wp.types.vector(2 * HISTORY_SIZE, R)
@@ -159,7 +159,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
         p_xz = history[first + 4]
         eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
         S, eps_new, p_new = return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
-        return S, eps_new, p_new, square(xx, yy, zz, xy, yz, xz)
+        return S, eps_new, p_new, invariant(xx, yy, xy, yz, xz)
 
     @wp.func
     def force_of_edge(S: mat33, pressure: R, b: vec3):
@@ -233,9 +233,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
         b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
         b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
         pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
-        S0, eps0, p0, square0 = stress_of_point(sums0, det0, law, m, history, 0)
-        S1, eps1, p1, square1 = stress_of_point(sums1, det1, law, m, history, size)
-        largest = lane_max(wp.max(square0, square1))
+        S0, eps0, p0, trial0 = stress_of_point(sums0, det0, law, m, history, 0)
+        S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
+        largest = lane_max(wp.max(trial0, trial1))
         if valid and q == 0:
             keep_greatest(STRAIN_SQUARE, e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
         if valid and (p0 > history[last] or p1 > history[size + last]):
@@ -317,7 +317,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
                     keep_forces(forces, lane, f)
                     keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
                     if wp.static(plastic):
-                        if R(1.5) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
+                        if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
                             flows = bool(True)
                             yielded_out[e] = 1
                 if wp.static(plastic):
@@ -338,7 +338,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
                     valid = item < listed
                     grid = exponent_of(head)
                     q = lane & 3
-                    flow(near, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, forces)
+                    flow(
+                        near, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, forces
+                    )
                 if listed > 0:
                     barrier()
                     if lane == 0:

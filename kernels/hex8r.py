@@ -119,7 +119,7 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
-    The first also gives the ratio of volumes J, the second the square of the deviatoric strain.
+    The first also gives the ratio of volumes J, the second keeps the greatest strain.
 
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
     """
@@ -132,6 +132,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
+    keep_greatest, _ = keep_functions(R)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
@@ -156,11 +157,13 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         law: wp.array2d(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
     ):
         K = law[m, 0]
         G = law[m, 1]
         kept = R(1.0)
         strain, N, d = deviator(H)
+        keep_greatest(STRAIN_SQUARE, e, wp.ddot(strain, strain), extreme_out)
         S = R(2.0) * G * strain
         if wp.static(plastic):
             eps_p = mat33()
@@ -188,7 +191,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
                 # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
                 history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
             Q = kept * Q
-        return P, Q, wp.ddot(strain, strain)
+        return P, Q
 
     @wp.func
     def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
@@ -238,10 +241,9 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         x = to_patterns(load_element(X, conn, e))
         du = to_patterns(load_element(u, conn, e))
         b, volume, W, H, J, q = shape_and_strain(x, du)
-        P, Q, square = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
-        keep_greatest(STRAIN_SQUARE, e, square, extreme_out)
-        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+from warp_mca.kernels.extremes import VOLUME_LOSS, keep_functions
 from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.overlap import begins_early
 from warp_mca.kernels.patch import (
@@ -95,10 +95,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
             copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 b, volume, W, H, J, q = shape_and_strain(x, du)
-                keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
-                P, Q, square = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out)
-                keep_greatest(STRAIN_SQUARE, e, square, extreme_out)
+                P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out, extreme_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
+                keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
             corners = corners_of(patches, coming, lane)
             wait_for_copies()
             barrier()

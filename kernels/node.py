@@ -78,10 +78,10 @@ def integrate_kernel(
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
-    where it is not empty. speed_square_out keeps the greatest v^2 of each node; peak_out, where it is not empty, the
-    greatest sum of normal forces of each scene. `fixed`: some axes are at rest; `bound`: some nodes are left to `constraint.bound_kernel`.
-    With `each`, gravity differs between the scenes of a batch, and nodes know their scene. `early`: the next kernel
-    takes its places as soon as nodes leave some.
+    where it is not empty. speed_square_out keeps the greatest v^2 of each node. normal_force_out, empty but for the
+    first range of nodes, is as in `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`: some nodes are
+    left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and nodes know their
+    scene. `early`: the next kernel takes its places as soon as nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
@@ -104,7 +104,6 @@ def integrate_kernel(
         v_before_out: wp.array(dtype=wp.vec3d),
         speed_square_out: wp.array(dtype=wp.float32),
         normal_force_out: wp.array2d(dtype=wp.int64),
-        peak_out: wp.array(dtype=wp.int64),
     ):
         if wp.static(early):
             let_next_begin()
@@ -113,7 +112,7 @@ def integrate_kernel(
         inverse = inverse_mass[i]
         wait_for_previous()
         if wp.static(contact):
-            keep_normal_force(i, u_out.shape[0], normal_force_out, peak_out)
+            keep_normal_force(i, u_out.shape[0], normal_force_out)
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return

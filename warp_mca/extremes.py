@@ -19,27 +19,26 @@ class NormalForce:
     """Normal forces of all springs of a step, summed for each scene, and the greatest sum so far.
 
     Attributes:
-        sums: of the present step, a row for each range of slaves, shape (range_count, column_count), int64.
-        rows: views of these rows.
-        peak: greatest sum of any step, shape (scene_count,), int64.
+        array: the greatest sum of any step, then a row of sums of the present step for each range of slaves, shape
+            (1 + range_count, column_count), int64; a column for each scene, and some that stay 0.
+        rows: views of the rows of sums.
         per_newton: what the sums count for a newton [1/N], a power of two; as kernels take it, see `kernels.each`.
     """
 
     def __init__(self, scenes: Sequence[Sequence[ContactPass]], threads: int) -> None:
         """Allocate for the passes of each scene, none where no scene has contact, and for as many threads of a CPU."""
         ranges = RANGES * threads if threads > 1 else 1
-        self.sums = wp.zeros((ranges, -(-len(scenes) // _LINE) * _LINE), dtype=wp.int64)
-        self.rows = [self.sums[k] for k in range(ranges)] if scenes else []
-        self.peak = wp.zeros(len(scenes), dtype=wp.int64)
+        self.array = wp.zeros((1 + ranges if scenes else 0, -(-len(scenes) // _LINE) * _LINE), dtype=wp.int64)
+        self.rows = [self.array[1 + k] for k in range(ranges)] if scenes else []
         self._scales = [_scale(passes) for passes in scenes]
         self.per_newton: Any = self._scales[0] if len(scenes) == 1 else wp.array(self._scales, dtype=wp.float64)
 
     def greatest(self, scene: int) -> float:
-        """Greatest normal force of any step [N]."""
-        return float(self.peak.numpy()[scene]) / self._scales[scene]
+        """Greatest normal force of a scene in any step [N]; 0 without contact."""
+        return float(self.array.numpy()[0, scene]) / self._scales[scene] if self._scales else 0.0
 
 
 def _scale(passes: Sequence[ContactPass]) -> float:
-    """Parts of a newton that sums are counted in [1/N]: guards stop a run before forces come near the largest number."""
+    """What sums count for a newton [1/N]: guards stop a run before forces come near the largest whole number."""
     reach = [item.sides * float(item.stiffness.sum()) * max(item.longest, item.deepest) for item in passes]
     return 2.0 ** (_BITS - math.ceil(math.log2(sum(reach))))

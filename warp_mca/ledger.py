@@ -41,7 +41,8 @@ class Ledger:
         exchanged: largest energy so far that was in elements, contact springs and friction, or that motion had gained
             or lost [J].
         max_strain: greatest deviatoric strain of any step so far [-].
-        min_jacobian: smallest ratio of volumes so far: at points of elements in records, at their centres in any step [-].
+        min_jacobian: smallest ratio of volumes so far, 1 at most: of any step at the centres of elements, of records at
+            all their points [-].
         turned: whether a pressed node went over to a face across a sharp edge.
     """
 
@@ -94,10 +95,10 @@ class Ledger:
         self.max_strain = max(self.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
         self.min_jacobian = min(self.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
         self.energy_error = max(self.energy_error, float(share[:end].max(initial=0.0)))
-        t = self.steps.time(self.records)
+        last, t = (self.steps.time(self.records + k) for k in (-1, 0))
         if over.any():
             raise GuardError(
-                f"energy imbalance {share[end - 1]:.2%} at t = {self.steps.time(self.records - 1):.4g} s exceeds energy_tolerance = "
+                f"energy imbalance {share[end - 1]:.2%} at t = {last:.4g} s exceeds energy_tolerance = "
                 f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
                 f"tolerance if that much is acceptable{self._hint}"
             )
@@ -106,7 +107,7 @@ class Ledger:
         if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
 
-    def rows(self, written: int) -> Array:
+    def rows(self, written: int) -> NDArray[np.int_]:
         """Which of the next `written` records are rows of the history."""
         return np.arange(-self.records % self.steps.checks, written, self.steps.checks)
 

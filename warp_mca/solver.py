@@ -4,8 +4,8 @@
 |---|---|---|
 | 1 element forces | `hex8_patch_force`, `tet4_force`, … | every step, for each block of like elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
-| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval and of each check between, see `Steps` |
-| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | first step of an output interval, where a scene has paths or a frame is due |
+| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval, and checks between: `warp_mca.steps` |
+| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | each output interval, if there are paths or a due frame |
 | 4 gather and integrate | `integrate` | every step |
 | 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
 | 5 record of motion | `record_motion` | as 3 |
@@ -154,7 +154,7 @@ class Solver:
             if before:
                 wp.wait_event(before)
             for contact in self.contacts:
-                outputs = [self.contact_force, self.normal_force, self.flag]
+                outputs = self.contact_force, self.normal_force, self.flag
                 contact.touch(self.X, self.u, self.v, self.dt, *outputs, split)
             if beside:
                 beside()
@@ -170,16 +170,12 @@ class Solver:
             inputs = [self.inverse_mass[part], self.near[part], self.more]
             inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part], None if before is None else before[part]]
-            outputs += [self.speed_square[part], *self._normal_force_outputs(part)]
+            outputs += [self.speed_square[part], self.normal_force.array if part.start == 0 else None]
             wp.launch(
                 self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK
             )
 
         split(self.model.node_count, launch, NODES)
-
-    def _normal_force_outputs(self, part: slice) -> tuple[wp.array | None, wp.array | None]:
-        """What the kernel of a range of nodes takes the normal forces of a step from; only that of the first does."""
-        return (self.normal_force.sums, self.normal_force.peak) if part.start == 0 else (None, None)
 
     def _advance_bound(self, before: wp.array | None = None) -> None:
         inputs = [self.mass, self.inverse_mass, self.near, self.more, self.bonds.role, self.force, self.node_scene]
@@ -304,7 +300,9 @@ class Solver:
             self.speed_square.assign((self.model.V**2).sum(axis=1))  # not that before the start
 
     def record_and_step(self, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True) -> None:
-        """Record the state, as a row of the history or between two, with a frame of `needs`, then advance `count` steps.
+        """Record the state, as a row of the history or as a check between two, then advance `count` steps.
+
+        A row may come with a frame of `needs`.
 
         Raises:
             Exception: what a thread raised.
@@ -364,7 +362,7 @@ class Solver:
 
     def max_normal_force(self, scene: int = 0) -> float:
         """Greatest sum of the normal forces on all slave nodes of a scene in any step [N]."""
-        return self.normal_force.greatest(scene) if self.contacts else 0.0
+        return self.normal_force.greatest(scene)
 
     def max_speed(self, scene: int = 0) -> float:
         """Greatest speed of any node of a scene, from the start on [m/s]."""

@@ -32,8 +32,8 @@ class ElementStage:
         yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
         history: plastic strain and equivalent plastic strain of each point, in the order of
             `kernels.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
-        extreme: of all steps the greatest square of the deviatoric strain and the greatest loss of volume 1 - J [-], 0 at
-            least, shape (2, element_count), real.
+        extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step so far [-], from
+            0 on, shape (2, element_count), in the scalars of the precision.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
         rounds: patches that a block of threads computes in turn.
