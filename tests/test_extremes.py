@@ -14,28 +14,29 @@ from test_run import bar
 
 import warp_mca as mca
 from warp_mca import simulation
-from warp_mca.ledger import LEAST
 from warp_mca.steps import CHECK_STEPS, CHECK_TIME, Steps
 
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=400e6, E_t=2e9)
-DT = 5e-8  # of all runs here: rows differ, steps do not
+DT = 2.5e-8  # of most runs here: rows differ, steps do not
 
 
-def run(scene: mca.Scene, monkeypatch: pytest.MonkeyPatch, rows: int, steps: int, **more: object) -> mca.Result:
+def run(
+    scene: mca.Scene, monkeypatch: pytest.MonkeyPatch, rows: int, steps: int, dt: float = DT, **more: object
+) -> mca.Result:
     """A run of so many rows of as many steps each."""
-    division = Steps(dt=DT, per_search=steps, searches=1, intervals=rows)
+    division = Steps(dt=dt, per_search=steps, searches=1, intervals=rows)
     with monkeypatch.context() as patch:
         patch.setattr(simulation, "divide", lambda *_: division)
         return mca.run(scene, **more)
 
 
 def fast(element: str = "hex8") -> mca.Scene:
-    """A bar of 40 elements that strikes a wall at 800 m/s, a sixth of its wave speed, and has left it after 30 us."""
+    """A bar of 40 elements that strikes a wall at 600 m/s, a ninth of its wave speed, and has left it after 30 us."""
     scene = bar(penalty=10.0, energy_tolerance=1.0)
     body = replace(
         scene.bodies[0],
         geometry=mca.Box(size=(0.04, 0.01, 0.01), divisions=(40, 2, 2)),
-        velocity=(800.0, 0.0, 0.0),
+        velocity=(600.0, 0.0, 0.0),
         element=element,
     )
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1, 0, 0))
@@ -46,7 +47,7 @@ def fast(element: str = "hex8") -> mca.Scene:
 @pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
 def test_rows_200_times_as_long_give_the_same_extremes(element, monkeypatch):
     """A single row showed a fraction of the greatest force, and no strain: the bar was free again."""
-    short, long = (run(fast(element), monkeypatch, *division) for division in ((200, 3), (1, 600)))
+    short, long = (run(fast(element), monkeypatch, *division) for division in ((200, 6), (1, 1200)))
     one, other = short.summary["extremes"], long.summary["extremes"]
     for name in ("F_n_max", "max_strain", "max_speed"):
         assert one[name] == other[name], name
@@ -54,7 +55,7 @@ def test_rows_200_times_as_long_give_the_same_extremes(element, monkeypatch):
     for result in (short, long):
         assert result.summary["max_strain"] == one["max_strain"] > 0.1
         assert any("strain reached" in warning for warning in result.warnings)
-    assert other["min_jacobian"] == pytest.approx(one["min_jacobian"], rel=0.0 if element != "hex8" else 0.02)
+    assert other["min_jacobian"] == pytest.approx(one["min_jacobian"], rel=0.0 if element != "hex8" else 0.05)
     assert 0.5 < one["min_jacobian"] < 0.95
 
 
@@ -66,9 +67,7 @@ def heads_on(two_way: bool) -> mca.Scene:
     right = mca.Body(name="right", position=(0.02, 0.0, 0.0), **steel)
     ends = mca.Surface(body="left", nodes="xmax"), mca.Surface(body="right", nodes="xmin")
     contact = mca.Contact(slave=ends[0], master=ends[1], two_way=two_way)
-    return mca.Scene(
-        name="heads on", bodies=(left, right), contacts=(contact,), impact=mca.ImpactPhase(duration=1e-5)
-    )
+    return mca.Scene(name="heads on", bodies=(left, right), contacts=(contact,), impact=mca.ImpactPhase(duration=1e-5))
 
 
 @pytest.mark.parametrize("scene", [bar(), heads_on(False), heads_on(True)], ids=["plane", "surface", "two-way"])
@@ -77,7 +76,8 @@ def test_greatest_force_is_that_of_rows_of_one_step(scene, monkeypatch):
     result = run(scene, monkeypatch, 200, 1)
     assert result.summary["F_n_max"] > 100.0
     assert result.summary["extremes"]["F_n_max"] == pytest.approx(result.summary["F_n_max"], rel=1e-9)
-    assert run(scene, monkeypatch, 2, 100).summary["extremes"] == pytest.approx(result.summary["extremes"], rel=1e-2)
+    coarse = run(scene, monkeypatch, 2, 100)
+    assert coarse.summary["extremes"]["F_n_max"] == result.summary["extremes"]["F_n_max"] > coarse.summary["F_n_max"]
 
 
 @pytest.mark.parametrize(("v", "fastest"), [(0.0, 1e4 * 100.5 * DT), (1.0, 1.0)])
@@ -107,25 +107,27 @@ def test_strain_and_loss_of_volume_of_a_past_step_stay(element, kinematics, mate
     strain = 1.0 / 3.0 if kinematics == "corotational" else 2.0 / 3.0 * np.log(2.0)
     for share in (0.5, 0.1, 0.0):
         forces(solver, solver.model.X * [-share, 0.0, 0.0])
-        assert extremes() == pytest.approx((strain, 0.5), rel=1e-9)
+        assert extremes() == pytest.approx((strain, 0.5), rel=1e-6)  # the rotation's error at this stretch
     forces(solver, solver.model.X * [-2.0, 0.0, 0.0])
     forces(solver, 0.0 * solver.model.X)
-    assert extremes()[1] == pytest.approx(-1.0, rel=1e-9)
+    assert extremes()[1] == pytest.approx(-1.0, rel=1e-6)
 
 
 def test_an_imbalance_between_two_rows_stops_the_run(monkeypatch):
-    """Contact springs hide energy from central differences while they close; when the bar is free it has come back."""
-    scene = bar(time_step_scale=0.9)
-    fine, coarse = (run(scene, monkeypatch, *division) for division in ((2400, 1), (1, 2400)))
+    """The balance is off by half as much again while bars touch as when they are free, in the row at the end."""
+    scene = heads_on(False)
+    dt = CHECK_TIME / CHECK_STEPS
+    fine, coarse = (run(scene, monkeypatch, *division, dt) for division in ((2400, 1), (1, 2400)))
     last = abs(fine["E_total_error"][-1]) / fine.summary["energy"]["initial"]
-    assert coarse.summary["extremes"]["energy_error"] == coarse.summary["energy_error"] > 3.0 * last
-    assert coarse.summary["energy_error"] > 0.5 * fine.summary["energy_error"]
-    strict = replace(scene, impact=replace(scene.impact, energy_tolerance=max(2.0 * last, LEAST)))
+    assert coarse["E_total_error"].shape == (2,)
+    assert coarse.summary["extremes"]["energy_error"] == coarse.summary["energy_error"] > 1.5 * last
+    assert coarse.summary["energy_error"] > 0.6 * fine.summary["energy_error"]
+    strict = replace(scene, impact=replace(scene.impact, energy_tolerance=1.25 * last))
     with pytest.raises(mca.GuardError, match=r"energy imbalance .* at t = ") as found:
-        run(strict, monkeypatch, 1, 2400)
+        run(strict, monkeypatch, 1, 2400, dt)
     time = float(re.search(r"at t = (\S+) s", str(found.value))[1])
-    assert 0.0 < time < 2400 * DT
-    assert time / (CHECK_STEPS * DT) == pytest.approx(round(time / (CHECK_STEPS * DT)), abs=1e-6)
+    assert 0.0 < time < 2400 * dt
+    assert time / CHECK_TIME == pytest.approx(round(time / CHECK_TIME), abs=1e-6)
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -146,7 +148,7 @@ def test_rows_hold_their_whole_interval_whatever_checks_lie_in_it(count, monkeyp
 def test_checks_fill_an_output_interval_with_no_gap_too_long():
     """Records lie where `time` says, searches at equal distances, and few lengths of parts make few graphs."""
     rng = random.Random(0)
-    for _ in range(1000):
+    for _ in range(300):
         steps = Steps(10.0 ** rng.uniform(-9.5, -5.0), rng.randint(1, 300), rng.randint(1, 60), 3)
         parts = list(steps.parts())
         begin = np.cumsum([0, *(part.count for part in parts)])
@@ -160,5 +162,3 @@ def test_checks_fill_an_output_interval_with_no_gap_too_long():
         assert times == pytest.approx(steps.interval + steps.dt * checks, rel=1e-12)
         assert len({(part.count, part.begins_check) for part in parts}) <= 3
     assert Steps(1e-6 / 40, 40, 1, 10).checks == Steps(1e-7, 10, 2, 10).checks == 1
-
-

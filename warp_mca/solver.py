@@ -4,8 +4,8 @@
 |---|---|---|
 | 1 element forces | `hex8_patch_force`, `tet4_force`, … | every step, for each block of like elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
-| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval, and checks between: `warp_mca.steps` |
-| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | each output interval, if there are paths or a due frame |
+| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval, checks between: `warp_mca.steps` |
+| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | each output interval, if paths or a frame need it |
 | 4 gather and integrate | `integrate` | every step |
 | 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
 | 5 record of motion | `record_motion` | as 3 |
