@@ -18,7 +18,7 @@ def bodies(held: Held) -> dict[str, Callable[[], None]]:
 
     def contact() -> None:
         for stage in s.contacts:
-            stage.touch(s.X, s.u, s.v, s.dt, s.contact_force, s.flag)
+            stage.touch(s.X, s.u, s.v, s.dt, s.contact_force, s.normal_force, s.flag)
 
     return {
         "element forces": elements,

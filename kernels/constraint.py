@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.extremes import keep_speed
 from warp_mca.kernels.node import gather_function, hold, take_contact
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
@@ -118,6 +119,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
         v_before_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
         impulse_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
@@ -155,11 +157,13 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
                 v = weighted_mean(mass[i], free, mass[j], v_j)
                 u_out[j] = u
                 v_out[j] = v
+                keep_speed(j, v, speed_square_out)
             impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
         else:
             v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
             u = u_free + dt * (v - free)
         u_out[i] = u
         v_out[i] = v
+        keep_speed(i, v, speed_square_out)
 
     return begins_early(advance_bound)

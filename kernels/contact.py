@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.extremes import add_normal_force
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.search import STALE, TOO_DEEP, TURNED, moved_too_far
@@ -159,7 +160,9 @@ def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
         own: wp.float64,
         limit: wp.float64,
         mu: wp.float64,
+        per_newton: wp.float64,
         spring: Spring,
+        normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         # a spring with neither gap nor normal has no force, and is released as an open one
@@ -167,7 +170,8 @@ def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
         normal_kept = wp.where(touches, normal, wp.vec3d())
         gap_pressed = gap_from_rest(s, gap_kept, spring)
         stiffness = spring_stiffness(s, gap_pressed, du, own, limit, touches, spring)
-        force = press(s, gap_pressed, normal_kept, du, stiffness, mu, spring)
+        force, F_n = press(s, gap_pressed, normal_kept, du, stiffness, mu, spring)
+        add_normal_force(scene, F_n, per_newton, normal_force_out)
         spring.face[s] = wp.where(touches, f, -1)
         spring.weight[s] = weight
         spring.held[s] = wp.where(touches or front < wp.float64(FAR), -gap_kept, held)
@@ -232,9 +236,11 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any
         scene: Index,
         mu: Real,
         margin: Real,
+        per_newton: Real,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -274,7 +280,9 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any
                 stiffness[s],
                 face_stiffness[best],
                 of(mu, k),
+                of(per_newton, k),
                 spring,
+                normal_force_out,
                 flag_out,
             )
         else:
@@ -370,9 +378,11 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
         plane_velocity: Vector,
         mu: Real,
         deepest: Real,
+        per_newton: Real,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -388,7 +398,8 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
         if gap < -of(deepest, k):
             flag_out[k, TOO_DEEP] = 1
         if gap < wp.float64(0.0):
-            force = press(s, gap, normal, du, stiffness[s], of(mu, k), spring)
+            force, F_n = press(s, gap, normal, du, stiffness[s], of(mu, k), spring)
+            add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
             contact_force_out[i] = contact_force_out[i] + force
         elif spring.face[s] >= 0:

@@ -11,6 +11,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 from warp_mca.kernels.fused import NOTHING
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hex8_finite import finite_force_kernel
@@ -50,6 +51,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     load_element = load_function(precision)
     elastic_forces = elastic_function(precision)
     store_force = store_function(precision)
+    keep_greatest, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
@@ -63,15 +65,19 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         count: int,
         yielded: wp.array(dtype=wp.int32),
         history: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
+        W, J = element_rotation(Xl, ul)
         ul = local_displacement(Xl, ul, W)
         m = material[e]
-        f, _largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], R(scale) * law[m, 1])
+        G = R(scale) * law[m, 1]
+        f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G)
+        keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
 
@@ -87,8 +93,9 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
     element_rotation, local_displacement = frame_functions(precision)
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
-    add_traction, symmetric_gradient = stress_functions(precision)
+    add_traction, symmetric_gradient, invariant = stress_functions(precision)
     store_force = store_function(precision)
+    keep_greatest, strain_square = keep_functions(R)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     functions = law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
@@ -105,12 +112,13 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
         count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
+        W, J = element_rotation(Xl, ul)
         ul = local_displacement(Xl, ul, W)
         gx = to_lines(edges(Xl, 0))
         gy = to_lines(edges(Xl, 1))
@@ -131,6 +139,7 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
         Bz = mat43(R(NOTHING))
         volume = R(NOTHING)
         dilation = R(NOTHING)
+        largest = R(0.0)
         flag = yielded_out[e]
         flag_new = flag
         for g in range(8):
@@ -161,6 +170,7 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
             xy = shear * xy
             yz = shear * yz
             xz = shear * xz
+            largest = wp.max(largest, invariant(xx, yy, xy, yz, xz))
             S = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
             S, eps_new, p_new = return_map(S, eps_p, p, G, parameters)
             if p_new > p:
@@ -174,6 +184,8 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
             Bz[jz] = Bz[jz] + b2
         if flag_new != flag:
             yielded_out[e] = flag_new
+        keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         pressure = K * dilation / volume
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)
@@ -187,7 +199,10 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
 
 @cache
 def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
+    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
+
+    The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
+    """
     k = kinematics(precision, finite)
     dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
     t = scalars(precision)
@@ -209,6 +224,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         yielded: wp.array(dtype=wp.int32),
         history: wp.array2d(dtype=R),
+        extreme: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         first: int,
         energy_out: wp.array2d(dtype=R),
@@ -216,7 +232,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         e = wp.tid()
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
+        W, _J = element_rotation(Xl, ul)
         ul = local_displacement(Xl, ul, W)
         gx = to_gauss(half_edges(Xl, 0))
         gy = to_gauss(half_edges(Xl, 1))
@@ -230,7 +246,6 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         dilation = R(0.0)
         elastic = R(0.0)
         dissipated = R(0.0)
-        largest = R(0.0)
         smallest = R(1.0)
         for g in range(8):
             det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
@@ -243,14 +258,14 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                     eps_p, p = read_plastic_strain(history, g, e)
                     dissipated += det * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
             elastic += det * law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
-            largest = wp.max(largest, wp.ddot(strain, strain))
             smallest = wp.min(smallest, wp.determinant(identity + grad))
         energy_out[0, first + e] = elastic + volume * volumetric_energy(law[m, 0], dilation / volume)
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
         energy_out[4, first + e] = R(0.0)
         # an inverted element's Q is a reflection, which would hide the inversion in its own frame
-        energy_out[3, first + e] = smallest * wp.determinant(identity + W)
+        smallest = smallest * wp.determinant(identity + W)
+        energy_out[3, first + e] = wp.min(smallest, R(1.0) - extreme[VOLUME_LOSS, e])
 
     return hex8_energy
 
@@ -290,7 +305,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         e = element[item]
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
+        W, _J = element_rotation(Xl, ul)
         ul = local_displacement(Xl, ul, W)
         gx = to_gauss(half_edges(Xl, 0))
         gy = to_gauss(half_edges(Xl, 1))

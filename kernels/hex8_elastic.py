@@ -13,8 +13,11 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def stress_functions(precision: str) -> tuple[Any, Any]:
-    """Functions of the symmetric stress (xx, yy, zz, xy, yz, xz): (S b + c; six sums of products l b, as strains)."""
+def stress_functions(precision: str) -> tuple[Any, Any, Any]:
+    """Functions of symmetric tensors (xx, yy, zz, xy, yz, xz).
+
+    (S b + c; six sums of products l b, as strains; the invariant J2 = S : S / 2 of a traceless S, which needs no zz.)
+    """
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
 
@@ -38,12 +41,16 @@ def stress_functions(precision: str) -> tuple[Any, Any]:
         xz = l0[0] * b0[2] + l1[0] * b1[2] + l2[0] * b2[2] + l0[2] * b0[0] + l1[2] * b1[0] + l2[2] * b2[0]
         return xx, yy, zz, xy, yz, xz
 
-    return add_traction, symmetric_gradient
+    @wp.func
+    def invariant(xx: R, yy: R, xy: R, yz: R, xz: R):
+        return xx * (xx + yy) + (yy * yy + (xy * xy + (yz * yz + xz * xz)))
+
+    return add_traction, symmetric_gradient, invariant
 
 
 @cache
 def elastic_function(precision: str) -> Any:
-    """The function (corners, local displacements, frame W, K, G) -> (corner forces, greatest S : S of a point).
+    """The function (corners, local displacements, frame W, K, G) -> (corner forces, greatest S : S / 2 of a point).
 
     Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli: K, G and stresses are
     those of the material times that.
@@ -52,7 +59,7 @@ def elastic_function(precision: str) -> Any:
     R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
     edges, to_lines = line_functions(precision)
     edge_to_node = node_force_function(precision)
-    add_traction, symmetric_gradient = stress_functions(precision)
+    add_traction, symmetric_gradient, invariant = stress_functions(precision)
 
     @wp.func
     def elastic_forces(Xl: mat83, ul: mat83, W: mat33, K: R, G: R):
@@ -95,7 +102,7 @@ def elastic_function(precision: str) -> Any:
             xy = shear * xy
             yz = shear * yz
             xz = shear * xz
-            largest = wp.max(largest, xx * xx + yy * yy + zz * zz + R(2.0) * (xy * xy + yz * yz + xz * xz))
+            largest = wp.max(largest, invariant(xx, yy, xy, yz, xz))
             Sx[jx] = add_traction(xx, yy, zz, xy, yz, xz, b0, Sx[jx])
             Sy[jy] = add_traction(xx, yy, zz, xy, yz, xz, b1, Sy[jy])
             Sz[jz] = add_traction(xx, yy, zz, xy, yz, xz, b2, Sz[jz])

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 from warp_mca.kernels.hexahedron import (
     edge_functions,
     frame_functions,
@@ -31,6 +32,7 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
     store_force = store_function(precision)
+    keep_greatest, _ = keep_functions(R)
     point_gradient = gradient_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
@@ -49,12 +51,13 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
         count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
         Xl = load_element(X, conn, e)
         ul = load_element(u, conn, e)
-        W = element_rotation(Xl, ul)
+        W, J = element_rotation(Xl, ul)
         ul = local_displacement(Xl, ul, W)
         gx = to_gauss(half_edges(Xl, 0))
         gy = to_gauss(half_edges(Xl, 1))
@@ -75,6 +78,7 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             flag = yielded_out[e]
         flag_new = flag
+        largest = R(0.0)
         Sx = mat43()
         Sy = mat43()
         Sz = mat43()
@@ -87,6 +91,7 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
             jz = i + 2 * j
             det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             strain, N, d = deviator(grad)
+            largest = wp.max(largest, wp.ddot(strain, strain))
             S = (R(2.0) * G) * strain
             if wp.static(plastic):
                 eps_p = mat33()
@@ -104,6 +109,8 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
+        keep_greatest(STRAIN_SQUARE, e, largest, extreme_out)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         half = R(0.5)
         f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz), W)
         for a in range(8):

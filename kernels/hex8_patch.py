@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
@@ -47,12 +48,12 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def lane_functions(precision: str) -> tuple[Any, Any, Any]:
+def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
     """Functions over the four lanes of an element, whose bits 0 and 1 are xi and eta of corners and Gauss points.
 
     A lane has the lower and the upper of both. (Corner values -> edge vectors on the Gauss lines through the lane's
     points, as `line_functions` has them, along zeta one for both; edge forces at the points -> corner forces, the
-    transpose; sum of a scalar.)
+    transpose; sum and greatest of a scalar.)
     """
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
@@ -98,7 +99,12 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any]:
         value += exchange(value, 1)
         return value + exchange(value, 2)
 
-    return to_point_lines, to_corners, lane_sum
+    @wp.func
+    def lane_max(value: R):
+        value = wp.max(value, exchange(value, 1))
+        return wp.max(value, exchange(value, 2))
+
+    return to_point_lines, to_corners, lane_sum, lane_max
 
 
 @cache
@@ -106,11 +112,12 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
     """Functions of one Gauss point.
 
     (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
-    stress and plastic strain of a point; the history of two points; forces of the edges.)
+    stress and plastic strain of a point, and J2 of the stress that it would have without; the history of two points;
+    forces of the edges.)
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    add_traction, symmetric_gradient = stress_functions(precision)
+    add_traction, symmetric_gradient, invariant = stress_functions(precision)
     functions = law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     pair = wp.types.vector(2 * HISTORY_SIZE, R)
@@ -151,7 +158,8 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
         p_yz = history[first + 3]
         p_xz = history[first + 4]
         eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
-        return return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
+        S, eps_new, p_new = return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
+        return S, eps_new, p_new, invariant(xx, yy, xy, yz, xz)
 
     @wp.func
     def force_of_edge(S: mat33, pressure: R, b: vec3):
@@ -186,10 +194,11 @@ def force_kernel(precision: str, law_name: str) -> Any:
     element_rotation, local_displacement = frame_functions(precision)
     elastic_forces = elastic_function(precision)
     add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
-    to_point_lines, to_corners, lane_sum = lane_functions(precision)
+    to_point_lines, to_corners, lane_sum, lane_max = lane_functions(precision)
     shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
+    keep_greatest, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -205,6 +214,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
         q: int,
         valid: bool,
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
         """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
@@ -223,8 +233,11 @@ def force_kernel(precision: str, law_name: str) -> Any:
         b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
         b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
         pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
-        S0, eps0, p0 = stress_of_point(sums0, det0, law, m, history, 0)
-        S1, eps1, p1 = stress_of_point(sums1, det1, law, m, history, size)
+        S0, eps0, p0, trial0 = stress_of_point(sums0, det0, law, m, history, 0)
+        S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
+        largest = lane_max(wp.max(trial0, trial1))
+        if valid and q == 0:
+            keep_greatest(STRAIN_SQUARE, e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
         if valid and (p0 > history[last] or p1 > history[size + last]):
             write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
@@ -262,6 +275,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
         stride: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         lane = wp.tid() & wp.static(PATCH - 1)
@@ -291,16 +305,19 @@ def force_kernel(precision: str, law_name: str) -> Any:
             if wp.static(early):
                 copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                W = element_rotation(Xl, ul)
+                W, J = element_rotation(Xl, ul)
+                keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
                 flows = bool(False)
                 if wp.static(plastic):
                     flows = yielded_out[e] != 0
                 if not flows:
                     ul = local_displacement(Xl, ul, W)
-                    f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], R(scale) * law[m, 1])
+                    G = R(scale) * law[m, 1]
+                    f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G)
                     keep_forces(forces, lane, f)
+                    keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
                     if wp.static(plastic):
-                        if R(1.5) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
+                        if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
                             flows = bool(True)
                             yielded_out[e] = 1
                 if wp.static(plastic):
@@ -319,9 +336,11 @@ def force_kernel(precision: str, law_name: str) -> Any:
                     thread = todo[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
                     mine = from_start(head[0] + thread)
                     valid = item < listed
-                    exponent = exponent_of(head)
+                    grid = exponent_of(head)
                     q = lane & 3
-                    flow(near, pool, first, exponent, patches, mine, law, thread, q, valid, history_out, forces)
+                    flow(
+                        near, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, forces
+                    )
                 if listed > 0:
                     barrier()
                     if lane == 0:

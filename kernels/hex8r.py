@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 from warp_mca.kernels.fused import NOTHING, fused
 from warp_mca.kernels.hexahedron import history_functions, load_function, store_function, stress_function
 from warp_mca.kernels.kinematics import kinematics
@@ -118,6 +119,8 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
+    The first also gives the ratio of volumes J, the second keeps the greatest strain.
+
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
     """
     t = scalars(precision)
@@ -129,6 +132,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
+    keep_greatest, _ = keep_functions(R)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
@@ -139,7 +143,8 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         b, scaled_volume = mean_gradients(x)
         H_world = mean_gradient_of(du, b, scaled_volume)
         W, H = rotated(H_world)
-        return b, R(VOLUME_SCALE) * scaled_volume, W, H, amplitudes(x, du, H_world, W)
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H_world)
+        return b, R(VOLUME_SCALE) * scaled_volume, W, H, J, amplitudes(x, du, H_world, W)
 
     @wp.func
     def stress_and_flow(
@@ -152,11 +157,13 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         law: wp.array2d(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
     ):
         K = law[m, 0]
         G = law[m, 1]
         kept = R(1.0)
         strain, N, d = deviator(H)
+        keep_greatest(STRAIN_SQUARE, e, wp.ddot(strain, strain), extreme_out)
         S = R(2.0) * G * strain
         if wp.static(plastic):
             eps_p = mat33()
@@ -213,6 +220,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
     store_force = store_function(precision)
+    keep_greatest, _ = keep_functions(R)
 
     # ln(1 + x) of small x needs the rounding that fast math gives away
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -226,14 +234,16 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         count: int,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
         x = to_patterns(load_element(X, conn, e))
         du = to_patterns(load_element(u, conn, e))
-        b, volume, W, H, q = shape_and_strain(x, du)
-        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out)
+        b, volume, W, H, J, q = shape_and_strain(x, du)
+        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
 
@@ -242,7 +252,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
 
 @cache
 def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
+    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
     t = scalars(precision)
     R, mat33, mat43 = t.real, t.mat33, t.mat43
     to_patterns, _ = pattern_functions(precision)
@@ -265,6 +275,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         yielded: wp.array(dtype=wp.int32),
         history: wp.array2d(dtype=R),
+        extreme: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         first: int,
         energy_out: wp.array2d(dtype=R),
@@ -294,12 +305,11 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                 q_p = read_amplitudes(history, e)
             q = q - q_p
         _Q, stored = hourglass(q, x, volume, K, G)
-        identity = wp.identity(n=3, dtype=R)
         elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * wp.ddot(strain, strain))
-        energy_out[3, first + e] = wp.determinant(identity + H) * wp.determinant(identity + W)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
+        energy_out[3, first + e] = R(1.0) - extreme[VOLUME_LOSS, e]
         energy_out[4, first + e] = stored
 
     return hex8r_energy

@@ -118,7 +118,10 @@ def line_functions(precision: str) -> tuple[Any, Any]:
 
 @cache
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
-    """Functions that take an element to its rotated frame: (rotation as W = Q - I, local displacements)."""
+    """Functions that take an element to its rotated frame.
+
+    (Its rotation as W = Q - I and the ratio of volumes J at its centre; local displacements.)
+    """
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
     edges, _ = line_functions(precision)
@@ -140,7 +143,8 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
         a2 = wp.cross(c0, c1)
         inverse = R(1.0) / wp.dot(c0, a0)
         grad = wp.outer(edge_sum(u, 0), a0) + wp.outer(edge_sum(u, 1), a1) + wp.outer(edge_sum(u, 2), a2)
-        return polar_rotation(wp.identity(n=3, dtype=R) + inverse * grad)
+        F = wp.identity(n=3, dtype=R) + inverse * grad
+        return polar_rotation(F), wp.determinant(F)
 
     @wp.func
     def local_displacement(X: mat83, u: mat83, W: mat33):

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
+from warp_mca.kernels.extremes import keep_normal_force, keep_speed
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
 
@@ -77,9 +78,10 @@ def integrate_kernel(
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
-    where it is not empty. `fixed`: some axes are at rest; `bound`: some nodes are left to `constraint.bound_kernel`.
-    With `each`, gravity differs between the scenes of a batch, and nodes know their scene. `early`: the next kernel
-    takes its places as soon as nodes leave some.
+    where it is not empty. speed_square_out keeps the greatest v^2 of each node. normal_force_out, empty but for the
+    first range of nodes, is as in `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`: some nodes are
+    left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and nodes know their
+    scene. `early`: the next kernel takes its places as soon as nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
@@ -100,6 +102,8 @@ def integrate_kernel(
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
         v_before_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
+        normal_force_out: wp.array2d(dtype=wp.int64),
     ):
         if wp.static(early):
             let_next_begin()
@@ -107,6 +111,8 @@ def integrate_kernel(
         pair = near[i]
         inverse = inverse_mass[i]
         wait_for_previous()
+        if wp.static(contact):
+            keep_normal_force(i, u_out.shape[0], normal_force_out)
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
@@ -122,5 +128,6 @@ def integrate_kernel(
             v_before_out[i] = v_out[i]
         v_out[i] = v
         u_out[i] = u_out[i] + drift * v
+        keep_speed(i, v, speed_square_out)
 
     return begins_early(integrate)

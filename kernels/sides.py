@@ -136,9 +136,11 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
         scene: Index,
         mu: Real,
         margin: Real,
+        per_newton: Real,
         dt: wp.float64,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -258,7 +260,9 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
                             stiffness[s],
                             face_stiffness[f],
                             of(mu, k),
+                            of(per_newton, k),
                             spring,
+                            normal_force_out,
                             flag_out,
                         )
                 elif turn == 1:

@@ -21,7 +21,7 @@ class Spring:
     tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1.
     weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
     far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
-    force and normal force while sticking, summed over the steps since the last record [N]. depth: largest
+    force and normal force while sticking, summed over the steps since the last row of the history [N]. depth: largest
     penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
     in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
     stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
@@ -102,7 +102,7 @@ def stiffness_function(friction: bool) -> Any:
 
 @cache
 def spring_function(friction: bool) -> Any:
-    """The function that turns a gap into force and bookkeeping; without `friction` it has no tangential part."""
+    """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential."""
 
     @wp.func
     def press(s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k: wp.float64, mu: wp.float64, spring: Spring):
@@ -128,7 +128,7 @@ def spring_function(friction: bool) -> Any:
         spring.impulse[s] = impulse + force
         spring.normal_impulse[s] = normal_impulse + Fn
         spring.depth[s] = wp.max(depth, -gap)
-        return force
+        return force, Fn
 
     return press
 
@@ -154,14 +154,15 @@ def sum_springs(
     row: wp.array(dtype=wp.int32),
     column: int,
     first: wp.array(dtype=wp.int32),
+    afresh: bool,
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
     """Sums over the slaves of each scene, which begin at `first`, into PASS_COLUMNS columns, as `kernels.ledger` sums.
 
-    What is summed over the record interval then starts afresh. The last columns are of the state at the record: the
-    vector sum of the normal forces [N], their sum [N], the energy that the normal springs hold [J], the energy that
-    springs lost as they became softer [J], and the sum of the squares of the normal forces [N^2].
+    With `afresh`, what is summed over an output interval then starts again from zero. The last columns are of the state
+    at the record: the vector sum of the normal forces [N], their sum [N], the energy that the normal springs hold [J],
+    the energy that springs lost as they became softer [J], and the sum of the squares of the normal forces [N^2].
     """
     scene, k, lane = wp.tid()
     energy = wp.float64(0.0)
@@ -193,9 +194,10 @@ def sum_springs(
         normal += spring.normal_impulse[s]
         stick += spring.stick_impulse[s]
         lost += spring.lost[s]
-        spring.impulse[s] = wp.vec3d()
-        spring.normal_impulse[s] = wp.float64(0.0)
-        spring.stick_impulse[s] = wp.float64(0.0)
+        if afresh:
+            spring.impulse[s] = wp.vec3d()
+            spring.normal_impulse[s] = wp.float64(0.0)
+            spring.stick_impulse[s] = wp.float64(0.0)
     energy_sum = wp.tile_sum(wp.tile(energy))
     friction_sum = wp.tile_sum(wp.tile(friction))
     drive_sum = wp.tile_sum(wp.tile(drive))

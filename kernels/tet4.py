@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hexahedron import history_functions, stress_function
 from warp_mca.kernels.kinematics import kinematics
@@ -23,7 +24,7 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def gradient_function(precision: str, finite: bool) -> Any:
-    """The function (X, conn, u, e) -> (W, H, cofactors of the edges as rows, volume): rotation W = Q - I."""
+    """The function (X, conn, u, e) -> (W, H, cofactors of the edges as rows, volume, J): rotation W = Q - I."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     rotated = mean_frame(precision, finite)
@@ -50,9 +51,10 @@ def gradient_function(precision: str, finite: bool) -> Any:
         det = wp.dot(d0, c0)
         inverse = R(1.0) / det
         H = inverse * (wp.outer(l0, c0) + wp.outer(l1, c1) + wp.outer(l2, c2))
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H)
         W, H = rotated(H)
         rows = mat33(c0[0], c0[1], c0[2], c1[0], c1[1], c1[2], c2[0], c2[1], c2[2])
-        return W, H, rows, det / R(6.0)
+        return W, H, rows, det / R(6.0), J
 
     return tet_gradient
 
@@ -73,7 +75,7 @@ def dilation_kernel(precision: str, finite: bool) -> Any:
     ):
         wait_for_previous()
         e = wp.tid()
-        _W, H, _c, volume = tet_gradient(X, conn, u, e)
+        _W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
         growth_out[e] = volume * dilation_of(H)
 
     return begins_early(tet4_dilation)
@@ -112,6 +114,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     add_matrices = fused(precision).add_matrices
+    keep_greatest, _ = keep_functions(R)
     k = kinematics(precision, finite)
     deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
 
@@ -129,11 +132,12 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         dilation: wp.array(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
         wait_for_previous()
         e = wp.tid()
-        W, H, c, _volume = tet_gradient(X, conn, u, e)
+        W, H, c, _volume, J = tet_gradient(X, conn, u, e)
         m = material[e]
         G = law[m, 1]
         pressure = R(0.0)
@@ -141,6 +145,8 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             pressure += R(0.25) * pressure_of(law[m, 0], dilation[group[a, e]])
         strain, N, d = deviator(H)
         S = R(2.0) * G * strain
+        keep_greatest(STRAIN_SQUARE, e, wp.ddot(strain, strain), extreme_out)
+        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
         if wp.static(plastic):
             eps_p = mat33()
             p = R(0.0)
@@ -168,7 +174,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
 
 @cache
 def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], largest strain [-] and smallest Jacobian ratio."""
+    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     tet_gradient = gradient_function(precision, finite)
@@ -186,6 +192,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         law: wp.array2d(dtype=R),
         yielded: wp.array(dtype=wp.int32),
         history: wp.array2d(dtype=R),
+        extreme: wp.array2d(dtype=R),
         u: wp.array(dtype=wp.vec3d),
         first: int,
         group: wp.array2d(dtype=wp.int32),
@@ -193,7 +200,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         energy_out: wp.array2d(dtype=R),
     ):
         e = wp.tid()
-        W, H, _c, volume = tet_gradient(X, conn, u, e)
+        _W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
         m = material[e]
         elastic = R(0.0)
         for a in range(4):
@@ -206,11 +213,10 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                 eps_p, p = read_plastic_strain(history, 0, e)
                 dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
         elastic += law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
-        identity = wp.identity(n=3, dtype=R)
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * wp.ddot(strain, strain))
-        energy_out[3, first + e] = wp.determinant(identity + H) * wp.determinant(identity + W)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
+        energy_out[3, first + e] = R(1.0) - extreme[VOLUME_LOSS, e]
         energy_out[4, first + e] = R(0.0)
 
     return tet4_energy
@@ -245,7 +251,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     ):
         item = wp.tid()
         e = element[item]
-        W, H, _c, _volume = tet_gradient(X, conn, u, e)
+        W, H, _c, _volume, _J = tet_gradient(X, conn, u, e)
         m = material[e]
         pressure = R(0.0)
         for a in range(4):

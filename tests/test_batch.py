@@ -85,11 +85,20 @@ def test_histories_are_those_of_each_scene_alone_bit_for_bit():
         for name in one.history:
             assert np.array_equal(one[name], result[name], equal_nan=True), name
         assert np.array_equal(one.paths[0].stress, result.paths[0].stress)
-        for name in ("max_plastic_strain", "energy", "joint_impulse", "max_penetration", "contacts", "n_steps"):
+        for name in (
+            "max_plastic_strain",
+            "energy",
+            "joint_impulse",
+            "max_penetration",
+            "contacts",
+            "n_steps",
+            "extremes",
+        ):
             assert one.summary[name] == result.summary[name], name
         assert result.summary["batch"] == {"scene": k, "scenes": 4}
     assert results[2].F_t.max() < results[0].F_t.max()
     assert len({result.F_n.max() for result in results}) == 4
+    assert len({result.summary["extremes"]["F_n_max"] for result in results}) == 4
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,19 @@ def test_device_repeats_bit_for_bit():
     assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one.history)
 
 
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+def test_extremes_are_those_of_the_cpu_and_repeat_bit_for_bit(element):
+    scene = oblique()
+    scene = replace(scene, bodies=tuple(replace(body, element=element) for body in scene.bodies))
+    cpu, one, two = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0", "cuda:0"))
+    assert one.summary["extremes"] == two.summary["extremes"]
+    for name in ("F_n_max", "max_strain", "min_jacobian", "max_speed"):
+        assert one.summary["extremes"][name] == pytest.approx(cpu.summary["extremes"][name], rel=1e-6), name
+    alone = mca.run(scene, device="cuda:0")
+    for batched in mca.run_batch([scene, scene], device="cuda:0"):
+        assert batched.summary["extremes"] == alone.summary["extremes"]
+
+
 @pytest.mark.gpu
 def test_frames_arrive_in_order_and_equal_those_of_the_cpu():
     """The host runs ahead of the device: frames must be those of their time, whatever is under way."""

@@ -36,7 +36,7 @@ PATCH = np.array(
 
 
 def launch(X, hexahedra, u, precision, *, sigma_y=None):
-    """Forces on nodes (node_count, 3) and energies (4, element_count) of a displacement field."""
+    """Forces on nodes (node_count, 3) and energies (5, element_count) of a displacement field."""
     t = scalars(precision)
     plastic, count = sigma_y is not None, len(hexahedra)
     law_name = J2Bilinear.law if plastic else Elastic.law
@@ -51,10 +51,11 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         field = wp.array(u, dtype=wp.vec3d)
         force = wp.full(8 * count, np.nan, dtype=t.vec3)
         energy = wp.full((5, count), np.nan, dtype=t.real)
+        extreme = wp.zeros((2, count), dtype=t.real)
         kernel = hex8.force_kernel(precision, law_name)
-        wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[*history, force])
+        wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[*history, extreme, force])
         kernel = hex8.energy_kernel(precision, law_name)
-        wp.launch(kernel, count, inputs=[*arrays, law, *history, field, 0], outputs=[energy])
+        wp.launch(kernel, count, inputs=[*arrays, law, *history, extreme, field, 0], outputs=[energy])
     total = np.zeros_like(X)
     for a in range(8):
         np.add.at(total, hexahedra[:, a], force.numpy().reshape(8, count, 3)[a].astype(float))

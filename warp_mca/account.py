@@ -72,7 +72,7 @@ class Account:
         self.ready, self.steps, self.layout, self.index = ready, steps, solver.layout, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         tolerance = ready.scene.impact.energy_tolerance
-        self.ledger = Ledger(ready.model, steps.dt, steps.interval, tolerance, solver.precision)
+        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision)
         self.rings: list[NDArray] = []
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
@@ -81,12 +81,12 @@ class Account:
         Raises:
             GuardError: a record breaks a guard; those before it count.
         """
-        first = self.ledger.count
+        first, rows = self.ledger.count, self.ledger.rows(written)
         try:
             self.ledger.read(written, self.layout.records(records, self.index))
         finally:
             if self.ready.scene.paths:
-                self.rings.append(records["path_stress"][: self.ledger.count - first, self.probes].copy())
+                self.rings.append(records["path_stress"][rows[: self.ledger.count - first], self.probes])
 
     def result(
         self, solver: Solver, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None
@@ -112,6 +112,7 @@ class Account:
             },
             "max_penetration": solver.max_penetration(self.index),
             "max_strain": ledger.max_strain,
+            "extremes": self._extremes(solver),
             "energy_error_exchanged": ledger.exchange_error,
             "stable_dt": model.stable.dt,
             "joint_impulse": solver.joint_impulses(self.index),
@@ -144,6 +145,16 @@ class Account:
             theta_dot=tuple(float(x) for x in start.theta_dot),
             more=more,
         )
+
+    def _extremes(self, solver: Solver) -> dict[str, float]:
+        """Of single steps, whatever the output interval."""
+        return {
+            "F_n_max": solver.max_normal_force(self.index),
+            "max_strain": self.ledger.max_strain,
+            "min_jacobian": self.ledger.min_jacobian,
+            "max_speed": solver.max_speed(self.index),
+            "energy_error": self.ledger.energy_error,
+        }
 
     def _mesh_warnings(self) -> list[str]:
         found: list[str] = []

@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.extremes import NormalForce
 from warp_mca.kernels import contact, search, sides, spring
 from warp_mca.layout import offsets
 from warp_mca.surfaces import LIST_LENGTH, ContactPass
@@ -184,37 +185,48 @@ class ContactStage:
         wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[self.u_search])
 
     def touch(
-        self, X: wp.array, u: wp.array, v: wp.array, dt: float, force: wp.array, flag: wp.array, split: Split = whole
+        self,
+        X: wp.array,
+        u: wp.array,
+        v: wp.array,
+        dt: float,
+        force: wp.array,
+        sums: NormalForce,
+        flag: wp.array,
+        split: Split = whole,
     ) -> None:
-        """Contact forces of this pass, added to `force`."""
+        """Contact forces of this pass, added to `force`; its normal forces, added to `sums`."""
+        rows = iter(sums.rows)  # a row of sums for each range of slaves
 
         def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
             threads = lanes * (part.stop - part.start)
-            wp.launch(kernel, threads, [part.start, *inputs], [force, flag], block_dim=contact.BLOCK_DIM)
+            outputs = [force, next(rows), flag] if kernel is self.kernel else [force, flag]
+            wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)
 
         slaves = [self.slave, self.stiffness]
         if self.on_plane:
-            inputs = [X, u, v, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest, dt, self.spring]
+            inputs = [X, u, v, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest]
+            inputs += [sums.per_newton, dt, self.spring]
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         if self.sides > 1:
             slaves = [self.slave, self.slave_face, *self.around_slave, self.stiffness]
         inputs = [X, u, v, self.u_search, *slaves, self.face_stiffness, self.face, self.count, self.candidate]
-        inputs += [self.slave_scene, self.mu, self.margin, dt, self.spring]
+        inputs += [self.slave_scene, self.mu, self.margin, sums.per_newton, dt, self.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
 
     def initial_depths(
-        self, X: wp.array, u: wp.array, v: wp.array, force: wp.array, flag: wp.array
+        self, X: wp.array, u: wp.array, v: wp.array, force: wp.array, sums: NormalForce, flag: wp.array
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Depth [m] and energy [J] of each spring before the first step, shape (spring_count,), after the first search.
 
-        The springs themselves stay as they are; `force` and `flag` are written to.
+        The springs themselves stay as they are; `force`, `sums` and `flag` are written to.
         """
         held = wp.clone(self.spring.held)
-        self.touch(X, u, v, 0.0, force, flag)
+        self.touch(X, u, v, 0.0, force, sums, flag)
         depth, energy = self.spring.depth.numpy(), self.spring.energy.numpy()
         self.spring = self._new_springs()
         self.spring.held = held

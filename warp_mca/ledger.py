@@ -13,6 +13,7 @@ from warp_mca.errors import GuardError
 
 if TYPE_CHECKING:
     from warp_mca.model import Model
+    from warp_mca.steps import Steps
 
 Array = NDArray[np.float64]
 
@@ -31,25 +32,32 @@ _FLAGS = (
 
 
 class Ledger:
-    """Collects one record for each output interval.
+    """Collects the records of one scene: rows of its history, and those that check the run between them.
 
     Attributes:
+        count: rows so far.
+        records: check records so far, rows included.
         energy_error: largest imbalance so far, as a share of initial energy and external work [-].
         exchanged: largest energy so far that was in elements, contact springs and friction, or that motion had gained
             or lost [J].
-        max_strain: largest deviatoric strain so far [-].
+        max_strain: greatest deviatoric strain of any step so far [-].
+        min_jacobian: smallest ratio of volumes so far, 1 at most: of any step at the centres of elements, of records at
+            all their points [-].
         turned: whether a pressed node went over to a face across a sharp edge.
     """
 
-    def __init__(self, model: Model, dt: float, interval: float, tolerance: float, precision: str) -> None:
-        self.model, self.dt, self.interval, self.tolerance = model, dt, interval, tolerance
+    def __init__(self, model: Model, steps: Steps, tolerance: float, precision: str) -> None:
+        self.model, self.steps, self.tolerance = model, steps, tolerance
         self.precision = precision
         self.columns: list[Array] = []
         self.velocities: list[Array] = []
-        self.count = 0
+        self.count = self.records = 0
         self.turned = False
         self.energy_error = 0.0
         self.max_strain = 0.0
+        self.min_jacobian = 1.0
+        self.contact_energy = 0.0
+        self.peaks: Array = np.zeros((len(model.passes), 2))  # of each pass: greatest sum of normal forces, of squares
         self.initial_energy: float | None = None
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
@@ -71,22 +79,26 @@ class Ledger:
         self.turned = bool(turned)
         for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
-                end = (self.count + written) * self.interval
+                end = self.steps.time(self.records + written)
                 raise GuardError(f"stopped before t = {end:.4g} s: {message}")
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
         share = self._balance(sums[:good])
         over = share > self.tolerance
         end = int(np.argmax(over)) + 1 if over.any() else good
-        self.columns.extend(sums[:end])
-        self.velocities.extend(velocity[:end].copy())
-        self.count += end
+        self._note_peaks(sums[:end])
+        rows = self.rows(end)
+        self.columns.extend(sums[rows])
+        self.velocities.extend(velocity[rows])
+        self.count += len(rows)
+        self.records += end
         self.max_strain = max(self.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
+        self.min_jacobian = min(self.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
         self.energy_error = max(self.energy_error, float(share[:end].max(initial=0.0)))
-        t = self.count * self.interval
+        last, t = (self.steps.time(self.records + k) for k in (-1, 0))
         if over.any():
             raise GuardError(
-                f"energy imbalance {share[end - 1]:.2%} at t = {t - self.interval:.4g} s exceeds energy_tolerance = "
+                f"energy imbalance {share[end - 1]:.2%} at t = {last:.4g} s exceeds energy_tolerance = "
                 f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
                 f"tolerance if that much is acceptable"
             )
@@ -94,6 +106,10 @@ class Ledger:
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
         if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
+
+    def rows(self, written: int) -> NDArray[np.int_]:
+        """Which of the next `written` records are rows of the history."""
+        return np.arange(-self.records % self.steps.checks, written, self.steps.checks)
 
     def _sums(self, partial: Array) -> Array:
         """Columns of each record from its partial sums, shape (row_count, column_count)."""
@@ -160,18 +176,22 @@ class Ledger:
     @property
     def greatest_contact_share(self) -> float:
         """Greatest energy of all contact springs in a record as a share of `exchanged` [-]; 0 where hardly any was."""
-        if not self.columns or self.exchanged <= LEAST * self.energy_scale:
-            return 0.0
-        return float(self._energies(np.array(self.columns))["contact"].max()) / self.exchanged
+        return self.contact_energy / self.exchanged if self.exchanged > LEAST * self.energy_scale else 0.0
 
     def nodes_at_peak(self, k: int) -> float:
         """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""
-        if not self.columns:
-            return 0.0
-        springs = self._springs(np.array(self.columns))[:, k]
-        force, squares = springs[:, 11], springs[:, 14]
-        peak = int(force.argmax())
-        return float(force[peak] ** 2 / squares[peak]) if squares[peak] > 0.0 else 0.0
+        force, squares = self.peaks[k]
+        return float(force**2 / squares) if squares > 0.0 else 0.0
+
+    def _note_peaks(self, sums: Array) -> None:
+        """Keep what records say of contact at its greatest."""
+        self.contact_energy = float(self._energies(sums)["contact"].max(initial=self.contact_energy))
+        springs = self._springs(sums)
+        for k, found in enumerate(
+            springs[springs[:, :, 11].argmax(axis=0), range(springs.shape[1])] if len(sums) else ()
+        ):
+            if found[11] > self.peaks[k, 0]:
+                self.peaks[k] = found[11], found[14]
 
     def energy(self) -> dict[str, float]:
         """The ledger at the end [J]; not numbers where no record was taken in."""
@@ -188,7 +208,7 @@ class Ledger:
         """
         table = np.array(self.columns[first:]).reshape(-1, self._width)
         energy, springs = self._energies(table), self._springs(table)
-        share = self.dt / self.interval
+        share = self.steps.dt / self.steps.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
             force = share * item.sign * springs[:, k, 3:6]
@@ -205,7 +225,7 @@ class Ledger:
         stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
         balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
         return {
-            "time_s": self.interval * np.arange(first, self.count, dtype=np.float64),
+            "time_s": self.steps.interval * np.arange(first, self.count, dtype=np.float64),
             "F_n_N": F_n,
             "F_t_N": F_t,
             "stick_fraction": stick,
@@ -226,7 +246,10 @@ class Ledger:
 
     def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
         """Each contact by itself, with these `names`."""
-        springs, share = self._springs(np.array(self.columns).reshape(-1, self._width)), self.dt / self.interval
+        springs, share = (
+            self._springs(np.array(self.columns).reshape(-1, self._width)),
+            self.steps.dt / self.steps.interval,
+        )
         found: list[ContactHistory] = []
         for index, name in enumerate(names):
             own = [k for k, item in enumerate(self.model.passes) if item.contact == index]
@@ -251,7 +274,7 @@ class Ledger:
         rows = np.array(self.columns[max(first - 1, 0) :]).reshape(-1, self._width)
         springs = self._springs(rows)[:, passes].sum(axis=1)
         gain, rise = np.diff(springs[:, 12]), np.diff(springs[:, 11])
-        impulse = self.dt * (springs[1:, 6] - 0.5 * rise)
+        impulse = self.steps.dt * (springs[1:, 6] - 0.5 * rise)
         speed: Array = np.full(len(rows), np.nan)
         np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
         return speed[min(first, 1) :]

@@ -25,6 +25,7 @@ from warp_mca.paths import Found, locate
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results import Result, check_output, save
 from warp_mca.scene import Body, Scene
+from warp_mca.steps import Steps
 
 if TYPE_CHECKING:
     from warp_mca.recorders.frames import Recording
@@ -37,38 +38,6 @@ Read = Callable[[int, Mapping[str, NDArray]], None]
 SPEED_RESERVE = 4.0
 MOST_ROWS = 10_000_000  # of a history: some 5 GB
 MOST_STEPS = 10_000_000_000  # of a run: more than a week of the smallest model
-
-
-@dataclass(frozen=True)
-class Steps:
-    """How an output interval is divided.
-
-    Attributes:
-        dt: time step [s].
-        per_search: steps between two searches for contact.
-        searches: searches in an output interval.
-        intervals: output intervals in the run.
-    """
-
-    dt: float
-    per_search: int
-    searches: int
-    intervals: int
-
-    @property
-    def per_interval(self) -> int:
-        """Steps of an output interval."""
-        return self.per_search * self.searches
-
-    @property
-    def interval(self) -> float:
-        """Output interval [s]."""
-        return self.dt * self.per_interval
-
-    @property
-    def count(self) -> int:
-        """Steps of the whole run."""
-        return self.per_interval * self.intervals
 
 
 def mesh(
@@ -290,7 +259,8 @@ def run(
     def read(written: int, records: Mapping[str, NDArray]) -> None:
         first = account.ledger.count
         account.read(written, records)
-        recording.history(lambda: account.ledger.history(first))
+        if account.ledger.count > first:
+            recording.history(lambda: account.ledger.history(first))
         tell("impact", account.ledger.count / (steps.intervals + 1))
 
     try:
@@ -334,7 +304,7 @@ def prepare(
 
 
 def advance(solver: Solver, steps: Steps, read: Read, recording: Recording | None = None) -> None:
-    """Run the finite elements: in each output interval search for contact, record, step.
+    """Run the finite elements: search for contact, record, step.
 
     `read` gets the number of records that were written since its last call, and `Solver.records` with these first.
     """
@@ -342,27 +312,41 @@ def advance(solver: Solver, steps: Steps, read: Read, recording: Recording | Non
     from warp_mca.transfer import Transfer
 
     transfer = Transfer(solver.records(), solver.device)
+    written = 0
 
-    def record(interval: int, count: int) -> None:
-        needs: frozenset[str] = recording.needs(interval) if recording else frozenset()
-        solver.search()
-        solver.record_and_step(count, needs)
-        if recording:
-            recording.take(interval, needs)
+    def record(count: int, row: int | None) -> None:
+        """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
+        nonlocal written
+        needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
+        solver.record_and_step(count, needs, row is not None)
+        written += 1
+        if recording and row is not None:
+            recording.take(row, needs)
+
+    def send() -> None:
+        nonlocal written
+        if transfer.full:
+            read(*transfer.receive())
+        transfer.send(written)
+        written = 0
+        while transfer.arrived:
+            read(*transfer.receive())
 
     for interval in range(steps.intervals):
-        record(interval, steps.per_search)
-        for _ in range(steps.searches - 1):
-            solver.search()
-            solver.step(steps.per_search)
-        if (interval + 1) % ROWS == 0:
-            if transfer.full:
-                read(*transfer.receive())
-            transfer.send(ROWS)
-            while transfer.arrived:
-                read(*transfer.receive())
-    record(steps.intervals, 1)
+        for number, part in enumerate(steps.parts()):
+            if part.begins_check and written == ROWS:
+                send()
+            if part.begins_search:
+                solver.search()
+            if part.begins_check:
+                record(part.count, interval if number == 0 else None)
+            else:
+                solver.step(part.count)
+    if written == ROWS:
+        send()
+    solver.search()
+    record(1, steps.intervals)
     while transfer.pending:
         read(*transfer.receive())
-    transfer.send(steps.intervals % ROWS + 1)
+    transfer.send(written)
     read(*transfer.receive())

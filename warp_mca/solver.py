@@ -4,11 +4,11 @@
 |---|---|---|
 | 1 element forces | `hex8_patch_force`, `tet4_force`, … | every step, for each block of like elements |
 | 2 contact | `touch_surface` + `react`, or `touch_plane` | every step, in scenes with contact |
-| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval |
-| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | the same, where a scene has paths or a frame is due |
+| 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval, checks between: `warp_mca.steps` |
+| 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | each output interval, if paths or a frame need it |
 | 4 gather and integrate | `integrate` | every step |
 | 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
-| 5 record of motion | `record_motion` | first step of each output interval |
+| 5 record of motion | `record_motion` | as 3 |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
 between two searches raise a flag, which stops the run. On the CPU, stages 1, 2 and 4 and energies of stage 3 are cut
@@ -17,6 +17,7 @@ in ranges, which threads compute side by side; on a GPU, kernels of a graph begi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
 from warp_mca.errors import bad_value
+from warp_mca.extremes import NormalForce
 from warp_mca.kernels import constraint, contact, ledger, node, output, search, spring, subnormals
 from warp_mca.kernels.scalars import scalars
 from warp_mca.layout import layout_of
@@ -78,12 +80,12 @@ class Solver:
             raise bad_value("precision", precision, "choose mixed or float64")
         self.model, self.device, self.precision, self.dt = model, check_device(device), precision, dt
         self.layout = layout_of(model)
+        largest = max(block.conn.shape[1] for block in model.blocks)
+        self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
         with wp.ScopedDevice(self.device):
             self._allocate()
         self.graphs: dict[str, Any] = {}
         self.stages: dict[str, Stages] = {}
-        largest = max(block.conn.shape[1] for block in model.blocks)
-        self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
         self.pool = Pool(self.threads) if self.threads > 1 else None
         self._flushing: AbstractContextManager[object] | None = None
         self.output: Output | None = None
@@ -112,6 +114,9 @@ class Solver:
         cuda = wp.get_device().is_cuda
         self.side, self.sums = (wp.Stream(priority=-1), wp.Stream(priority=-1)) if cuda else (None, None)
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
+        by_scene = [model.passes[k * passes : (k + 1) * passes] for k in range(scenes)]
+        self.normal_force = NormalForce(by_scene if passes else [], self.threads)
+        self.speed_square = wp.zeros(model.node_count, dtype=wp.float32)
         self.flag = wp.zeros((scenes, len(search.FLAGS)), dtype=wp.int32)
         self.bonds = BondStage(model, self.layout)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
@@ -150,7 +155,8 @@ class Solver:
             if before:
                 wp.wait_event(before)
             for contact in self.contacts:
-                contact.touch(self.X, self.u, self.v, self.dt, self.contact_force, self.flag, split)
+                outputs = self.contact_force, self.normal_force, self.flag
+                contact.touch(self.X, self.u, self.v, self.dt, *outputs, split)
             if beside:
                 beside()
         if side:
@@ -165,6 +171,7 @@ class Solver:
             inputs = [self.inverse_mass[part], self.near[part], self.more]
             inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part], None if before is None else before[part]]
+            outputs += [self.speed_square[part], self.normal_force.array if part.start == 0 else None]
             wp.launch(
                 self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK
             )
@@ -174,7 +181,7 @@ class Solver:
     def _advance_bound(self, before: wp.array | None = None) -> None:
         inputs = [self.mass, self.inverse_mass, self.near, self.more, self.bonds.role, self.force, self.node_scene]
         inputs += [self.node_gravity, self.bonds.bonds, self.dt]
-        outputs = [self.contact_force, self.u, self.v, before, *self.bonds.counts()]
+        outputs = [self.contact_force, self.u, self.v, before, self.speed_square, *self.bonds.counts()]
         wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK)
 
     def _advance(self, split: Split = whole, before: wp.array | None = None) -> None:
@@ -199,23 +206,26 @@ class Solver:
     def _next_row(self) -> None:
         wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.row])
 
-    def _record_step(self, needs: frozenset[str], split: Split = whole) -> None:
-        """One step that also writes a record of the state at its start, and a frame of `needs`."""
+    def _record_step(self, needs: frozenset[str], is_row: bool = True, split: Split = whole) -> None:
+        """One step that also writes a record of the state at its start, and a frame of `needs`.
+
+        Where the record is no row of the history, what is summed over an output interval goes on, and paths are left.
+        """
         self._forces(split, self._next_row)
-        if self.output:
+        if self.output and is_row:
             self.output.before_step(needs)
         for stage in self.elements:
             stage.energies(self.X, self.law, self.u, self.energy, split)
         with wp.ScopedStream(self.sums):
             for touching in self.contacts:
-                springs = [touching.column, touching.first, touching.spring]
+                springs = [touching.column, touching.first, is_row, touching.spring]
                 self._sum(spring.sum_springs, int(np.diff(touching.springs).max()), springs)
             self._sum(self.sum_elements_kernel, self.most_elements, [self.energy, self.element_ranges])
         self._advance(split, self.v_before)
         motion = [self.mass, self.gravity, self.u, self.v_before, self.v, self.dt, self.node_first]
         motion += [self.bonds.work, self.bonds.driven_first, self.point_node]
         self._sum(ledger.record_motion, self.most_nodes, motion, self.point_velocity)
-        if self.output:
+        if self.output and is_row:
             self.output.after_step(needs)
         if self.sums:
             wp.wait_stream(self.sums)
@@ -285,7 +295,10 @@ class Solver:
         """Of each contact, depth [m] and energy [J] of every spring at the start; nothing of the state changes."""
         with wp.ScopedDevice(self.device):
             force, flag = wp.zeros_like(self.contact_force), wp.zeros_like(self.flag)
-            return [stage.initial_depths(self.X, self.u, self.v, force, flag) for stage in self.contacts]
+            inputs = [self.X, self.u, self.v, force, self.normal_force, flag]
+            found = [stage.initial_depths(*inputs) for stage in self.contacts]
+            self.normal_force.array.zero_()
+            return found
 
     def start(self) -> None:
         """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
@@ -294,25 +307,29 @@ class Solver:
         """
         with wp.ScopedDevice(self.device):
             self._integrate(-0.5 * self.dt, 0.0, self.bonds.at_rest)
+            self.speed_square.assign((self.model.V**2).sum(axis=1))  # not that before the start
 
-    def record_and_step(self, count: int, needs: frozenset[str] = frozenset()) -> None:
-        """Record the state, with a frame of `needs`, then advance `count` steps.
+    def record_and_step(self, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True) -> None:
+        """Record the state, as a row of the history or as a check between two, then advance `count` steps.
+
+        A row may come with a frame of `needs`.
 
         Raises:
             Exception: what a thread raised.
         """
+        name = f"{'record' if is_row else 'check'} {sorted(needs)}"
         if self.pool:
-            self._replay(self.pool, f"record {sorted(needs)}", lambda split: self._record_step(needs, split))
+            self._replay(self.pool, name, lambda split: self._record_step(needs, is_row, split))
             self.step(count - 1)
             return
 
         def interval() -> None:
             self._schedule()
-            self._record_step(needs)
+            self._record_step(needs, is_row)
             for _ in range(count - 1):
                 self._step()
 
-        self._launch(f"record {count} {sorted(needs)}", interval)
+        self._launch(f"{name} {count}", interval)
 
     def step(self, count: int) -> None:
         """Advance `count` steps.
@@ -352,6 +369,15 @@ class Solver:
     def max_penetration(self, scene: int = 0) -> float:
         """Greatest depth that a slave node of a scene reached below its master [m]."""
         return max((float(stage.depths(scene).max()) for stage in self.contacts), default=0.0)
+
+    def max_normal_force(self, scene: int = 0) -> float:
+        """Greatest sum of the normal forces on all slave nodes of a scene in any step [N]."""
+        return self.normal_force.greatest(scene)
+
+    def max_speed(self, scene: int = 0) -> float:
+        """Greatest speed of any node of a scene, from the start on [m/s]."""
+        first, end = self.layout.nodes[scene : scene + 2]
+        return math.sqrt(self.speed_square.numpy()[first:end].max())
 
     def joint_impulses(self, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each joint of a scene gave to its first body [N s], by name."""

@@ -83,7 +83,7 @@ class PatchStage(ElementStage):
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
         inputs = [X, self.point, self.patches, law, u, self.slot, self.blocks]
-        outputs = [self.yielded, self.history, force]
+        outputs = [self.yielded, self.history, self.extreme, force]
         wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 

@@ -32,6 +32,8 @@ class ElementStage:
         yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
         history: plastic strain and equivalent plastic strain of each point, in the order of
             `kernels.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
+        extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step so far [-], from
+            0 on, shape (2, element_count), in the scalars of the precision.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
         rounds: patches that a block of threads computes in turn.
@@ -56,9 +58,11 @@ class ElementStage:
         self.slot_node: Index = block.conn.ravel()
         self.slot = 0
         kept = self.count if block.plastic else 0
+        real = scalars(precision).real
         self.yielded = wp.zeros(kept, dtype=wp.int32)
         self.points = points
-        self.history = wp.zeros((rows or points * HISTORY_SIZE, kept), dtype=scalars(precision).real)
+        self.history = wp.zeros((rows or points * HISTORY_SIZE, kept), dtype=real)
+        self.extreme = wp.zeros((2, self.count), dtype=real)
         kind = (precision, block.law, block.finite)
         self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
         self.energy_kernel = side_by_side(kernels.energy_kernel(*kind), large=block.finite)
@@ -87,17 +91,20 @@ class ElementStage:
 
         def launch(part: slice) -> None:
             inputs = [X, self.conn[:, part], self.material[part], law, u, self.slot + part.start, self.count]
-            outputs = [*self._history(part), force]
+            outputs = [*self._history(part), self.extreme[:, part], force]
             inputs += self.more(part)
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
         split(self.count, launch, ELEMENTS)
 
     def energies(self, X: wp.array, law: wp.array, u: wp.array, energy: wp.array, split: Split = whole) -> None:
-        """Rows elastic, plastic energy [J], largest strain, smallest Jacobian ratio [-], hourglass energy [J]."""
+        """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].
+
+        To be called after `forces` of the same step.
+        """
 
         def launch(part: slice) -> None:
-            inputs = [X, self.conn[:, part], self.material[part], law, *self._history(part), u]
+            inputs = [X, self.conn[:, part], self.material[part], law, *self._history(part), self.extreme[:, part], u]
             inputs += [self.block.first + part.start, *self.more(part)]
             wp.launch(self.energy_kernel, part.stop - part.start, inputs=inputs, outputs=[energy], block_dim=BLOCK_DIM)
 
