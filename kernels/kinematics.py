@@ -37,7 +37,8 @@ def eigen_function(precision: str) -> Any:
         one = R(1.0)
         twice = R(2.0) * pq
         size = wp.abs(q - p) + wp.sqrt((q - p) * (q - p) + twice * twice)
-        tangent = wp.where(q < p, -twice, twice) / wp.where(size > R(0.0), size, one)
+        resolved = size > wp.abs(pq)  # not where squares underflow, and a tiny q - p would make the tangent huge
+        tangent = wp.where(resolved, wp.where(q < p, -twice, twice), R(0.0)) / wp.where(resolved, size, one)
         cosine = one / wp.sqrt(one + tangent * tangent)
         return cosine, cosine * tangent, tangent
 

@@ -35,9 +35,8 @@ def test_logarithm_to_three_units_in_the_last_place(precision):
     assert (np.abs(found - exact) < 3.0 * np.spacing(np.abs(exact).astype(kind)))[y != 1.0].all()
 
 
-@pytest.mark.parametrize("precision", PRECISIONS)
-def test_principal_directions(precision):
-    """C = N d N^T with orthonormal N: any matrix, diagonal ones, equal eigenvalues, hardly anything off them."""
+def decomposed(C: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
+    """Directions and eigenvalues that the kernels find."""
     t = scalars(precision)
     eigen = eigen_function(precision)
 
@@ -48,6 +47,27 @@ def test_principal_directions(precision):
         N_out[i] = N
         d_out[i] = d
 
+    N, d = (wp.full(len(C), value=np.nan, dtype=kind, device="cpu") for kind in (t.mat33, t.vec3))
+    wp.launch(decompose, len(C), inputs=[wp.array(C, dtype=t.mat33, device="cpu")], outputs=[N, d], device="cpu")
+    return N.numpy().astype(float), d.numpy().astype(float)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_strains_whose_squares_underflow_stay_tiny(precision):
+    """Where diagonal entries differ by still less, the rotation between them made an eigenvalue of 1e-13 out of 1e-25.
+
+    Ahead of a wave, where a CPU takes subnormal numbers for zero, strains of 1e-19 became 0.05, and metal yielded.
+    """
+    small, less = (1e-25, 1e-37) if precision == "mixed" else (1e-200, 1e-300)
+    C = small * (np.ones((3, 3)) - np.eye(3)) + np.diag([less, 0.0, -less])
+    N, d = decomposed(np.array([C, C.T[::-1, ::-1]]), precision)
+    assert np.abs(d).max() < 3.0 * small
+    assert np.abs(N.transpose(0, 2, 1) @ N - np.eye(3)).max() < 1e-6
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_principal_directions(precision):
+    """C = N d N^T with orthonormal N: any matrix, diagonal ones, equal eigenvalues, hardly anything off them."""
     rng = np.random.default_rng(0)
     free = rng.normal(size=(500, 3, 3))
     equal = np.linalg.qr(free)[0]
@@ -62,9 +82,7 @@ def test_principal_directions(precision):
         1e-12 * (free + free.transpose(0, 2, 1)),
     ]
     C = np.concatenate(sets)
-    N, d = (wp.full(len(C), value=np.nan, dtype=kind, device="cpu") for kind in (t.mat33, t.vec3))
-    wp.launch(decompose, len(C), inputs=[wp.array(C, dtype=t.mat33, device="cpu")], outputs=[N, d], device="cpu")
-    N, d = N.numpy().astype(float), d.numpy().astype(float)
+    N, d = decomposed(C, precision)
     exact = C.astype(np.float32).astype(float) if precision == "mixed" else C
     tolerance = 2e-6 if precision == "mixed" else 4e-15
     made = np.einsum("nik,nk,njk->nij", N, d, N)
