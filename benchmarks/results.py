@@ -106,8 +106,9 @@ def table_row(row: dict[str, Any]) -> str:
     if "failed" in row:
         return f"| `{row['command']}` | | stopped: {row['failed']} | | | | | |"
     contacts = f"{1e3 * row['contact_duration']:.3f}" + (f" in {n}" if (n := len(row["contacts"])) > 1 else "")
+    first = "–" if row["F_n_first_peak"] is None else f"{row['F_n_first_peak'] / 1e3:.3f}"
     return (
-        f"| `{row['command']}` | {row['n_elements']:,} | {row['F_n_first_peak'] / 1e3:.3f} | {len(row['F_n_peaks'])} "
+        f"| `{row['command']}` | {row['n_elements']:,} | {first} | {len(row['F_n_peaks'])} "
         f"| {contacts} | {row['F_t_min'] / 1e3:.3f} … {row['F_t_max'] / 1e3:.3f} "
         f"| {'yes' if row['F_t_reverses'] else 'no'} | {100 * row['energy_error']:.3f} % |"
     )
