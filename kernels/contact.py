@@ -18,7 +18,6 @@ from warp_mca.kernels.spring import (
     open_function,
     rest_function,
     spring_function,
-    stiffness_function,
 )
 
 wp.set_module_options({"enable_backward": False})
@@ -141,7 +140,6 @@ def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
     press = spring_function(friction)
     open_contact = open_function(friction)
     gap_from_rest = rest_function(stress_free)
-    spring_stiffness = stiffness_function(friction)
 
     @wp.func
     def settle(
@@ -169,8 +167,10 @@ def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
         gap_kept = wp.where(touches, gap, wp.float64(0.0))
         normal_kept = wp.where(touches, normal, wp.vec3d())
         gap_pressed = gap_from_rest(s, gap_kept, spring)
-        stiffness = spring_stiffness(s, gap_pressed, du, own, limit, touches, spring)
-        force, F_n = press(s, gap_pressed, normal_kept, du, stiffness, mu, spring)
+        k_old = wp.where(spring.face[s] < 0, wp.min(own, limit), spring.stiffness[s])
+        stiffness = wp.where(touches, wp.min(k_old, limit), k_old)
+        force, F_n = press(s, gap_pressed, normal_kept, du, k_old, stiffness, mu, spring)
+        spring.stiffness[s] = stiffness
         add_normal_force(scene, F_n, per_newton, normal_force_out)
         spring.face[s] = wp.where(touches, f, -1)
         spring.weight[s] = weight
@@ -398,7 +398,7 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
         if gap < -of(deepest, k):
             flag_out[k, TOO_DEEP] = 1
         if gap < wp.float64(0.0):
-            force, F_n = press(s, gap, normal, du, stiffness[s], of(mu, k), spring)
+            force, F_n = press(s, gap, normal, du, stiffness[s], stiffness[s], of(mu, k), spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
             contact_force_out[i] = contact_force_out[i] + force

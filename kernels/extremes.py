@@ -11,17 +11,26 @@ wp.set_module_options({"enable_backward": False})
 STRAIN_SQUARE, VOLUME_LOSS = 0, 1
 
 
-def _keep(index: str, double: bool) -> str:
+def _keep(index: str, double: bool, together: bool) -> str:
     """Source of `array[index] = max(array[index], value)` for values of at least 0.
 
     Floats of one sign are ordered as the integers of their bits, and those below 0 lie below all others. An atomic
-    maximum whose result is not used has nothing to wait for.
+    maximum whose result is not used has nothing to wait for. With `together`, threads of a GPU that run side by side
+    keep the greatest of their float32 values at the index of the first one: one request in place of 32.
     """
-    bits, kind, name = ("__double_as_longlong", "long long", "double") if double else ("__float_as_int", "int", "float")
+    name = "double" if double else "float"
+    keep = "atomicMax((long long*)place, __double_as_longlong(value));"
+    if not double:
+        keep = "atomicMax((int*)place, __float_as_int(value));"
+    if not double and together:
+        keep = """const unsigned active = __activemask();
+    const int greatest = __reduce_max_sync(active, __float_as_int(value));
+    if ((threadIdx.x & 31) == __ffs(active) - 1)
+        atomicMax((int*)place, greatest);"""
     return f"""
     {name}* place = wp::address(greatest_out, {index});
 #if defined(__CUDA_ARCH__)
-    atomicMax(({kind}*)place, {bits}(value));
+    {keep}
 #else
     *place = *place > value ? *place : value;
 #endif
@@ -29,14 +38,15 @@ def _keep(index: str, double: bool) -> str:
 
 
 @cache
-def keep_functions(scalar: Any) -> tuple[Any, Any]:
+def keep_functions(scalar: Any, together: bool = False) -> tuple[Any, Any]:
     """Functions for one scalar type.
 
     (Keep in greatest_out[k, e] the greatest value so far, from 0 on; the square e : e of a deviatoric strain, from the
-    invariant J2 = S : S / 2 of its elastic stress S = 2 G e.)
+    invariant J2 = S : S / 2 of its elastic stress S = 2 G e.) `together`: threads side by side are of one scene, and it
+    does not matter which of their entries keeps the greatest value.
     """
 
-    @wp.func_native(_keep("k, e", scalar is wp.float64))
+    @wp.func_native(_keep("k, e", scalar is wp.float64, together))
     def keep_greatest(k: int, e: int, value: scalar, greatest_out: wp.array2d(dtype=scalar)): ...
 
     @wp.func
@@ -47,16 +57,18 @@ def keep_functions(scalar: Any) -> tuple[Any, Any]:
     return keep_greatest, strain_square
 
 
-@wp.func_native(_keep("i", False))
-def keep_value(i: int, value: wp.float32, greatest_out: wp.array(dtype=wp.float32)):
-    """Keep in greatest_out[i] the greatest value so far, from 0 on."""
-    ...
+@cache
+def keep_speed_function(together: bool) -> Any:
+    """The function that keeps the greatest square of the velocity of node i so far [m^2/s^2]; as `keep_functions`."""
 
+    @wp.func_native(_keep("i", False, together))
+    def keep_value(i: int, value: wp.float32, greatest_out: wp.array(dtype=wp.float32)): ...
 
-@wp.func
-def keep_speed(i: int, v: wp.vec3d, speed_square_out: wp.array(dtype=wp.float32)):
-    """Keep the greatest square of the velocity of node i so far [m^2/s^2]."""
-    keep_value(i, wp.float32(wp.dot(v, v)), speed_square_out)
+    @wp.func
+    def keep_speed(i: int, v: wp.vec3d, speed_square_out: wp.array(dtype=wp.float32)):
+        keep_value(i, wp.float32(wp.dot(v, v)), speed_square_out)
+
+    return keep_speed
 
 
 @wp.func

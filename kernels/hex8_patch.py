@@ -198,7 +198,8 @@ def force_kernel(precision: str, law_name: str) -> Any:
     shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
-    keep_greatest, strain_square = keep_functions(R)
+    keep_greatest, strain_square = keep_functions(R, together=True)
+    keep_own, _ = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -237,7 +238,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
         S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
         largest = lane_max(wp.max(trial0, trial1))
         if valid and q == 0:
-            keep_greatest(STRAIN_SQUARE, e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
+            keep_own(STRAIN_SQUARE, e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
         if valid and (p0 > history[last] or p1 > history[size + last]):
             write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)

@@ -116,7 +116,7 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
+def element_functions(precision: str, law_name: str, finite: bool, together: bool = False) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
     The first also gives the ratio of volumes J, the second keeps the greatest strain.
@@ -132,7 +132,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
-    keep_greatest, _ = keep_functions(R)
+    keep_greatest, _ = keep_functions(R, together)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)

@@ -49,8 +49,8 @@ def force_kernel(precision: str, law_name: str) -> Any:
     _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
-    keep_greatest, _ = keep_functions(R)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False)
+    keep_greatest, _ = keep_functions(R, together=True)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False, together=True)
 
     @wp.kernel(
         enable_backward=False,

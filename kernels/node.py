@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
-from warp_mca.kernels.extremes import keep_normal_force, keep_speed
+from warp_mca.kernels.extremes import keep_normal_force, keep_speed_function
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
 
@@ -15,6 +15,8 @@ wp.set_module_options({"enable_backward": False})
 # In the role of a node, whose lowest three bits are its axes at rest:
 BOUND = 8  # `kernels.constraint` advances it
 TOUCHABLE = 16  # it belongs to a surface of a contact
+
+KEEPERS = 32  # threads that keep the greatest normal force of each scene
 
 
 @cache
@@ -73,19 +75,26 @@ def hold(role: int, a: wp.vec3d):
 
 @cache
 def integrate_kernel(
-    precision: str, contact: bool, fixed: bool, bound: bool = False, each: bool = False, early: bool = False
+    precision: str,
+    contact: bool,
+    fixed: bool,
+    bound: bool = False,
+    each: bool = False,
+    early: bool = False,
+    lone: bool = True,
 ) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
-    where it is not empty. speed_square_out keeps the greatest v^2 of each node. normal_force_out, empty but for the
-    first range of nodes, is as in `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`: some nodes are
+    where it is not empty. speed_square_out keeps the greatest v^2 of each node. With `contact`, KEEPERS threads beyond
+    the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`: some nodes are
     left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and nodes know their
-    scene. `early`: the next kernel takes its places as soon as nodes leave some.
+    scene. `early`: the next kernel takes its places as soon as nodes leave some. `lone`: there is one scene.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision)
+    keep_speed = keep_speed_function(lone)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
@@ -108,11 +117,16 @@ def integrate_kernel(
         if wp.static(early):
             let_next_begin()
         i = wp.tid()
+        beyond = i - u_out.shape[0]
+        if wp.static(contact):
+            i = wp.min(i, u_out.shape[0] - 1)
         pair = near[i]
         inverse = inverse_mass[i]
         wait_for_previous()
         if wp.static(contact):
-            keep_normal_force(i, u_out.shape[0], normal_force_out)
+            if beyond >= 0:  # no node waits for the sums
+                keep_normal_force(beyond, wp.static(KEEPERS), normal_force_out)
+                return
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return

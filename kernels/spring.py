@@ -64,48 +64,36 @@ def rest_function(stress_free: bool) -> Any:
 
 
 @cache
-def stiffness_function(friction: bool) -> Any:
-    """The function that sets a spring's stiffness at first touch, and lowers it where the node meets a softer face."""
-
-    @wp.func
-    def soften(s: int, gap: wp.float64, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring):
-        # The work of the mean force of two steps, less the change of k g^2 / 2, is (k_old - k) g_old g / 2. Along the
-        # surface the spring keeps its length, f / k.
-        pressed = spring.force[s]
-        lost = wp.float64(0.0)
-        if wp.static(friction):
-            pressed -= spring.tangential[s]
-            lost = (wp.float64(1.0) - k / k_old) * release(spring.tangential[s], du, k_old)
-            spring.tangential[s] = (k / k_old) * spring.tangential[s]
-        lost -= wp.float64(0.5) * (wp.float64(1.0) - k / k_old) * wp.length(pressed) * gap
-        spring.lost[s] = spring.lost[s] + lost
-
-    @wp.func
-    def spring_stiffness(
-        s: int, gap: wp.float64, du: wp.vec3d, own: wp.float64, limit: wp.float64, touches: bool, spring: Spring
-    ):
-        """Stiffness [N/m] of a spring whose node allows for `own`, and the face for `limit`."""
-        k_old = spring.stiffness[s]
-        if spring.face[s] < 0:
-            k_old = own
-        k = k_old
-        if touches:
-            k = wp.min(k_old, limit)
-            if k < k_old:
-                if spring.face[s] >= 0:
-                    soften(s, gap, du, k_old, k, spring)
-            spring.stiffness[s] = k
-        return k
-
-    return spring_stiffness
-
-
-@cache
 def spring_function(friction: bool) -> Any:
     """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential."""
 
     @wp.func
-    def press(s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k: wp.float64, mu: wp.float64, spring: Spring):
+    def soften(s: int, gap: wp.float64, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring):
+        """Book what a pressed spring loses as its stiffness falls; the share that is left."""
+        # Along the normal, the work of the mean force of two steps less the change of k g^2 / 2 is
+        # (k_old - k) g_old g / 2. Along the surface the spring keeps its length f / k.
+        share = k / k_old
+        pressed = spring.force[s]
+        lost = wp.float64(0.0)
+        if wp.static(friction):
+            pressed -= spring.tangential[s]
+            lost = (wp.float64(1.0) - share) * release(spring.tangential[s], du, k_old)
+        lost -= wp.float64(0.5) * (wp.float64(1.0) - share) * wp.length(pressed) * gap
+        spring.lost[s] = spring.lost[s] + lost
+        return share
+
+    @wp.func
+    def press(
+        s: int,
+        gap: wp.float64,
+        normal: wp.vec3d,
+        du: wp.vec3d,
+        k_old: wp.float64,
+        k: wp.float64,
+        mu: wp.float64,
+        spring: Spring,
+    ):
+        """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force."""
         # all is read before anything is written, so that a GPU waits for memory once
         impulse = spring.impulse[s]
         normal_impulse = spring.normal_impulse[s]
@@ -113,10 +101,16 @@ def spring_function(friction: bool) -> Any:
         Fn = -k * gap
         force = Fn * normal
         squares = Fn * Fn
+        if wp.static(not friction):
+            if k < k_old:
+                soften(s, gap, du, k_old, k, spring)
         if wp.static(friction):
             friction_work = spring.friction[s]
             stick_impulse = spring.stick_impulse[s]
-            Ft, work, stick = stick_slip(spring.tangential[s], du, normal, mu * Fn, k)
+            f_old = spring.tangential[s]
+            if k < k_old:
+                f_old = soften(s, gap, du, k_old, k, spring) * f_old
+            Ft, work, stick = stick_slip(f_old, du, normal, mu * Fn, k)
             force += Ft
             squares += wp.dot(Ft, Ft)
             spring.tangential[s] = Ft

@@ -137,7 +137,8 @@ class Solver:
         touched, fixed, bound = bool(self.contacts), bool(model.fixed_axes.any()), self.bonds.count > 0
         rounds = min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
         early = not touched and not bound and rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early)
+        lone = scenes == 1
+        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early, lone)
         self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if bound else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
@@ -171,10 +172,10 @@ class Solver:
             inputs = [self.inverse_mass[part], self.near[part], self.more]
             inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part], None if before is None else before[part]]
-            outputs += [self.speed_square[part], self.normal_force.array if part.start == 0 else None]
-            wp.launch(
-                self.integrate_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK
-            )
+            keepers = node.KEEPERS if self.contacts and part.start == 0 else 0
+            outputs += [self.speed_square[part], self.normal_force.array if keepers else None]
+            threads = part.stop - part.start + keepers
+            wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK)
 
         split(self.model.node_count, launch, NODES)
 
