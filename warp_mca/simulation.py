@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.paths import Found, locate
 from warp_mca.recorders.recorder import Recorder, RunInfo
-from warp_mca.results import Result, check_output, save
+from warp_mca.results import Result, hold, write
 from warp_mca.scene import Body, Scene
 
 if TYPE_CHECKING:
@@ -254,9 +254,8 @@ def run(
         RequestError: the request cannot be carried out; nothing was written.
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
-    from warp_mca.output import Output
-    from warp_mca.recorders.frames import Recording, check_files, skins
-    from warp_mca.solver import Solver, check_device
+    from warp_mca.recorders.frames import check_files
+    from warp_mca.solver import check_device
     from warp_mca.threads import thread_count
 
     check_scene("scene", scene)
@@ -264,10 +263,30 @@ def run(
     span = span_of(scene, duration)
     check_recorders(recorders)
     check_device(device)
-    threads = thread_count(threads)
-    if out is not None:
-        check_output(out, force=force)
     check_files(recorders, out)
+    settings: dict[str, Any] = {"device": device, "precision": precision, "threads": thread_count(threads)}
+    if out is None:
+        return _simulate(scene, meshes, recorders, span, tell, **settings)
+    with hold(out, force=force) as folder:
+        return write(_simulate(scene, meshes, recorders, span, tell, **settings), folder, force=force)
+
+
+def _simulate(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    recorders: Sequence[Recorder],
+    span: float,
+    tell: Progress,
+    *,
+    device: str,
+    precision: str,
+    threads: int,
+) -> Result:
+    """The run itself, of `span` [s]; arguments are those of `run`, checked."""
+    from warp_mca.output import Output
+    from warp_mca.recorders.frames import Recording, skins
+    from warp_mca.solver import Solver
+
     clock = Clock()
     ready = prepare(scene, meshes, clock, tell)
     steps = divide(scene, ready.model, span)
@@ -300,8 +319,7 @@ def run(
     recording.finish(True)
     clock.lap("output")
     tell("impact", 1.0)
-    result = replace(account.result(solver, clock.wall, said), failed=tuple(recording.failed))
-    return result if out is None else save(result, out, force=force)
+    return replace(account.result(solver, clock.wall, said), failed=tuple(recording.failed))
 
 
 def prepare(
