@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from warp_mca import validate
 from warp_mca.account import Account, Prepared
+from warp_mca.advice import warn
 from warp_mca.arguments import Progress, check_scene, one_at_a_time, span_of, teller
 from warp_mca.errors import GuardError, McaError, RequestError, bad_value
 from warp_mca.folder import held
@@ -21,6 +22,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.join import join_models, join_probes
 from warp_mca.layout import offsets
 from warp_mca.paths import Found
+from warp_mca.precision import check_range
 from warp_mca.results import FILES, PATH_FILES, Result, check_output, folder_path, save
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.simulation import Clock, advance, divide_alike, prepare
@@ -93,7 +95,8 @@ def _simulate(
     from warp_mca.solver import Solver
 
     clock = Clock()
-    ready = _prepare(scenes, meshes, clock, tell)
+    ready = _prepare(scenes, meshes, precision, clock, tell)
+    warn(sentence for item in ready for sentence in item.warnings)
     steps = divide_alike([(item.scene, item.model) for item in ready], span)
     model, probes = join_models([item.model for item in ready]), join_probes(ready)
     clock.lap("mesh")
@@ -225,7 +228,9 @@ def hold_scenes(out: str | os.PathLike[str] | None, count: int, force: bool) -> 
         yield folders
 
 
-def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Clock, tell: Progress) -> list[Prepared]:
+def _prepare(
+    scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, precision: str, clock: Clock, tell: Progress
+) -> list[Prepared]:
     """Every scene at the start of its impact phase."""
     if meshes is not None:
         validate.kind_of("meshes", meshes, (tuple, list), "give a list with the meshes by body of each scene")
@@ -238,6 +243,7 @@ def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Cl
         try:
             own = None if meshes is None else meshes[k]
             ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made))
+            check_range(ready[-1].model, precision)
         except RequestError as error:
             raise RequestError(f"scenes[{k}]: {error}") from error
     return ready

@@ -10,6 +10,7 @@ import argparse
 import atexit
 import dataclasses
 import gc
+import logging
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import warp_mca as mca
 from warp_mca import registry
+from warp_mca.advice import LOGGER
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import GuardError, McaError, bad_value
 from warp_mca.scene import Scene
@@ -69,6 +71,15 @@ class Request:
     meshes: dict[str, mca.Mesh] | None = None
 
 
+class _Early(logging.Handler):
+    """Prints what a run says before it is done on standard error, which may be another one for each command."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One line."""
+        with suppress(OSError):  # nobody reads it: the run goes on
+            print(f"warning: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
 class _Parser(argparse.ArgumentParser):
     """Reports a bad command in one line."""
 
@@ -101,6 +112,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     for number in signals:
         if before[number] is not signal.SIG_IGN:  # as nohup has it
             signal.signal(number, _terminate)
+    early = _Early()
+    logging.getLogger(LOGGER).addHandler(early)
     try:
         return _carry_out(argv)
     except McaError as error:
@@ -118,6 +131,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("; ".join([f"warp-mca: {what} before it was done", *getattr(stop, "__notes__", ())]), file=sys.stderr)
         return 128 + number
     finally:
+        logging.getLogger(LOGGER).removeHandler(early)
         gc.set_threshold(*collect)
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)

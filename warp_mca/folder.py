@@ -1,4 +1,4 @@
-"""Owns folders of results: one run holds a folder at a time, and the files of a run replace those of another at once."""
+"""Owns folders of results: one run holds a folder at a time, and its files replace those of another run together."""
 
 from __future__ import annotations
 

@@ -53,6 +53,7 @@ class Body:
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Body", name=self.name)
         if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
             raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
@@ -82,6 +83,7 @@ class Point:
     at: Vec3
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Point", body=self.body)
         validate.vectors(f"Point of {self.body}", at=self.at)
 
@@ -102,11 +104,12 @@ class Line:
     position: float = 0.0
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Line", body=self.body)
         validate.vectors(f"Line in {self.body}", start=self.start, end=self.end)
         if not validate.is_number(self.position):
             raise bad_value(f"Line in {self.body}.position", self.position, "give a finite number")
-        if tuple(self.start) == tuple(self.end):
+        if self.start == self.end:
             raise bad_value(f"Line in {self.body}.end", self.end, "give a point other than the start")
 
     @property
@@ -130,6 +133,7 @@ class Path:
     spacing: float
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Path", name=self.name)
         validate.positive(f"Path {self.name}", spacing=self.spacing)
         validate.members(f"Path {self.name}", Line, lines=self.lines)
@@ -145,6 +149,7 @@ class Surface:
     nodes: str
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Surface", body=self.body, nodes=self.nodes)
 
 
@@ -163,6 +168,7 @@ class RigidPlane:
     velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.vectors("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
         if math.hypot(*self.normal) == 0.0:
             raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
@@ -170,11 +176,6 @@ class RigidPlane:
             *self.velocity
         ):
             raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
-
-
-def _plain(master: Surface | RigidPlane) -> tuple[tuple[object, ...], ...]:
-    """Its values as tuples, which can be compared; vectors may be arrays."""
-    return tuple(tuple(value) for value in vars(master).values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,11 +198,13 @@ class Contact:
     two_way: bool = False
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
         validate.positive("Contact", penalty=self.penalty)
         if not (validate.is_number(self.mu) and self.mu >= 0.0):
             raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
+        validate.flags("Contact", two_way=self.two_way)
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
@@ -231,6 +234,7 @@ class Revolute:
     nodes: Literal["axis", "ends"] = "axis"
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Revolute", name=self.name, body=self.body)
         validate.kinds(
             f"Revolute {self.name}", (str, NoneType), "name a body, or None for the ground", other=self.other
@@ -257,6 +261,7 @@ class Fixed:
     axes: str = "xyz"
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Fixed", body=self.body, nodes=self.nodes)
         if not isinstance(self.axes, str) or not self.axes or set(self.axes) - set("xyz"):
             raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
@@ -281,6 +286,7 @@ class Prescribed:
     velocities: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Prescribed", body=self.body, nodes=self.nodes)
         if self.axis not in ("x", "y", "z"):
             raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
@@ -308,6 +314,7 @@ class Tip:
     radius: float
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Tip", body=self.body)
         validate.vectors("Tip", centre=self.centre)
         validate.positive("Tip", radius=self.radius)
@@ -341,6 +348,7 @@ class RigidPhase:
     t_max: float = 5.0
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         for name, values in (("theta", self.theta), ("theta_dot", self.theta_dot)):
             if not validate.is_list(values):
                 raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, one for each link")
@@ -350,6 +358,7 @@ class RigidPhase:
         validate.kinds("RigidPhase", (Surface, RigidPlane), "give a Surface or a RigidPlane", target=self.target)
         if self.inertia not in ("mesh", "slender"):
             raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
+        validate.flags("RigidPhase", centre_target=self.centre_target)
         validate.positive("RigidPhase", t_max=self.t_max)
 
 
@@ -370,6 +379,7 @@ class ImpactPhase:
     energy_tolerance: float = 0.01
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
         validate.positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
         if self.output_interval > self.duration:
@@ -422,6 +432,7 @@ class Scene:
     parameters: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Scene", name=self.name)
         for name, kind in _PARTS.items():
             validate.members("Scene", kind, **{name: getattr(self, name)})
@@ -429,6 +440,8 @@ class Scene:
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
+        for key in self.parameters:
+            validate.kind_of("Scene.parameters", key, str, "give each value under its name, a text")
         names = [body.name for body in self.bodies]
         if not names:
             raise bad_value("Scene.bodies", (), "give at least one body")
@@ -437,7 +450,7 @@ class Scene:
         paths = [path.name for path in self.paths]
         if len(set(paths)) != len(paths):
             raise bad_value("Scene.paths", paths, "give each path a name of its own")
-        pairs = [(item.slave, _plain(item.master)) for item in self.contacts]
+        pairs = [(item.slave, item.master) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:
                 what = f"{slave.nodes} of {slave.body}"

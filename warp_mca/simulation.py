@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from warp_mca import validate
 from warp_mca.account import Account, Prepared
+from warp_mca.advice import mesh_warnings, warn
 from warp_mca.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
@@ -22,6 +23,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.paths import Found, locate
+from warp_mca.precision import check_range
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results import Result, hold, write
 from warp_mca.scene import Body, Scene
@@ -185,14 +187,18 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         speed = float(np.linalg.norm(model.V, axis=1).max())
     driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
     fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
-    spacing = float(np.spacing(np.abs(model.X).max()))
+    far = float(np.abs(model.X).max())
+    spacing = float(np.spacing(far))
     if 0.0 < speed * stable < 4.0 * spacing:
-        raise bad_value(
-            "Body.position",
-            float(np.abs(model.X).max()),
-            f"this far from the origin, positions are rounded to {spacing:.2g} m and a step's motion of "
-            f"{speed * stable:.2g} m is lost; move the scene closer to the origin",
-        )
+        lost = f"positions are rounded to {spacing:.2g} m and a step's motion of {speed * stable:.2g} m is lost"
+        if far < 2.0 * float(np.ptp(model.X, axis=0).max()):  # nearer to the origin it would be no better
+            raise bad_value("speed of the bodies", speed, f"{lost}; give a greater one, or start at rest")
+        raise bad_value("Body.position", far, f"this far from the origin, {lost}; move the scene closer to the origin")
+    with np.errstate(over="ignore"):
+        apart = float(np.ptp(model.V, axis=0).max()) * stable
+    if apart > float(np.ptp(model.X, axis=0).max()):
+        remedy = f"in a step some nodes would move {apart:.3g} m more than others; check the unit [m/s or rad/s]"
+        raise bad_value("speed of the bodies", speed, remedy)
     margins = [item.margin for item in model.passes if item.plane is None]
     searches = SPEED_RESERVE * fastest * interval / (0.5 * min(margins)) if margins else 1.0
     if not searches * intervals <= MOST_STEPS:
@@ -289,6 +295,8 @@ def _simulate(
 
     clock = Clock()
     ready = prepare(scene, meshes, clock, tell)
+    check_range(ready.model, precision)
+    warn(ready.warnings)
     steps = divide(scene, ready.model, span)
     tell("compile", 0.0)
     solver = Solver(ready.model, device=device, precision=precision, dt=steps.dt, threads=threads)
@@ -346,7 +354,7 @@ def prepare(
     model = build_model(scene, meshes, start.positions, start.velocities)
     probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
-    return Prepared(scene, meshes, start, model, probes)
+    return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model)))
 
 
 def advance(solver: Solver, steps: Steps, read: Read, recording: Recording | None = None) -> None:
