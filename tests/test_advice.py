@@ -192,7 +192,7 @@ def test_bodies_too_small_for_float32_are_refused_and_run_in_float64():
     with pytest.raises(RequestError, match=r"size of element 0 of body bar \[m\] = 2e-10: .*--precision float64"):
         mca.run(small(2e-9))
     with pytest.raises(RequestError, match=r"^scenes\[1\]: size of element 0 of body bar"):
-        mca.run_batch([small(1e-8), small(2e-9)], duration=1e-12)
+        mca.run_batch([small(1e-8), replace(small(2e-9), impact=small(1e-8).impact)])
     tiny, usual = mca.run(small(2e-9), precision="float64"), mca.run(small(1.0), precision="float64")
     assert tiny.F_n == pytest.approx(4e-18 * usual.F_n, rel=1e-6)
     assert mca.run(small(1e-8)).F_n == pytest.approx(1e-16 * usual.F_n, rel=1e-3, abs=1e-20 * usual.F_n.max())

@@ -94,7 +94,8 @@ class Ledger:
         if over.any():
             raise GuardError(
                 f"energy imbalance {100.0 * share[end - 1]:.3g}% at t = {t - self.interval:.4g} s exceeds "
-                f"energy_tolerance = {self.tolerance:g}: {self.remedy}, or raise the tolerance if that much is acceptable{self._hint}"
+                f"energy_tolerance = {self.tolerance:g}: {self.remedy}, or raise the tolerance if that "
+                f"much is acceptable{self._hint}"
             )
         if good < written and not np.isfinite(sums[good]).all():
             if not self.count:

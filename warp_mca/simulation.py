@@ -25,7 +25,7 @@ from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.paths import Found, locate
 from warp_mca.precision import check_range
 from warp_mca.recorders.recorder import Recorder, RunInfo
-from warp_mca.results import Result, hold, write
+from warp_mca.results import Result, check_output, hold, write
 from warp_mca.scene import Body, Scene
 
 if TYPE_CHECKING:
@@ -269,8 +269,8 @@ def run(
     span = span_of(scene, duration)
     check_recorders(recorders)
     check_device(device)
-    check_files(recorders, out)
     settings: dict[str, Any] = {"device": device, "precision": precision, "threads": thread_count(threads)}
+    check_files(recorders, None if out is None else check_output(out, force=force))
     if out is None:
         return _simulate(scene, meshes, recorders, span, tell, **settings)
     with hold(out, force=force) as folder:
