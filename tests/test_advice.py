@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import warnings
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import scene_file
-from warp_mca.errors import RequestError
+from warp_mca import cli, scene_file
+from warp_mca.errors import GuardError, RequestError
 from warp_mca.geometry import Mesh
 from warp_mca.geometry.quality import doubled_nodes
+from warp_mca.solver import Solver
 
 ALUMINIUM = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
 SHORT = mca.ImpactPhase(duration=2e-6)
@@ -118,3 +122,95 @@ def test_moduli_beyond_numbers_are_refused_in_a_sentence():
     with warnings.catch_warnings(), pytest.raises(RequestError, match="exceed the range of numbers"):
         warnings.simplefilter("error")
         mca.run(mca.Scene(name="stiff", bodies=(body,), impact=SHORT))
+
+
+def sliver() -> Mesh:
+    """A cube of 4 x 4 x 4 cells, one layer of which is a hundred times thinner than the others."""
+    mesh = cube(4).build()
+    points = mesh.points.copy()
+    points[np.isclose(points[:, 2], 0.005), 2] = 0.0099
+    return Mesh(points, mesh.hexahedra, mesh.node_sets, mesh.cell_sets)
+
+
+SLIVER = r"element \d+ of body it, at \(.*\) m in the body's frame, makes the time step \d+ times shorter"
+
+
+def test_slivers_are_reported_before_the_first_step(caplog: pytest.LogCaptureFixture):
+    logged = []
+    scene = alone(sliver())
+    result = mca.run(scene, progress=lambda stage, done: logged.append((stage, caplog.text)))
+    before = next(text for stage, text in logged if stage == "compile")
+    assert re.search(SLIVER, before)
+    assert [re.match(SLIVER, warning) is not None for warning in result.warnings] == [True]
+    assert result.warnings == mca.quality_table(scene, mca.mesh(scene)).warnings
+    caplog.clear()
+    mca.run_batch([scene, scene])
+    assert len(re.findall(SLIVER, caplog.text)) == 1
+
+
+def test_the_command_line_reports_slivers_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    Path("thin.py").write_text(
+        "def build():\n    import test_advice\n    return test_advice.alone(test_advice.sliver())\n"
+    )
+    assert cli.main(["build", "thin.py", "-o", "thin.mca"]) == 0
+    assert re.search("warning: " + SLIVER, capsys.readouterr().out)
+    monkeypatch.setattr(Solver, "start", lambda self: print("impact", file=sys.stderr))
+    assert cli.main(["run", "thin.py"]) == 0
+    captured = capsys.readouterr()
+    assert re.search("^warning: " + SLIVER + r"(.|\n)*\nimpact\n", captured.err, re.MULTILINE)
+    assert re.search("^warning: " + SLIVER, captured.out, re.MULTILINE)
+
+
+def small(size: float, speed: float = 1.0) -> mca.Scene:
+    """A bar of that length [m] strikes a wall; all scales with its size."""
+    box = mca.Box(size=(size, 0.1 * size, 0.1 * size), divisions=(10, 1, 1))
+    body = mca.Body(name="bar", geometry=box, material=ALUMINIUM, velocity=(speed, 0.0, 0.0))
+    wall = mca.RigidPlane(point=(size, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
+    meet = mca.Contact(slave=mca.Surface(body="bar", nodes="xmax"), master=wall)
+    phase = mca.ImpactPhase(duration=4e-4 * size, output_interval=2e-5 * size)
+    return mca.Scene(name="small", bodies=(body,), contacts=(meet,), impact=phase)
+
+
+def test_bodies_too_small_for_float32_are_refused_and_run_in_float64():
+    """2 nm in mixed precision: the run was said to be unstable, for whatever time step; tetrahedra felt no strain."""
+    with pytest.raises(RequestError, match=r"size of element 0 of body bar \[m\] = 2e-10: .*--precision float64"):
+        mca.run(small(2e-9))
+    with pytest.raises(RequestError, match=r"^scenes\[1\]: size of element 0 of body bar"):
+        mca.run_batch([small(1e-8), replace(small(2e-9), impact=small(1e-8).impact)])
+    tiny, usual = mca.run(small(2e-9), precision="float64"), mca.run(small(1.0), precision="float64")
+    assert tiny.F_n == pytest.approx(4e-18 * usual.F_n, rel=1e-6)
+    assert mca.run(small(1e-8)).F_n == pytest.approx(1e-16 * usual.F_n, rel=1e-3, abs=1e-20 * usual.F_n.max())
+
+
+def test_speeds_lost_in_rounding_are_not_laid_to_the_place():
+    with pytest.raises(RequestError, match=r"speed of the bodies = 1e-12: positions are rounded to .*; give a greater"):
+        mca.run(small(1.0, 1e-12))
+
+
+def test_numbers_out_of_range_are_not_laid_to_the_time_step():
+    with pytest.raises(GuardError, match=r"not a number at t = 0, before the first step: .*check their units"):
+        mca.run(replace(alone(cube(1), velocity=(1e200, 0.0, 0.0)), impact=SHORT))
+
+
+def test_a_balance_of_rounding_alone_stops_no_run():
+    """The bar lies still; the wall is a rounding of positions inside it: 17 % of 1e-25 J were missing."""
+    scene = small(1.0, 0.0)
+    wall = replace(scene.contacts[0].master, point=(1.0 - 2e-16, 0.0, 0.0))
+    result = mca.run(replace(scene, contacts=(replace(scene.contacts[0], master=wall),)))
+    assert result.summary["energy"]["initial"] > 0.0
+    assert result.summary["energy_error"] < 1e-2
+
+
+@pytest.mark.parametrize(("gap", "penalty"), [(0.0, True), (1.0, False)])
+def test_penalty_is_named_only_where_contact_was_touched(gap: float, penalty: bool):
+    scene = stacked(2, 2, gap)
+    fast = replace(scene.bodies[1], velocity=(0.0, -1.0, 0.0), angular_velocity=(0.0, 0.0, 2e4 * (not penalty)))
+    strict = replace(SHORT, energy_tolerance=1e-12, duration=4e-5)
+    with pytest.raises(GuardError, match="energy imbalance") as stopped:
+        mca.run(replace(scene, bodies=(scene.bodies[0], fast), impact=strict))
+    assert ("penalty" in str(stopped.value)) == penalty
+    assert ("float64" in str(stopped.value)) == (not penalty)

@@ -273,7 +273,7 @@ sys.exit(cli.main(["run", "landing.py", "--duration", "1e-5", "--out", "there/ou
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True)
     assert (done.returncode, done.stderr.count("\n")) == (143, 1), done.stderr
     assert "terminated before it was done" in done.stderr
-    assert list((here / "there").iterdir()) == []
+    assert contents(here) == []
 
 
 def test_warnings_are_shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
@@ -326,6 +326,16 @@ def test_every_recorder_has_its_option(here: Path, capsys: pytest.CaptureFixture
     assert contents(here) == sorted([*files, "landing-tiny"])
     assert all(f"wrote {file}" in out for file in (*files, Path("landing-tiny", "snapshot-4us.png")))
     assert (here / "landing-tiny" / "snapshot-4us.png").is_file()
+
+
+def test_each_file_of_an_option_given_twice_is_written(here: Path, capsys: pytest.CaptureFixture[str]):
+    """The last one alone was."""
+    options = [word for name in ("a.vtu", "b.vtk") for word in ("--final", name)] + ["--rrd", "a.rrd", "--rrd", "b.rrd"]
+    assert cli.main(["run", "landing.py", "--duration", "1e-6", *options]) == 0
+    assert contents(here) == ["a.rrd", "a.vtu", "b.rrd", "b.vtk", "landing-tiny"]
+    capsys.readouterr()
+    line = refused(capsys, "run", "landing.py", "--out", "c", "--final", "c.vtu", "--final", "c.vtu")
+    assert "two outputs write this file" in line
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,8 @@ def test_units_suit_the_greatest_value(greatest, expected):
     assert engineering(greatest, "N") == expected
 
 
-def test_a_stiff_body_that_turns_in_mixed_is_sent_to_float64():
-    """Rounding in float32 heats a free steel bar: 3e-6 of its energy in 3 ms, though it exchanges next to nothing."""
+def test_a_free_body_that_turns_is_sent_to_float64_only_by_a_guard():
+    """Rounding in float32 heats a free steel bar: by 3e-6 of its energy in 3 ms, 127 % of what it exchanges."""
     bar = mca.Body(
         name="bar",
         geometry=mca.Box(size=(0.01, 0.2, 0.01), divisions=(2, 12, 2), origin=(-0.005, -0.1, -0.005)),
@@ -54,11 +54,14 @@ def test_a_stiff_body_that_turns_in_mixed_is_sent_to_float64():
         angular_velocity=(20.0, 0.0, 0.0),
     )
     scene = mca.Scene(name="spin", bodies=(bar,), impact=mca.ImpactPhase(duration=3e-3, output_interval=1e-4))
-    (warning,) = mca.run(scene).warnings
-    assert "--precision float64" in warning
+    mixed = mca.run(scene)
+    assert mixed.warnings == ()
+    assert 1e-6 < mixed.summary["energy_error"] < 1e-5
     double = mca.run(scene, precision="float64")
     assert double.summary["energy_error"] < 1e-9
     assert double.warnings == ()
     strict = mca.ImpactPhase(duration=3e-3, output_interval=1e-4, energy_tolerance=1e-6)
-    with pytest.raises(mca.GuardError, match=r"penalty, choose --precision float64 if bodies turn for long, or"):
+    with pytest.raises(
+        mca.GuardError, match=r"0\.0001\d*% at .*: lower time_step_scale, choose --precision float64 .*, or"
+    ):
         mca.run(replace(scene, impact=strict))

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warp_mca import results
 from warp_mca.errors import RequestError
+from warp_mca.folder import LONGEST_SAVE
 from warp_mca.history import (
     active_rows,
     contact_intervals,
@@ -177,49 +177,21 @@ def test_results_are_not_overwritten_unless_forced(tmp_path: Path):
     assert load(tmp_path).summary["mu"] == 2
 
 
-@pytest.mark.parametrize("exists", [False, True])
-def test_of_two_runs_that_save_at_once_the_first_keeps_its_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exists: bool
-):
-    """Both found the folder free, and the second wrote over the first."""
-    folder, write = tmp_path / "out", results._write_history
-
-    def write_after_the_other(*args: object) -> None:
-        monkeypatch.setattr(results, "_write_history", write)
-        save(Result({"mu": 1}, history()), folder)
-        write(*args)
-
-    if exists:
-        folder.mkdir()
-        (folder / "a.usdc").write_text("recorded")
-    monkeypatch.setattr(results, "_write_history", write_after_the_other)
-    with pytest.raises(RequestError, match=r"^out = .*: it holds results already; name another"):
-        save(Result({"mu": 2}, history()), folder)
-    assert load(folder).summary["mu"] == 1
-    assert sorted(file.name for file in folder.iterdir()) == sorted([*FILES, *["a.usdc"] * exists])
-    assert list(tmp_path.iterdir()) == [folder]
-
-
-@pytest.mark.parametrize("other_first", [False, True])
-def test_a_new_folder_appears_with_all_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other_first: bool):
-    """A kill at any time leaves the whole results or none; a folder that another run makes meanwhile is theirs."""
+@pytest.mark.parametrize("other_files", [False, True])
+def test_a_new_folder_appears_with_all_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other_files: bool):
+    """A kill at any time leaves the whole results or none; files that recorders put there meanwhile stay."""
     rename, seen = Path.rename, []
 
     def spied(self: Path, target: Path) -> Path:
-        seen.append((target.exists(), sorted(file.name for file in self.iterdir())))
-        if other_first:
-            target.mkdir()
-            (target / "summary.json").write_text("{}")
+        seen.append((list(target.iterdir()), sorted(file.name for file in self.iterdir())))
+        if other_files:
+            (target / "a.usdc").write_text("recorded")
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", spied)
-    if other_first:
-        with pytest.raises(RequestError, match="it holds results already"):
-            save(Result({"mu": 1}, history()), tmp_path / "new")
-        assert [file.name for file in (tmp_path / "new").iterdir()] == ["summary.json"]
-    else:
-        assert load(save(Result({"mu": 1}, history()), tmp_path / "new").path).summary["mu"] == 1
-    assert seen == [(False, sorted(FILES))]
+    assert load(save(Result({"mu": 1}, history()), tmp_path / "new").path).summary["mu"] == 1
+    assert seen == [([], sorted(FILES))]
+    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == sorted([*FILES, *["a.usdc"] * other_files])
     assert [file.name for file in tmp_path.iterdir()] == ["new"]
     (tmp_path / "plain").mkdir()
     assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode
@@ -230,7 +202,7 @@ def test_what_a_killed_save_left_goes_with_a_later_one(tmp_path: Path):
     for folder in (old, new):
         folder.mkdir()
         (folder / "history.csv").write_text("")
-    then = time.time() - 2 * results.LONGEST_SAVE
+    then = time.time() - 2 * LONGEST_SAVE
     os.utime(old, (then, then))
     save(Result({}, history()), tmp_path, force=True)
     assert not old.exists()

@@ -204,3 +204,35 @@ def test_where_a_model_file_may_not_go(tmp_path: Path, name: str):
     with pytest.raises(RequestError, match="output"):
         save(tmp_path / name, scene, stand_ins(scene))
     assert list(tmp_path.iterdir()) == []
+
+
+def bomb(path: Path, count: int) -> None:
+    """A model file whose mesh has so many points, all at the origin."""
+    header = json.dumps({"format": "warp_mca model 1", "scene": {}, "meshes": {}, "origin": None}).encode()
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        np.save(archive.open("header.npy", "w"), np.frombuffer(header, dtype=np.uint8))
+        with archive.open("array0.npy", "w", force_zip64=True) as entry:
+            np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False, "shape": (count, 3)})
+            for _ in range(24 * count >> 20):
+                entry.write(bytes(1 << 20))
+
+
+def test_a_file_that_would_unpack_to_far_more_than_it_holds_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """3 MB took 3.5 GB of memory."""
+    bomb(tmp_path / "m.mca", 8 << 20)
+    monkeypatch.setattr(np, "load", lambda *args, **options: pytest.fail("unpacked"))
+    with pytest.raises(RequestError, match=r"it would unpack to 0\.2 GB, 1\d\d\d times its size, as no mesh does"):
+        load(tmp_path / "m.mca")
+
+
+def test_a_file_that_memory_does_not_hold_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    stored(tmp_path / "m.mca")
+    monkeypatch.setattr("warp_mca.scene_file._free_memory", lambda: 1e3)
+    with pytest.raises(RequestError, match=r"GB of memory, of which 1e-06 GB are free"):
+        load(tmp_path / "m.mca")
+
+
+def test_parameters_of_any_kind_are_stored_as_their_text(tmp_path: Path):
+    scene = dataclasses.replace(everything(), parameters={"share": Path("a/b"), "n": 3})
+    save(tmp_path / "m.mca", scene, stand_ins(scene))
+    assert load(tmp_path / "m.mca").scene.parameters == {"share": "a/b", "n": 3}

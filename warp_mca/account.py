@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.contact_checks import resolution_warnings
 from warp_mca.contact_history import contact_names, contact_warnings
-from warp_mca.geometry import Box, Plate, Rod, Sphere
-from warp_mca.geometry.quality import doubled_nodes
 from warp_mca.ledger import Ledger
 from warp_mca.model import Model, body_materials
 from warp_mca.paths import Probes, path_histories
 from warp_mca.results import Result, RunFacts, summarise
-from warp_mca.scene import RigidPlane
-from warp_mca.surfaces import face_geometry
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.handoff import HandOff
-    from warp_mca.scene import Contact, Scene
+    from warp_mca.scene import Scene
     from warp_mca.simulation import Steps
     from warp_mca.solver import Solver
 
-SHORTENED = 10.0  # an element that makes the time step so many times shorter is worth a look
-COARSER = 1.5  # slave's faces so many times as wide as the master's: where it is 2, a third of the force is missing
 COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
 
 
@@ -43,6 +35,7 @@ class Prepared:
         start: the hand-off.
         model: assembled.
         probes: of its paths.
+        warnings: about its meshes, see `mesh_warnings`.
     """
 
     scene: Scene
@@ -50,6 +43,7 @@ class Prepared:
     start: HandOff
     model: Model
     probes: Probes
+    warnings: tuple[str, ...] = ()
 
 
 class Account:
@@ -156,43 +150,6 @@ class Account:
             "energy_error": self.ledger.energy_error,
         }
 
-    def _mesh_warnings(self) -> list[str]:
-        found: list[str] = []
-        stable = self.ready.model.stable
-        if stable.shortened > SHORTENED:
-            name, element = self.ready.model.owner(stable.element)
-            mesh = self.ready.meshes[name]
-            x, y, z = mesh.points[mesh.cell(element)].mean(axis=0)
-            found.append(
-                f"element {element} of body {name}, at ({x:.4g}, {y:.4g}, {z:.4g}) m in the body's frame, makes the "
-                f"time step {stable.shortened:.0f} times shorter than half of the elements need; improve the mesh there"
-            )
-        for body in self.ready.scene.bodies:
-            own = not isinstance(body.geometry, (Box, Plate, Rod, Sphere))
-            if own and (count := doubled_nodes(self.ready.meshes[body.name])):
-                found.append(
-                    f"{count} nodes of body {body.name} lie where others of it do: unless cracks are meant, merge the "
-                    "parts of its mesh, which hang together at shared nodes only"
-                )
-        for contact in self.ready.scene.contacts:
-            if (ratio := self._coarser(contact)) > COARSER:
-                found.append(
-                    f"faces of the slave {contact.slave.body} are {ratio:.2g} times as wide as those of its master, "
-                    "whose nodes pass between its own: make the finer side the slave, or set two_way"
-                )
-        return found
-
-    def _coarser(self, contact: Contact) -> float:
-        """Width of the slave's faces over that of the master's [-]; 0 where nodes of both are kept out.
-
-        The lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
-        """
-        if contact.two_way or isinstance(contact.master, RigidPlane):
-            return 0.0
-        sides = ((self.ready.meshes[side.body], side.nodes) for side in (contact.slave, contact.master))
-        slave, master = (face_geometry(mesh.points, mesh.surface(nodes)[0])[0] for mesh, nodes in sides)
-        return math.sqrt(min(slave.min() / master.min(), np.median(slave) / np.median(master)))
-
     def _warnings(self, solver: Solver) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found: list[str] = []
@@ -204,12 +161,11 @@ class Account:
                 f"stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose kinematics='finite'{where}"
             )
         tolerance = scene.impact.energy_tolerance
-        if ledger.exchange_error > tolerance >= ledger.energy_error:
+        if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.energy_error:
             found.append(
                 f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.exchanged:.3g} J that the bodies "
-                f"exchanged, though only {ledger.energy_error:.2g} of all they have: lower time_step_scale or a "
-                f"contact's penalty{ledger.other_remedy}, if that is above what energy_tolerance = {tolerance:g} "
-                "should allow"
+                f"exchanged, though only {ledger.energy_error:.2g} of all they have: {ledger.remedy}, if that is above "
+                f"what energy_tolerance = {tolerance:g} should allow"
             )
         if ledger.turned:
             found.append(
@@ -217,7 +173,7 @@ class Account:
                 "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
             )
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, solver, self.index)
-        found += self._mesh_warnings()
+        found += self.ready.warnings
         if scene.rigid and scene.rigid.inertia == "slender":
             found.append(
                 f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic "

@@ -5,20 +5,24 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import NDArray
 
 from warp_mca import validate
 from warp_mca.account import Account, Prepared
+from warp_mca.advice import warn
 from warp_mca.arguments import Progress, check_scene, one_at_a_time, span_of, teller
 from warp_mca.errors import GuardError, McaError, RequestError, bad_value
+from warp_mca.folder import held
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.join import join_models, join_probes
 from warp_mca.layout import offsets
 from warp_mca.paths import Found
+from warp_mca.precision import check_range
 from warp_mca.results import ALL_FILES, Result, check_output, folder_path, save
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.simulation import Clock, advance, divide_alike, prepare
@@ -62,9 +66,7 @@ def run_batch(
     Raises:
         RequestError: the request cannot be carried out; nothing was written.
     """
-    from warp_mca.initial_overlap import settle_initial_overlap
-    from warp_mca.output import Output
-    from warp_mca.solver import Solver, check_device
+    from warp_mca.solver import check_device
     from warp_mca.threads import thread_count
 
     if isinstance(scenes, str) or not isinstance(scenes, Iterable):
@@ -73,10 +75,29 @@ def run_batch(
     tell = teller(progress)
     span = check_alike(scenes, duration)
     check_device(device)
-    threads = thread_count(threads)
-    folders = scene_folders(out, len(scenes), force)
+    settings: dict[str, Any] = {"device": device, "precision": precision, "threads": thread_count(threads)}
+    with hold_scenes(out, len(scenes), force) as folders:
+        return save_scenes(_simulate(scenes, meshes, span, tell, **settings), folders, force)
+
+
+def _simulate(
+    scenes: Sequence[Scene],
+    meshes: Sequence[Meshes] | None,
+    span: float,
+    tell: Progress,
+    *,
+    device: str,
+    precision: str,
+    threads: int,
+) -> list[Result]:
+    """The runs themselves, of `span` [s]; arguments are those of `run_batch`, checked."""
+    from warp_mca.initial_overlap import settle_initial_overlap
+    from warp_mca.output import Output
+    from warp_mca.solver import Solver
+
     clock = Clock()
-    ready = _prepare(scenes, meshes, clock, tell)
+    ready = _prepare(scenes, meshes, precision, clock, tell)
+    warn(sentence for item in ready for sentence in item.warnings)
     steps = divide_alike([(item.scene, item.model) for item in ready], span)
     model, probes = join_models([item.model for item in ready]), join_probes(ready)
     clock.lap("mesh")
@@ -95,12 +116,11 @@ def run_batch(
         advance(solver, steps, _reader(accounts, stopped, steps.intervals + 1, tell))
     clock.lap("fe")
     tell("impact", 1.0)
-    results = [account.result(solver, clock.wall, stopped=stopped[k]) for k, account in enumerate(accounts)]
-    return save_scenes(results, folders, force)
+    return [account.result(solver, clock.wall, stopped=stopped[k]) for k, account in enumerate(accounts)]
 
 
 def save_scenes(results: Sequence[Result], folders: Sequence[Path | None], force: bool) -> list[Result]:
-    """Results, those that no guard stopped written to the folders of `scene_folders`.
+    """Results, those that no guard stopped written to the folders of `hold_scenes`.
 
     With `force`, old files go: those of scenes that were stopped now, and of a larger batch's other scenes.
 
@@ -194,19 +214,25 @@ def _kind(master: object) -> str:
     return "RigidPlane" if isinstance(master, RigidPlane) else "Surface"
 
 
-def scene_folders(out: str | os.PathLike[str] | None, count: int, force: bool) -> list[Path | None]:
-    """A folder for each scene, numbered so that names sort.
+@contextmanager
+def hold_scenes(out: str | os.PathLike[str] | None, count: int, force: bool) -> Iterator[list[Path | None]]:
+    """A folder for each scene, numbered so that names sort, in the folder `out` that is held meanwhile.
 
     Raises:
-        RequestError: as in `check_output`.
+        RequestError: as in `check_output`; or another run holds `out`.
     """
     if out is None:
-        return [None] * count
+        yield [None] * count
+        return
     path, digits = folder_path("out", out), len(str(count - 1))
-    return [check_output(path / f"{k:0{digits}d}", force=force) for k in range(count)]
+    folders: list[Path | None] = [check_output(path / f"{k:0{digits}d}", force=force) for k in range(count)]
+    with held(path):
+        yield folders
 
 
-def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Clock, tell: Progress) -> list[Prepared]:
+def _prepare(
+    scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, precision: str, clock: Clock, tell: Progress
+) -> list[Prepared]:
     """Every scene at the start of its impact phase."""
     if meshes is not None:
         validate.kind_of("meshes", meshes, (tuple, list), "give a list with the meshes by body of each scene")
@@ -219,6 +245,7 @@ def _prepare(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, clock: Cl
         try:
             own = None if meshes is None else meshes[k]
             ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made))
+            check_range(ready[-1].model, precision)
         except RequestError as error:
             raise RequestError(f"scenes[{k}]: {error}") from error
     return ready

@@ -10,6 +10,7 @@ import argparse
 import atexit
 import dataclasses
 import gc
+import logging
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import warp_mca as mca
 from warp_mca import registry
+from warp_mca.advice import LOGGER
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import GuardError, McaError, bad_value
 from warp_mca.scene import Scene
@@ -69,6 +71,15 @@ class Request:
     meshes: dict[str, mca.Mesh] | None = None
 
 
+class _Early(logging.Handler):
+    """Prints what a run says before it is done on standard error, which may be another one for each command."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One line."""
+        with suppress(OSError):  # nobody reads it: the run goes on
+            print(f"warning: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
 class _Parser(argparse.ArgumentParser):
     """Reports a bad command in one line."""
 
@@ -101,6 +112,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     for number in signals:
         if before[number] is not signal.SIG_IGN:  # as nohup has it
             signal.signal(number, _terminate)
+    early = _Early()
+    logging.getLogger(LOGGER).addHandler(early)
     try:
         return _carry_out(argv)
     except McaError as error:
@@ -118,6 +131,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("; ".join([f"warp-mca: {what} before it was done", *getattr(stop, "__notes__", ())]), file=sys.stderr)
         return 128 + number
     finally:
+        logging.getLogger(LOGGER).removeHandler(early)
         gc.set_threshold(*collect)
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)
@@ -221,12 +235,12 @@ def _add_scene(parser: argparse.ArgumentParser) -> None:
 def _add_recorders(parser: argparse.ArgumentParser) -> None:
     from warp_mca.recorders import FILES
 
-    group = parser.add_argument_group("see the run")
+    group = parser.add_argument_group("see the run", "options with FILE may be given several times")
     group.add_argument(
         "--viewer", default="none", choices=("rerun", "none"), help="open a viewer and stream to it (default: none)"
     )
     for option, kind in FILES.items():
-        group.add_argument(f"--{option}", metavar="FILE", type=Path, help=kind.help)
+        group.add_argument(f"--{option}", metavar="FILE", type=Path, action="append", default=[], help=kind.help)
     group.add_argument("--frames", type=int, default=100, metavar="N", help="in each of them (default: %(default)s)")
     group.add_argument(
         "--snapshot",
@@ -245,12 +259,13 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
 
     cadence = Cadence(frames=args.frames)
     found: list[Recorder] = []
+    files = {option: list(getattr(args, option)) for option in FILES}
     if args.viewer == "rerun":
-        found.append(FILES["rrd"].make(args.rrd, viewer=True, cadence=cadence))
+        first = files["rrd"].pop(0) if files["rrd"] else None
+        found.append(FILES["rrd"].make(first, viewer=True, cadence=cadence))
     for option, kind in FILES.items():
-        file = getattr(args, option)
-        if file is not None and not (option == "rrd" and args.viewer == "rerun"):
-            found.append(kind.make(file) if option == "final" else kind.make(file, cadence=cadence))
+        more = {} if option == "final" else {"cadence": cadence}
+        found += [kind.make(file, **more) for file in files[option]]
     return found + [SnapshotFile(out / f"snapshot-{1e6 * t:g}us.png", time=t) for t in args.snapshots]
 
 
@@ -348,7 +363,7 @@ def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
 
 
 def _sweep(args: argparse.Namespace) -> None:
-    from warp_mca.batch import save_scenes, scene_folders
+    from warp_mca.batch import hold_scenes, save_scenes
     from warp_mca.report.console import progress_bar
     from warp_mca.sweep import batches, parse_sweep, print_sweep
 
@@ -358,23 +373,24 @@ def _sweep(args: argparse.Namespace) -> None:
     if _recorders(args, out):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
     meshes, scenes = requests[0].meshes, [request.scene for request in requests]
-    folders, groups = scene_folders(out, len(scenes), args.force), batches(scenes, args.duration)
-    _start_warp()
+    groups = batches(scenes, args.duration)
     found: dict[int, Result] = {}
-    with progress_bar() as progress:
-        for group in groups:
-            done = mca.run_batch(
-                [scenes[k] for k in group],
-                device=args.device,
-                precision=args.precision,
-                threads=args.threads,
-                duration=args.duration,
-                meshes=[meshes] * len(group) if meshes else None,
-                progress=progress,
-            )
-            found |= zip(group, done, strict=True)
-    # only now is it sure that no scene is refused
-    results = save_scenes([found[k] for k in range(len(scenes))], folders, args.force)
+    with hold_scenes(out, len(scenes), args.force) as folders:
+        _start_warp()
+        with progress_bar() as progress:
+            for group in groups:
+                done = mca.run_batch(
+                    [scenes[k] for k in group],
+                    device=args.device,
+                    precision=args.precision,
+                    threads=args.threads,
+                    duration=args.duration,
+                    meshes=[meshes] * len(group) if meshes else None,
+                    progress=progress,
+                )
+                found |= zip(group, done, strict=True)
+        # only now is it sure that no scene is refused
+        results = save_scenes([found[k] for k in range(len(scenes))], folders, args.force)
     print_sweep(settings, results, groups)
     stopped = sum(result.stopped is not None for result in results)
     if stopped:

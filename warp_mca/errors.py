@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+LONGEST = 400  # characters of a value in a message
+
 
 class McaError(Exception):
     """Base of every error that warp_mca raises on purpose."""
@@ -23,4 +25,14 @@ class GuardError(McaError, RuntimeError):
 
 def bad_value(field: str, value: object, remedy: str) -> RequestError:
     """One sentence that names the field, the value it had and what to do about it."""
-    return RequestError(f"{field} = {value!r}: {remedy}")
+    return RequestError(f"{field} = {_shown(value)}: {remedy}")
+
+
+def _shown(value: object) -> str:
+    """The value as a message shows it: in one line, cut where it is long."""
+    try:
+        text = repr(value)
+    except Exception:  # Python refuses to print integers of many digits; a user's own class may fail too
+        text = f"({type(value).__name__})"
+    text = " ".join(text.split()) if "\n" in text else text
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} …"

@@ -12,6 +12,7 @@ from warp_mca.surfaces import ContactPass
 from warp_mca.threads import RANGES
 
 _BITS = 60  # of the whole numbers, below their sign, that springs as deep as their faces are long would fill
+_LARGEST = 1000  # exponent of a scale that a float64 holds, whatever the springs
 _LINE = 8  # numbers in a line of a CPU's cache: two threads that write to one wait for each other
 
 
@@ -41,4 +42,5 @@ class NormalForce:
 def _scale(passes: Sequence[ContactPass]) -> float:
     """What sums count for a newton [1/N]: guards stop a run before forces come near the largest whole number."""
     reach = [item.sides * float(item.stiffness.sum()) * max(item.longest, item.deepest) for item in passes]
-    return 2.0 ** (_BITS - math.ceil(math.log2(sum(reach))))
+    _, exponent = math.frexp(sum(reach))
+    return 2.0 ** min(max(_BITS - exponent, -_LARGEST), _LARGEST)

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
 PASS_COLUMNS = 15
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
+TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 
 _FLAGS = (
     "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh "
@@ -61,7 +62,10 @@ class Ledger:
         self.initial_energy: float | None = None
         self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
         self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
-        self.initial_kinetic = self.exchanged = self.imbalance = 0.0
+        self.initial_kinetic = self.exchanged = self.imbalance = self.worked = 0.0
+        self.touched = False  # whether a contact spring was ever pressed
+        self.spin = _spin(model)
+        self.rounding = _rounding(model, steps.dt)
 
     @property
     def _width(self) -> int:
@@ -98,11 +102,16 @@ class Ledger:
         last, t = (self.steps.time(self.records + k) for k in (-1, 0))
         if over.any():
             raise GuardError(
-                f"energy imbalance {share[end - 1]:.2%} at t = {last:.4g} s exceeds energy_tolerance = "
-                f"{self.tolerance:g}: lower time_step_scale or a contact's penalty{self.other_remedy}, or raise the "
-                f"tolerance if that much is acceptable"
+                f"energy imbalance {100.0 * share[end - 1]:.3g}% at t = {last:.4g} s exceeds "
+                f"energy_tolerance = {self.tolerance:g}: {self.remedy}, or raise the tolerance if that "
+                f"much is acceptable"
             )
         if good < written and not np.isfinite(sums[good]).all():
+            if not self.records:
+                raise GuardError(
+                    "energy is not a number at t = 0, before the first step: speeds, sizes or moduli exceed the range "
+                    f"of numbers; check their units{', or choose float64' if self.precision == 'mixed' else ''}"
+                )
             raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
         if good < written:
             raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
@@ -151,26 +160,43 @@ class Ledger:
         initial = self.initial_energy or 0.0
         scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.energy_scale))
         self.energy_scale = float(scale.max(initial=self.energy_scale))
+        self.touched = self.touched or bool(
+            (self._springs(sums)[..., 6] > 0.0).any() or (energy["contact"] > 0.0).any()
+        )
+        self.worked = float(np.abs(work).max(initial=self.worked))
         imbalance, moved = np.abs(stored - work - initial), np.abs(energy["kinetic"] - self.initial_kinetic)
         self.imbalance = float(imbalance.max(initial=self.imbalance))
         self.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.exchanged))
+        scale = np.maximum(scale, self.rounding)
         share: Array = np.zeros(len(sums))
         np.divide(imbalance, scale, out=share, where=scale > 0.0)
         return share
 
     @property
-    def other_remedy(self) -> str:
-        """What else helps against an imbalance: float32 heats what turns for long."""
-        return ", choose --precision float64 if bodies turn for long" if self.precision == "mixed" else ""
+    def remedy(self) -> str:
+        """What helps against an imbalance: penalty only where contact was touched, float64 only for what turns."""
+        found = "lower time_step_scale"
+        if self.touched:
+            found += " or a contact's penalty"
+        if self.precision == "mixed" and self.spin * self.steps.time(self.records) > TURNED:
+            found += ", choose --precision float64 for bodies that turn so far"
+        return found
+
+    @property
+    def exchanges(self) -> bool:
+        """Whether bodies exchanged energy worth a word, by contact, joints or external work."""
+        all_energy = LEAST * self.energy_scale
+        met = self.touched or len(self.model.joint_first) > 0 or self.worked > all_energy
+        return met and self.exchanged > max(all_energy, self.rounding)
 
     @property
     def exchange_error(self) -> float:
         """Largest imbalance as a share of `exchanged` [-]: the same for all who watch, however fast bodies move along.
 
-        What is exchanged counts as LEAST of the initial energy and external work at least, so that the rounding of
-        motion alone counts for little.
+        What is exchanged counts as LEAST of the initial energy and external work at least, and as the energy of
+        rounding, so that the rounding of motion alone counts for little.
         """
-        scale = max(self.exchanged, LEAST * self.energy_scale)
+        scale = max(self.exchanged, LEAST * self.energy_scale, self.rounding)
         return self.imbalance / scale if scale > 0.0 else 0.0
 
     @property
@@ -278,3 +304,22 @@ class Ledger:
         speed: Array = np.full(len(rows), np.nan)
         np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
         return speed[min(first, 1) :]
+
+
+def _spin(model: Model) -> float:
+    """Greatest angular speed of a body at the start, from the velocities of its nodes about their mean [rad/s]."""
+    greatest = 0.0
+    first = sorted(model.node_start.values())
+    for begin, end in zip(first, [*first[1:], model.node_count], strict=True):
+        share = model.mass[begin:end, None] / model.mass[begin:end].sum()
+        with np.errstate(over="ignore", invalid="ignore"):
+            arm, velocity = (x - (share * x).sum(axis=0) for x in (model.X[begin:end], model.V[begin:end]))
+            rate = np.sqrt((share * velocity**2).sum() / (share * arm**2).sum())
+        greatest = max(greatest, float(rate)) if np.isfinite(rate) else greatest
+    return greatest
+
+
+def _rounding(model: Model, dt: float) -> float:
+    """Energy of all bodies that move by four times the rounding of positions in a step [J]: no balance is finer."""
+    speed = 4.0 * float(np.spacing(np.abs(model.X).max())) / dt
+    return 0.5 * float(model.mass.sum()) * speed * speed

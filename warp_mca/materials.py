@@ -31,6 +31,7 @@ class Elastic:
     law: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.positive(type(self).__name__, E=self.E, rho=self.rho)
         if not (validate.is_number(self.nu) and -1.0 < self.nu < 0.5):
             raise bad_value(f"{type(self).__name__}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")

@@ -199,6 +199,7 @@ def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
     return mean if np.linalg.norm(mean) > CLOSED * master.area[touched].sum() else np.array([0.0, 1.0, 0.0])
 
 
+@np.errstate(over="ignore", invalid="ignore")  # `stable_step` refuses what is not finite
 def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array], V: Mapping[str, Array]) -> Model:
     """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
 

@@ -91,7 +91,7 @@ class Parameter:
         """
         try:
             result = _converted(value, self.kind)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise bad_value(self.name, value, self._remedy()) from None
         if not self.param.allows(result):
             raise bad_value(self.name, result, self._remedy())

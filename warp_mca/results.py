@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
-import shutil
-import tempfile
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from itertools import chain
 from pathlib import Path
@@ -19,7 +18,8 @@ import numpy as np
 
 from warp_mca.contact_history import ContactHistory, load_contacts, save_contacts
 from warp_mca.errors import McaError, RequestError, bad_value
-from warp_mca.files import check_folder, given_path, nearest
+from warp_mca.files import check_folder, given_path
+from warp_mca.folder import Folder, held
 from warp_mca.history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
 from warp_mca.paths import PathHistory, load_paths, save_paths
 from warp_mca.validate import DAMAGE
@@ -43,8 +43,7 @@ FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
 CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
 ALL_FILES = FILES + CONTACT_FILES + PATH_FILES
-STAGING = ".warp_mca-"  # begins the names of folders that results are written in at first
-LONGEST_SAVE = 3600.0  # far more than any takes [s]
+DIGESTS = "files"  # key of summary.json: SHA-256 of each other file of the run, by its name
 
 
 @dataclass(frozen=True)
@@ -185,13 +184,29 @@ def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> P
     """
     path = folder_path("out", directory)
     check_folder("out", path)
-    if not force and any((path / name).exists() for name in ALL_FILES):
-        raise _taken(path)
+    _check_free(path, force)
     return path
 
 
-def _taken(path: Path) -> RequestError:
-    return bad_value("out", str(path), "it holds results already; name another folder, or use --force (force=True)")
+def _check_free(path: Path, force: bool) -> None:
+    for name in ALL_FILES:
+        if (path / name).is_dir():
+            raise bad_value("out", str(path), f"{name} is a folder there; name another folder")
+        if not force and (path / name).exists():
+            remedy = "it holds results already; name another folder, or use --force (force=True)"
+            raise bad_value("out", str(path), remedy)
+
+
+@contextmanager
+def hold(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[Folder]:
+    """Hold the folder of a run's results from its start to its end; it is made if need be.
+
+    Raises:
+        RequestError: as in `check_output`; or another run holds it.
+    """
+    with held(check_output(directory, force=force)) as folder:
+        _check_free(folder.path, force)  # another run may have saved there between check and lock
+        yield folder
 
 
 def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
@@ -200,107 +215,87 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
     Args:
         result: of a run.
         directory: is made if need be.
-        force: replace results that are there already.
+        force: replace results that are there already; other files stay.
 
     Returns:
         The result with its `path` set, and with the time that writing took in wall.output.
 
     Raises:
-        RequestError: as in `check_output`; also where another run saves to the folder at the same time and is first.
+        RequestError: as in `check_output`; or another run writes to the folder.
         McaError: the disk is full or fails.
     """
+    with hold(directory, force=force) as folder:
+        return write(result, folder, force=force)
+
+
+def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
+    """As `save`, to a folder that is held already."""
     from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
     from warp_mca.report.paths import save_path_figures
 
-    path = check_output(directory, force=force)
-    # Written beside the folder first: a run that fails or is killed half-way leaves nothing behind.
-    staging = None
+    path = folder.path
     try:
-        staging = Path(tempfile.mkdtemp(prefix=STAGING, dir=nearest(path)))
-        written = staging / "results"
-        written.mkdir()
-        begun = time.perf_counter()
-        _write_history(written / "history.csv", result.history)
-        save_forces(written / "forces.png", result)
-        save_energies(written / "energies.png", result)
-        if result.contacts:
-            save_contacts(written / "forces.npz", result.time, result.contacts)
-        if result.paths:
-            save_paths(written / "paths.npz", result.time, result.paths)
-            save_path_figures(written, result)
-        result = _with_output_time(result, path, time.perf_counter() - begun)
-        summary = {**result.summary, "warnings": list(result.warnings)}
-        (written / "summary.json").write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
-        _move(written, path, force)
-        _clear(path)
+        folder.renew()
+        _check_free(path, force)
+        with folder.staging() as staging:
+            written = staging / "results"
+            written.mkdir()
+            begun = time.perf_counter()
+            _write_history(written / "history.csv", result.history)
+            save_forces(written / "forces.png", result)
+            save_energies(written / "energies.png", result)
+            if result.contacts:
+                save_contacts(written / "forces.npz", result.time, result.contacts)
+            if result.paths:
+                save_paths(written / "paths.npz", result.time, result.paths)
+                save_path_figures(written, result)
+            digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
+            result = _with_output_time(result, path, time.perf_counter() - begun)
+            summary = {**result.summary, "warnings": list(result.warnings), DIGESTS: digests}
+            text = json.dumps(summary, indent=2, default=_plain)
+            (written / "summary.json").write_text(text + "\n", encoding="utf-8")
+            folder.put(written, ALL_FILES)
     except OSError as error:
         raise McaError(f"the results could not be written to {path}: {error.strerror or error}") from error
-    finally:
-        if staging:
-            shutil.rmtree(staging, ignore_errors=True)
     return result
 
 
-def _move(written: Path, path: Path, force: bool) -> None:
-    """Move the folder `written` to `path`: at once where there is none yet, otherwise file by file.
-
-    Raises:
-        RequestError: another run was first.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not path.exists():
-        with suppress(OSError):  # another run made it meanwhile
-            written.rename(path)
-            return
-    path.mkdir(exist_ok=True)
-    if not force:
-        _claim(path)
-    for name in ALL_FILES:
-        if (written / name).exists():
-            (written / name).replace(path / name)
-        else:  # left by a run of another scene
-            (path / name).unlink(missing_ok=True)
-
-
-def _claim(path: Path) -> None:
-    """Make the first file of results in a folder, empty: of several runs only one can.
-
-    Raises:
-        RequestError: another run was first.
-    """
-    try:
-        (path / FILES[0]).open("x").close()
-    except FileExistsError as error:
-        raise _taken(path) from error
-
-
-def _clear(path: Path) -> None:
-    """Remove what is left in a folder by runs that were killed while they saved."""
-    for folder in path.glob(f"{STAGING}*"):
-        with suppress(OSError):
-            if time.time() - folder.stat().st_mtime > LONGEST_SAVE:
-                shutil.rmtree(folder, ignore_errors=True)
+def _digest(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def load(directory: str | os.PathLike[str]) -> Result:
     """The result that a run saved in `directory`.
 
     Raises:
-        RequestError: there is none, or its files cannot be read.
+        RequestError: there is none, its files cannot be read, or they are of different runs.
     """
     path = folder_path("results", directory)
     try:
         summary = json.loads((path / "summary.json").read_text(encoding="utf-8"))
-        warnings = tuple(summary.pop("warnings", ()))
+        warnings, digests = tuple(summary.pop("warnings", ())), summary.pop(DIGESTS, None)
         history = _read_history(path / "history.csv")
         paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
         contacts = load_contacts(path / "forces.npz") if (path / "forces.npz").exists() else ()
+        strange = _of_other_runs(path, digests)
     except FileNotFoundError as error:
         raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
     except DAMAGE as error:
         raise bad_value("results", str(path), "its files are damaged; run again") from error
+    if strange:
+        remedy = f"{strange[0]} was changed, or is not of the run that summary.json is of; run again"
+        raise bad_value("results", str(path), remedy)
     return Result(summary, history, path, warnings, paths, contacts=contacts)
+
+
+def _of_other_runs(path: Path, digests: Mapping[str, str] | None) -> list[str]:
+    """Names of the files with data in `path` that differ from those of the run whose `digests` these are."""
+    if digests is None:  # results of an earlier version
+        return []
+    found = [name for name in ("history.csv", "forces.npz", "paths.npz") if (path / name).exists()]
+    return [name for name in found if digests.get(name) != _digest(path / name)]
 
 
 def folder_path(field: str, directory: object) -> Path:

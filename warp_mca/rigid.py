@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Gap = Callable[[float, Array], float]
 
+MOST_TURN = 1e4  # of a chain at its own pace [rad]: some minutes of computing
 MAX_TURN_PER_STEP = 0.05  # of the chain's own time scale, so that the gap has at most one minimum in a step
 SAMPLE_COUNT = 257  # of the trajectory kept for plotting
 
@@ -95,7 +96,11 @@ def swing(chain: Chain, theta0: ArrayLike, theta_dot0: ArrayLike, gap: Gap, t_ma
 
     reach = sum(math.hypot(*link.hinge_out, *link.centre, math.sqrt(link.inertia / link.mass)) for link in chain.links)
     touching = _check_start(distance(0.0, start), approach(0.0, start), reach)
-    pace = math.sqrt(math.hypot(*chain.gravity) / reach + (start[count:] ** 2).max())
+    with np.errstate(over="ignore"):
+        pace = math.sqrt(math.hypot(*chain.gravity) / reach + (start[count:] ** 2).max())
+    if not pace * t_max < MOST_TURN:
+        remedy = f"links that turn at {pace:.3g} rad/s would turn by more than {MOST_TURN:g} rad; give a shorter time"
+        raise bad_value("RigidPhase.t_max", t_max, remedy)
     run = solve_ivp(
         flow,
         (0.0, t_max),

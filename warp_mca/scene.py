@@ -54,6 +54,7 @@ class Body:
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Body", name=self.name)
         if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
             raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
@@ -83,6 +84,7 @@ class Point:
     at: Vec3
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Point", body=self.body)
         validate.vectors(f"Point of {self.body}", at=self.at)
 
@@ -103,11 +105,12 @@ class Line:
     position: float = 0.0
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Line", body=self.body)
         validate.vectors(f"Line in {self.body}", start=self.start, end=self.end)
         if not validate.is_number(self.position):
             raise bad_value(f"Line in {self.body}.position", self.position, "give a finite number")
-        if tuple(self.start) == tuple(self.end):
+        if self.start == self.end:
             raise bad_value(f"Line in {self.body}.end", self.end, "give a point other than the start")
 
     @property
@@ -131,6 +134,7 @@ class Path:
     spacing: float
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Path", name=self.name)
         validate.positive(f"Path {self.name}", spacing=self.spacing)
         validate.members(f"Path {self.name}", Line, lines=self.lines)
@@ -146,6 +150,7 @@ class Surface:
     nodes: str
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Surface", body=self.body, nodes=self.nodes)
 
 
@@ -164,6 +169,7 @@ class RigidPlane:
     velocity: Vec3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.vectors("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
         if math.hypot(*self.normal) == 0.0:
             raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
@@ -171,11 +177,6 @@ class RigidPlane:
             *self.velocity
         ):
             raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
-
-
-def _plain(master: Surface | RigidPlane) -> tuple[tuple[object, ...], ...]:
-    """Its values as tuples, which can be compared; vectors may be arrays."""
-    return tuple(tuple(value) for value in vars(master).values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,6 +212,7 @@ class Contact:
     tangent: Vec3 | None = None
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
         if self.penalty is not None:
@@ -219,6 +221,7 @@ class Contact:
             raise bad_value("Contact.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")
         if not (validate.is_number(self.mu) and self.mu >= 0.0):
             raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
+        validate.flags("Contact", two_way=self.two_way)
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
@@ -256,6 +259,7 @@ class Revolute:
     nodes: Literal["axis", "ends"] = "axis"
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Revolute", name=self.name, body=self.body)
         validate.kinds(
             f"Revolute {self.name}", (str, NoneType), "name a body, or None for the ground", other=self.other
@@ -282,6 +286,7 @@ class Fixed:
     axes: str = "xyz"
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Fixed", body=self.body, nodes=self.nodes)
         if not isinstance(self.axes, str) or not self.axes or set(self.axes) - set("xyz"):
             raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
@@ -306,6 +311,7 @@ class Prescribed:
     velocities: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Prescribed", body=self.body, nodes=self.nodes)
         if self.axis not in ("x", "y", "z"):
             raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
@@ -333,6 +339,7 @@ class Tip:
     radius: float
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Tip", body=self.body)
         validate.vectors("Tip", centre=self.centre)
         validate.positive("Tip", radius=self.radius)
@@ -366,6 +373,7 @@ class RigidPhase:
     t_max: float = 5.0
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         for name, values in (("theta", self.theta), ("theta_dot", self.theta_dot)):
             if not validate.is_list(values):
                 raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, one for each link")
@@ -375,6 +383,7 @@ class RigidPhase:
         validate.kinds("RigidPhase", (Surface, RigidPlane), "give a Surface or a RigidPlane", target=self.target)
         if self.inertia not in ("mesh", "slender"):
             raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
+        validate.flags("RigidPhase", centre_target=self.centre_target)
         validate.positive("RigidPhase", t_max=self.t_max)
 
 
@@ -395,6 +404,7 @@ class ImpactPhase:
     energy_tolerance: float = 0.01
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
         validate.positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
         if self.output_interval > self.duration:
@@ -447,6 +457,7 @@ class Scene:
     parameters: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.texts("Scene", name=self.name)
         for name, kind in _PARTS.items():
             validate.members("Scene", kind, **{name: getattr(self, name)})
@@ -454,6 +465,8 @@ class Scene:
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
+        for key in self.parameters:
+            validate.kind_of("Scene.parameters", key, str, "give each value under its name, a text")
         names = [body.name for body in self.bodies]
         if not names:
             raise bad_value("Scene.bodies", (), "give at least one body")
@@ -465,7 +478,7 @@ class Scene:
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
         if len(set(contacts)) != len(contacts):
             raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
-        pairs = [(item.slave, _plain(item.master)) for item in self.contacts]
+        pairs = [(item.slave, item.master) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:
                 what = f"{slave.nodes} of {slave.body}"

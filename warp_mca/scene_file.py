@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import tempfile
+import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -30,6 +33,8 @@ from warp_mca.validate import DAMAGE
 
 SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
+DENSEST = 50  # times their packed size, that meshes unpack to at most: boxes of equal cells reach 5
+SMALL = 64 << 20  # what is not worth a check [byte]
 
 
 @dataclass(frozen=True)
@@ -92,9 +97,9 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
     )
     content = {
         "format": FORMAT,
-        "scene": _encoded(dataclasses.replace(scene, bodies=bodies), arrays),
+        "scene": _encoded(dataclasses.replace(scene, bodies=bodies, parameters=_record(scene.parameters)), arrays),
         "meshes": {name: _encoded(mesh, arrays) for name, mesh in meshes.items()},
-        "origin": dataclasses.asdict(origin) if origin else None,
+        "origin": {**dataclasses.asdict(origin), "parameters": _record(origin.parameters)} if origin else None,
     }
     entries: dict[str, Any] = {f"array{i}": array for i, array in enumerate(arrays)}
     entries["header"] = np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
@@ -113,6 +118,7 @@ def load(path: str | os.PathLike[str]) -> StoredModel:
     if not Path(path).is_file():
         raise bad_value("scene", str(path), "there is no such file")
     try:
+        _check_unpacked(Path(path))
         with np.load(path, allow_pickle=False) as archive:
             content = json.loads(archive["header"].tobytes())
             if content["format"] != FORMAT:
@@ -125,10 +131,41 @@ def load(path: str | os.PathLike[str]) -> StoredModel:
             raise ValueError("scene")
         if not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
             raise ValueError("meshes")
+    except McaError:
+        raise
     except DAMAGE as error:
         remedy = "it is damaged or of another version; make it again with warp-mca build"
         raise bad_value("model file", str(path), remedy) from error
     return StoredModel(scene, meshes, origin)
+
+
+def _check_unpacked(path: Path) -> None:
+    """Refuse a file that would unpack to more than meshes of its size do, or than memory holds.
+
+    Raises:
+        RequestError: so it is.
+        zipfile.BadZipFile: it is no archive.
+    """
+    packed = path.stat().st_size
+    with zipfile.ZipFile(path) as archive:
+        unpacked = sum(entry.file_size for entry in archive.infolist())
+    if unpacked > max(SMALL, DENSEST * packed):
+        remedy = f"it would unpack to {unpacked / 1e9:.2g} GB, {unpacked / packed:.0f} times its size, as no mesh does"
+        raise bad_value("model file", str(path), f"{remedy}; make it again with warp-mca build")
+    free = _free_memory()
+    if unpacked > free:
+        remedy = (
+            f"it takes {unpacked / 1e9:.2g} GB of memory, of which {free / 1e9:.2g} GB are free; take fewer elements"
+        )
+        raise bad_value("model file", str(path), remedy)
+
+
+def _free_memory() -> float:
+    """Memory that the system can give to a process [byte]; infinite where it does not tell."""
+    with suppress(OSError, ValueError, LookupError):
+        entries = dict(line.split(":") for line in Path("/proc/meminfo").read_text().splitlines())
+        return 1024.0 * float(entries["MemAvailable"].split()[0])
+    return math.inf
 
 
 def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel:
@@ -162,6 +199,11 @@ def _vocabulary() -> dict[str, type]:
     """The classes that a file may name: the dataclasses of scenes, materials and geometry recipes."""
     members = {**vars(warp_mca.geometry), **vars(warp_mca.materials), **vars(warp_mca.scene)}
     return {name: item for name, item in members.items() if isinstance(item, type) and dataclasses.is_dataclass(item)}
+
+
+def _record(parameters: Mapping[str, object]) -> dict[str, object]:
+    """The parameters as JSON holds them; of other values their text."""
+    return json.loads(json.dumps(dict(parameters), default=str))
 
 
 def _encoded(value: object, arrays: list[NDArray]) -> object:

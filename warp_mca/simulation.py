@@ -7,13 +7,14 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca import validate
 from warp_mca.account import Account, Prepared
+from warp_mca.advice import mesh_warnings, warn
 from warp_mca.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
 from warp_mca.elements import ELEMENTS
 from warp_mca.errors import bad_value
@@ -22,8 +23,9 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.handoff import hand_off
 from warp_mca.model import Model, build_model, nodal_masses
 from warp_mca.paths import Found, locate
+from warp_mca.precision import check_range
 from warp_mca.recorders.recorder import Recorder, RunInfo
-from warp_mca.results import Result, check_output, save
+from warp_mca.results import Result, check_output, hold, write
 from warp_mca.scene import Body, Scene
 from warp_mca.steps import Steps
 
@@ -154,14 +156,18 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         speed = float(np.linalg.norm(model.V, axis=1).max())
     driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
     fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
-    spacing = float(np.spacing(np.abs(model.X).max()))
+    far = float(np.abs(model.X).max())
+    spacing = float(np.spacing(far))
     if 0.0 < speed * stable < 4.0 * spacing:
-        raise bad_value(
-            "Body.position",
-            float(np.abs(model.X).max()),
-            f"this far from the origin, positions are rounded to {spacing:.2g} m and a step's motion of "
-            f"{speed * stable:.2g} m is lost; move the scene closer to the origin",
-        )
+        lost = f"positions are rounded to {spacing:.2g} m and a step's motion of {speed * stable:.2g} m is lost"
+        if far < 2.0 * float(np.ptp(model.X, axis=0).max()):  # nearer to the origin it would be no better
+            raise bad_value("speed of the bodies", speed, f"{lost}; give a greater one, or start at rest")
+        raise bad_value("Body.position", far, f"this far from the origin, {lost}; move the scene closer to the origin")
+    with np.errstate(over="ignore"):
+        apart = float(np.ptp(model.V, axis=0).max()) * stable
+    if apart > float(np.ptp(model.X, axis=0).max()):
+        remedy = f"in a step some nodes would move {apart:.3g} m more than others; check the unit [m/s or rad/s]"
+        raise bad_value("speed of the bodies", speed, remedy)
     margins = [item.margin for item in model.passes if item.plane is None]
     searches = SPEED_RESERVE * fastest * interval / (0.5 * min(margins)) if margins else 1.0
     if not searches * intervals <= MOST_STEPS:
@@ -223,10 +229,8 @@ def run(
         RequestError: the request cannot be carried out; nothing was written.
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
-    from warp_mca.initial_overlap import settle_initial_overlap
-    from warp_mca.output import Output
-    from warp_mca.recorders.frames import Recording, check_files, skins
-    from warp_mca.solver import Solver, check_device
+    from warp_mca.recorders.frames import check_files
+    from warp_mca.solver import check_device
     from warp_mca.threads import thread_count
 
     check_scene("scene", scene)
@@ -234,12 +238,35 @@ def run(
     span = span_of(scene, duration)
     check_recorders(recorders)
     check_device(device)
-    threads = thread_count(threads)
-    if out is not None:
-        check_output(out, force=force)
-    check_files(recorders, out)
+    settings: dict[str, Any] = {"device": device, "precision": precision, "threads": thread_count(threads)}
+    check_files(recorders, None if out is None else check_output(out, force=force))
+    if out is None:
+        return _simulate(scene, meshes, recorders, span, tell, **settings)
+    with hold(out, force=force) as folder:
+        return write(_simulate(scene, meshes, recorders, span, tell, **settings), folder, force=force)
+
+
+def _simulate(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    recorders: Sequence[Recorder],
+    span: float,
+    tell: Progress,
+    *,
+    device: str,
+    precision: str,
+    threads: int,
+) -> Result:
+    """The run itself, of `span` [s]; arguments are those of `run`, checked."""
+    from warp_mca.initial_overlap import settle_initial_overlap
+    from warp_mca.output import Output
+    from warp_mca.recorders.frames import Recording, skins
+    from warp_mca.solver import Solver
+
     clock = Clock()
     ready = prepare(scene, meshes, clock, tell)
+    check_range(ready.model, precision)
+    warn(ready.warnings)
     steps = divide(scene, ready.model, span)
     tell("compile", 0.0)
     solver = Solver(ready.model, device=device, precision=precision, dt=steps.dt, threads=threads)
@@ -272,8 +299,7 @@ def run(
     recording.finish(True)
     clock.lap("output")
     tell("impact", 1.0)
-    result = replace(account.result(solver, clock.wall, said), failed=tuple(recording.failed))
-    return result if out is None else save(result, out, force=force)
+    return replace(account.result(solver, clock.wall, said), failed=tuple(recording.failed))
 
 
 def prepare(
@@ -300,7 +326,7 @@ def prepare(
     model = build_model(scene, meshes, start.positions, start.velocities)
     probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
-    return Prepared(scene, meshes, start, model, probes)
+    return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model)))
 
 
 def advance(solver: Solver, steps: Steps, read: Read, recording: Recording | None = None) -> None:

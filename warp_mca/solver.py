@@ -39,6 +39,7 @@ from warp_mca.layout import layout_of
 from warp_mca.ledger import JACOBIAN, PASS, PASS_COLUMNS
 from warp_mca.model import Model
 from warp_mca.overlap import overlap
+from warp_mca.precision import limited
 from warp_mca.threads import ELEMENTS as RANGE
 from warp_mca.threads import NODES, Pool, Split, Stages, flushing, whole
 
@@ -99,7 +100,7 @@ class Solver:
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
-        self.law = wp.array(model.law, dtype=t.real)
+        self.law = wp.array(limited(model.law, self.precision), dtype=t.real)
         self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
         near, more = gather_lists(self.elements, model.node_count)
         self.near, self.more = wp.array(near, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)

@@ -40,6 +40,7 @@ class StableStep:
     shortened: float
 
 
+@np.errstate(divide="ignore", over="ignore", invalid="ignore")  # bounds that are not numbers are refused
 def stable_step(
     formulation: Element, X: Array, conn: Index, K: Array, G: Array, mass: Array, contact: Array, index: Index
 ) -> StableStep:

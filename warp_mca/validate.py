@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import math
+import re
 import struct
 import tokenize
 import traceback
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
-from numbers import Real
+from contextlib import suppress
+from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -39,6 +42,32 @@ DAMAGE = (
     zlib.error,
 )
 
+MOST = 1_000_000_000  # of anything that is counted; memory ends before
+
+
+def plain(item: Any) -> None:
+    """Turn the numbers and sequences among a dataclass's values into Python's own: float, int, bool and tuple.
+
+    NumPy arrays, lists and fractions then compare, hash and print like the numbers that they stand for. A number stays
+    an int only in a field whose annotation says int. All other values stay as they are, for the checks that follow.
+    """
+    for field in dataclasses.fields(item):
+        whole = re.search(r"\bint\b", str(field.type)) is not None
+        value = getattr(item, field.name)
+        value = value.tolist() if isinstance(value, np.ndarray) else value
+        if _is_sequence(value):
+            value = tuple(_plain_number(entry, whole) for entry in value)
+        object.__setattr__(item, field.name, _plain_number(value, whole))
+
+
+def _plain_number(value: object, whole: bool) -> object:
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # no float holds it
+            return int(value) if whole and isinstance(value, Integral) else float(value)
+    return value
+
 
 def positive(owner: str, /, **values: float) -> None:
     """Each value must be a finite number above 0."""
@@ -58,14 +87,19 @@ def counts(owner: str, /, **values: int) -> None:
     """Each value must be a whole number above 0."""
     for name, value in values.items():
         if not _is_count(value):
-            raise bad_value(f"{owner}.{name}", value, "give a whole number above 0")
+            raise bad_value(f"{owner}.{name}", value, f"give a whole number above 0, at most {MOST:,}")
 
 
 def even_counts(owner: str, /, **values: int) -> None:
     """Each value must be an even number above 0, so that the middle is a grid line."""
     for name, value in values.items():
         if not (_is_count(value) and value % 2 == 0):
-            raise bad_value(f"{owner}.{name}", value, "give an even number above 0")
+            raise bad_value(f"{owner}.{name}", value, f"give an even number above 0, at most {MOST:,}")
+
+
+def flags(owner: str, /, **values: bool) -> None:
+    """Each value must be True or False."""
+    kinds(owner, bool, "give True or False", **values)
 
 
 def entries(owner: str, count: int, /, **values: tuple) -> None:
@@ -152,8 +186,12 @@ def is_list(value: object) -> bool:
     """Whether it is a sequence of finite numbers; sets, mappings and generators have no places."""
     if isinstance(value, np.ndarray):
         return value.ndim == 1 and all(map(is_number, value))
-    return isinstance(value, Sequence) and not isinstance(value, str | bytes) and all(map(is_number, value))
+    return _is_sequence(value) and all(map(is_number, value))
+
+
+def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview)
 
 
 def _is_count(value: object) -> bool:
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and int(value) > 0
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 < int(value) <= MOST

@@ -20,6 +20,7 @@ from warp_mca.geometry.recipe import check_size
 # Faces and edges of a block by the position of their corners; edges are grouped by the direction they run in.
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 _EDGES = (((0, 1), (3, 2), (4, 5), (7, 6)), ((0, 3), (1, 2), (4, 7), (5, 6)), ((0, 4), (1, 5), (2, 6), (3, 7)))
+FINEST = 1e-8  # smallest edge of a cell [extent of all blocks]
 _LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
 _one_at_a_time = threading.Lock()  # gmsh keeps one global state
 
@@ -123,6 +124,7 @@ class Blocks:
         Raises:
             RequestError: gmsh cannot be loaded, or cannot mesh these blocks.
         """
+        self._check_cells()
         with _gmsh() as gmsh:
             try:
                 surfaces, volumes = self._draw(gmsh.model.geo)
@@ -133,6 +135,21 @@ class Blocks:
                 if type(error) is not Exception:  # gmsh raises nothing more specific than this
                     raise
                 raise RequestError(f"gmsh could not mesh the blocks ({error}): change the recipe's values") from error
+
+    def _check_cells(self) -> None:
+        """Refuses cells so small or large beside others that gmsh crashes, or computes for hours."""
+        points = np.array(self._points)
+        extent = float(np.ptp(points, axis=0).max())
+        for (a, b), count in self._count.items():
+            length, factor = math.dist(self._points[a], self._points[b]), self._growth.get((a, b), 1.0)
+            smallest = (
+                math.log(length) - math.log(count) - (count - 1) * abs(math.log(factor)) if length > 0.0 else None
+            )
+            if smallest is None or not (math.isfinite(extent) and smallest > math.log(extent * FINEST)):
+                raise RequestError(
+                    f"{self._owner}: some cells would be {1.0 / FINEST:g} times smaller than the body, or of no size; "
+                    "bring its lengths closer together, or take fewer cells"
+                )
 
     def _draw(self, geo: ModuleType) -> tuple[dict[frozenset[int], int], list[int]]:
         """Emits the geometry; returns gmsh's surface tags by corners and its volume tags in block order."""

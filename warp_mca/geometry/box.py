@@ -26,6 +26,7 @@ class Box:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.entries("Box", 3, size=self.size, divisions=self.divisions, origin=self.origin)
         for value in self.size:
             validate.positive("Box", size=value)

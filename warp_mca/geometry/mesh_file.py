@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca import validate
 from warp_mca.errors import RequestError, bad_value
 from warp_mca.geometry.degenerate import AS_HEXAHEDRON, oriented
 from warp_mca.geometry.edit import compact
@@ -38,6 +39,7 @@ class MeshFile:
     path: str | Path
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         if not isinstance(self.path, (str, Path)):
             raise bad_value("MeshFile.path", self.path, "give the path of a mesh file")
 
@@ -64,7 +66,11 @@ class MeshFile:
         return compact(Mesh(points, np.concatenate(hexahedra), node_sets, cell_sets, tetrahedra))
 
     def _read(self) -> meshio.Mesh:
-        if not Path(self.path).is_file():
+        try:
+            found = Path(self.path).is_file()
+        except OSError as error:  # as of a name that is too long
+            raise self._bad(f"{error.strerror or error}; check the path") from error
+        if not found:
             raise self._bad("there is no such file; check the path")
         try:
             import meshio

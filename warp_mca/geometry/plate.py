@@ -54,6 +54,7 @@ class Plate:
     part: Literal["whole", "quarter"] = "whole"
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.positive("Plate", length=self.length, width=self.width, height=self.height, core_size=self.core_size)
         validate.entries("Plate", 2, core=self.core)
         for value in self.core:

@@ -58,7 +58,10 @@ class Rod:
     focus_layers: int = 4
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.positive("Rod", radius=self.radius, length=self.length, axial_ratio=self.axial_ratio)
+        if not 1e-6 <= self.axial_ratio <= 1e6:
+            raise bad_value("Rod.axial_ratio", self.axial_ratio, "give a ratio between 1e-6 and 1e6")
         validate.even_counts("Rod", section=self.section)
         validate.counts("Rod", ring=self.ring, axial=self.axial, focus_layers=self.focus_layers)
         validate.finite("Rod", focus_angle=self.focus_angle)

@@ -49,6 +49,7 @@ class Sphere:
     pole_layers: int = 6
 
     def __post_init__(self) -> None:
+        validate.plain(self)
         validate.positive("Sphere", radius=self.radius)
         validate.even_counts("Sphere", section=self.section)
         validate.counts("Sphere", ring=self.ring, pole_layers=self.pole_layers)

@@ -88,6 +88,8 @@ def print_quality(quality: Quality) -> None:
         f"smallest stable step {quality.stable_dt:.4g} s, set by element {quality.element} of {quality.body} "
         f"at ({place}) mm in its frame"
     )
+    for warning in quality.warnings:
+        out.print(f"warning: {warning}", soft_wrap=True)
 
 
 def print_summary(result: Result, files: Sequence[str]) -> None:

@@ -37,6 +37,7 @@ class Quality:
         body, element: whose element sets it, and its index in that body's mesh.
         at: centre of that element in the body's frame [m].
         contact_share: share of that element's largest eigenvalue that comes from contact springs [-].
+        warnings: what is worth a look in the meshes, one sentence each.
     """
 
     bodies: tuple[BodyQuality, ...]
@@ -45,6 +46,7 @@ class Quality:
     element: int
     at: tuple[float, float, float]
     contact_share: float
+    warnings: tuple[str, ...] = ()
 
 
 def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
@@ -57,6 +59,7 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     Raises:
         RequestError: the bodies cannot be put together, e.g. a joint's nodes do not coincide; or it is no scene.
     """
+    from warp_mca.advice import mesh_warnings
     from warp_mca.arguments import check_scene
     from warp_mca.geometry.quality import edge_lengths, scaled_jacobian
     from warp_mca.handoff import hand_off
@@ -84,4 +87,5 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
         element=element,
         at=(x, y, z),
         contact_share=model.stable.contact_share,
+        warnings=tuple(mesh_warnings(scene, meshes, model)),
     )

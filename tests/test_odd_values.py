@@ -1,0 +1,180 @@
+"""Tests that odd values in any field of the public classes are refused in a sentence, or run as what they stand for."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca import geometry, materials, scene
+from warp_mca.errors import GuardError, RequestError
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=4e8, E_t=1e9, beta=0.5)
+LINE = mca.Line(body="low", start=(0.0, 0.005, 0.005), end=(0.01, 0.005, 0.005))
+TOP = mca.Surface(body="low", nodes="ymax")
+WALL = mca.RigidPlane(point=(0.0, -1.0, 0.0))
+TIP = mca.Tip(body="up", centre=(0.005, 0.0, 0.005), radius=0.001)
+SOUND: dict[type, Any] = {
+    mca.Elastic: STEEL,
+    mca.J2Bilinear: METAL,
+    mca.Box: mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1)),
+    mca.Rod: mca.Rod(radius=0.01, length=0.05, section=2, ring=1, axial=2, tip_layers=1, focus_layers=1),
+    mca.Sphere: mca.Sphere(radius=0.01, section=2, ring=1, pole_layers=1),
+    mca.Plate: mca.Plate(
+        length=0.1, width=0.1, height=0.05, core=(2, 2), core_depth=1, core_size=0.005, layers=2, extension=1
+    ),
+    mca.MeshFile: mca.MeshFile("none.vtu"),
+    mca.Point: mca.Point(body="low", at=(0.0, 0.0, 0.0)),
+    mca.Line: LINE,
+    mca.Path: mca.Path(name="p", lines=(LINE,), spacing=0.005),
+    mca.Surface: TOP,
+    mca.RigidPlane: WALL,
+    mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
+    mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
+    mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
+    mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
+    mca.Tip: TIP,
+    mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),
+    mca.ImpactPhase: mca.ImpactPhase(duration=1e-7, output_interval=1e-7),
+}
+SOUND[mca.Body] = mca.Body(name="low", geometry=SOUND[mca.Box], material=STEEL)
+SOUND[mca.Scene] = mca.Scene(
+    name="s",
+    bodies=(SOUND[mca.Body], dataclasses.replace(SOUND[mca.Body], name="up", position=(0.0, 0.0101, 0.0))),
+    impact=SOUND[mca.ImpactPhase],
+)
+ODD = [
+    None,
+    True,
+    np.True_,
+    math.nan,
+    math.inf,
+    2**70,
+    -(2**70),
+    10**400,
+    10**5000,
+    Fraction(1, 3),
+    Fraction(10**400),
+    Decimal("0.1"),
+    1e300,
+    1e-300,
+    5e-324,
+    0,
+    1j,
+    b"x",
+    bytearray(b"abc"),
+    "",
+    "x\0y",
+    "\ud800",
+    "x" * 5000,
+    {},
+    {1: 2},
+    {"*": 5},
+    [],
+    [[]],
+    (None, None, None),
+    [Fraction(1, 3)] * 3,
+    (2**70, 0, 0),
+    [2**70],
+    [1e300],
+    (10**400, 0, 0),
+    (Decimal(1), 0, 0),
+    ("0", "0", "0"),
+    [math.nan] * 3,
+    range(3),
+    np.float32(0.25),
+    np.int64(2),
+    np.longdouble("0.5"),
+    np.array(0.5),
+    np.array(2),
+    np.array([0.5, 0.0, 0.0]),
+    np.array([2, 2, 2]),
+    np.array([0.0, 1.0]),
+    np.array(["x", "y"]),
+    np.array([None, 1, "x"], dtype=object),
+    np.zeros((3, 3)),
+    np.zeros(1000),
+    np.array("x"),
+    object(),
+    int,
+    lambda: None,
+]
+
+
+def scene_with(item: Any) -> mca.Scene:
+    """A scene of two boxes, one above the other, in which the item takes part."""
+    whole: mca.Scene = SOUND[mca.Scene]
+    low, up = whole.bodies
+    change: dict[str, Any] = {}
+    match item:
+        case mca.Scene():
+            return item
+        case mca.ImpactPhase():
+            change = {"impact": item}
+        case mca.RigidPhase() | mca.Tip():
+            phase = item if isinstance(item, mca.RigidPhase) else dataclasses.replace(SOUND[mca.RigidPhase], tip=item)
+            change = {"rigid": phase, "joints": (SOUND[mca.Revolute],), "gravity": (0.0, -9.81, 0.0)}
+        case mca.Elastic():
+            change = {"bodies": (dataclasses.replace(low, material=item), up)}
+        case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.MeshFile() | mca.Mesh():
+            change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
+        case mca.Body():
+            change = {"bodies": (item, up)}
+        case mca.Surface() | mca.RigidPlane():
+            change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], master=item),)}
+        case mca.Line():
+            change = {"paths": (dataclasses.replace(SOUND[mca.Path], lines=(item,)),)}
+        case _:
+            name = {
+                mca.Point: "tip",
+                mca.Path: "paths",
+                mca.Contact: "contacts",
+                mca.Revolute: "joints",
+                mca.Fixed: "fixed",
+                mca.Prescribed: "prescribed",
+            }[type(item)]
+            change = {name: item if name == "tip" else (item,)}
+    return dataclasses.replace(whole, **change)
+
+
+def test_every_public_class_is_tried():
+    found = [item for module in (scene, materials, geometry) for item in vars(module).values()]
+    public = [item for item in found if inspect.isclass(item) and dataclasses.is_dataclass(item)]
+    assert {*public} - {mca.Mesh} == {*SOUND}
+
+
+def fields() -> list[Any]:
+    return [
+        pytest.param(kind, field.name, id=f"{kind.__name__}.{field.name}")
+        for kind in SOUND
+        for field in dataclasses.fields(kind)
+    ]
+
+
+@pytest.mark.parametrize(("kind", "name"), fields())
+@pytest.mark.filterwarnings("error")
+def test_odd_values_are_refused_in_a_sentence_or_run(kind: type, name: str, monkeypatch: pytest.MonkeyPatch):
+    """No traceback and no warning of NumPy, until a few steps are done."""
+    monkeypatch.setattr("warp_mca.simulation.MOST_STEPS", 1000)
+    sound, tried = SOUND[kind], []
+    for value in ODD:
+        try:
+            item = dataclasses.replace(sound, **{name: value})
+            if repr(item) in tried:
+                continue
+            tried.append(repr(item))
+            if repr(item) == repr(sound):
+                continue
+            mca.run(scene_with(item))
+        except (RequestError, GuardError) as error:
+            assert "\n" not in str(error)
+            assert len(str(error)) < 1000
+            assert isinstance(error, RequestError) or "sank deeper" in str(error)  # of planes inside a body
