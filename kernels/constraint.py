@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
-from warp_mca.kernels.extremes import keep_speed_function
+from warp_mca.kernels.extremes import keep_speed
 from warp_mca.kernels.node import gather_function, hold, take_contact
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
@@ -102,7 +102,6 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision)
-    keep_speed = keep_speed_function(False)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_bound(

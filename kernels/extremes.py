@@ -11,64 +11,73 @@ wp.set_module_options({"enable_backward": False})
 STRAIN_SQUARE, VOLUME_LOSS = 0, 1
 
 
-def _keep(index: str, double: bool, together: bool) -> str:
-    """Source of `array[index] = max(array[index], value)` for values of at least 0.
+# Values up to these are left to check records, so that most elements write nothing.
+_FLOOR = {"strain": 1e-6, "volume": 0.02}  # e : e and 1 - J [-]
 
-    Floats of one sign are ordered as the integers of their bits, and those below 0 lie below all others. An atomic
-    maximum whose result is not used has nothing to wait for. With `together`, threads of a GPU that run side by side
-    keep the greatest of their float32 values at the index of the first one: one request in place of 32.
+
+def _keep(index: str, double: bool, floor: float) -> str:
+    """Source of `array[index] = max(array[index], value)` for values above `floor`, which is not below 0.
+
+    Floats of one sign are ordered as the integers of their bits. On a GPU the atomic maximum has no result to wait for,
+    and a predicate in place of a branch leaves the registers of the kernel as they are.
     """
-    name = "double" if double else "float"
-    keep = "atomicMax((long long*)place, __double_as_longlong(value));"
-    if not double:
-        keep = "atomicMax((int*)place, __float_as_int(value));"
-    if not double and together:
-        keep = """const unsigned active = __activemask();
-    const int greatest = __reduce_max_sync(active, __float_as_int(value));
-    if ((threadIdx.x & 31) == __ffs(active) - 1)
-        atomicMax((int*)place, greatest);"""
+    size, name, suffix, number, word = (64, "double", "", "d", "l") if double else (32, "float", "f", "f", "r")
+    bits = "__double_as_longlong" if double else "__float_as_int"
     return f"""
     {name}* place = wp::address(greatest_out, {index});
 #if defined(__CUDA_ARCH__)
-    {keep}
+    asm volatile("{{.reg .pred p; setp.gt.f{size} p, %0, %3; @p red.max.s{size} [%1], %2;}}"
+        :: "{number}"(value), "l"(place), "{word}"({bits}(value)), "{number}"({floor}{suffix}));
 #else
-    *place = *place > value ? *place : value;
+    *place = value > {floor}{suffix} && value > *place ? value : *place;
 #endif
 """
 
 
 @cache
-def keep_functions(scalar: Any, together: bool = False) -> tuple[Any, Any]:
+def keep_functions(scalar: Any) -> tuple[Any, Any, Any]:
     """Functions for one scalar type.
 
-    (Keep in greatest_out[k, e] the greatest value so far, from 0 on; the square e : e of a deviatoric strain, from the
-    invariant J2 = S : S / 2 of its elastic stress S = 2 G e.) `together`: threads side by side are of one scene, and it
-    does not matter which of their entries keeps the greatest value.
+    (Keep in greatest_out[0, e] the greatest square e : e of the deviatoric strain of an element so far; in
+    greatest_out[1, e] its greatest loss of volume 1 - J; e : e from the invariant J2 = S : S / 2 of its elastic stress
+    S = 2 G e.)
     """
 
-    @wp.func_native(_keep("k, e", scalar is wp.float64, together))
-    def keep_greatest(k: int, e: int, value: scalar, greatest_out: wp.array2d(dtype=scalar)): ...
+    @wp.func_native(_keep("0, e", scalar is wp.float64, _FLOOR["strain"]))
+    def keep_strain(e: int, value: scalar, greatest_out: wp.array2d(dtype=scalar)): ...
+
+    @wp.func_native(_keep("1, e", scalar is wp.float64, _FLOOR["volume"]))
+    def keep_volume(e: int, value: scalar, greatest_out: wp.array2d(dtype=scalar)): ...
 
     @wp.func
     def strain_square(J2: scalar, G: scalar):
         compliance = scalar(1.0) / G
         return (scalar(0.5) * compliance) * (compliance * J2)
 
-    return keep_greatest, strain_square
+    return keep_strain, keep_volume, strain_square
 
 
-@cache
-def keep_speed_function(together: bool) -> Any:
-    """The function that keeps the greatest square of the velocity of node i so far [m^2/s^2]; as `keep_functions`."""
+_KEEP_SPEED = """
+    float* place = wp::address(greatest_out, i);
+#if defined(__CUDA_ARCH__)
+    if (value > *place)  // threads share an entry: few of them exceed it
+        atomicMax((int*)place, __float_as_int(value));
+#else
+    *place = value > *place ? value : *place;
+#endif
+"""
 
-    @wp.func_native(_keep("i", False, together))
-    def keep_value(i: int, value: wp.float32, greatest_out: wp.array(dtype=wp.float32)): ...
 
-    @wp.func
-    def keep_speed(i: int, v: wp.vec3d, speed_square_out: wp.array(dtype=wp.float32)):
-        keep_value(i, wp.float32(wp.dot(v, v)), speed_square_out)
+@wp.func_native(_KEEP_SPEED)
+def keep_value(i: int, value: wp.float32, greatest_out: wp.array(dtype=wp.float32)):
+    """Keep in greatest_out[i] the greatest value so far, from 0 on."""
+    ...
 
-    return keep_speed
+
+@wp.func
+def keep_speed(i: int, v: wp.vec3d, speed_square_out: wp.array(dtype=wp.float32)):
+    """Keep the greatest square of a velocity so far in entry i, or in the only one [m^2/s^2]."""
+    keep_value(wp.min(i, speed_square_out.shape[0] - 1), wp.float32(wp.dot(v, v)), speed_square_out)
 
 
 @wp.func

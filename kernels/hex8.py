@@ -51,7 +51,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     load_element = load_function(precision)
     elastic_forces = elastic_function(precision)
     store_force = store_function(precision)
-    keep_greatest, strain_square = keep_functions(R)
+    keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": True})
@@ -76,8 +76,8 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         m = material[e]
         G = R(scale) * law[m, 1]
         f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G)
-        keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
-        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+        keep_strain(e, strain_square(largest, G), extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
 
@@ -95,7 +95,7 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
     load_element = load_function(precision)
     add_traction, symmetric_gradient, invariant = stress_functions(precision)
     store_force = store_function(precision)
-    keep_greatest, strain_square = keep_functions(R)
+    keep_strain, keep_volume, strain_square = keep_functions(R)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     functions = law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
@@ -184,8 +184,8 @@ def _plastic_force_kernel(precision: str, law_name: str) -> Any:
             Bz[jz] = Bz[jz] + b2
         if flag_new != flag:
             yielded_out[e] = flag_new
-        keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
-        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+        keep_strain(e, strain_square(largest, G), extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
         pressure = K * dilation / volume
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)
@@ -246,12 +246,14 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         dilation = R(0.0)
         elastic = R(0.0)
         dissipated = R(0.0)
+        largest = extreme[STRAIN_SQUARE, e]
         smallest = R(1.0)
         for g in range(8):
             det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             volume += det
             dilation += dilation_of(grad) * det
             strain, _N, _d = deviator(grad)
+            largest = wp.max(largest, wp.ddot(strain, strain))
             eps_p = mat33()
             if wp.static(plastic):
                 if yielded[e] != 0:
@@ -261,7 +263,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             smallest = wp.min(smallest, wp.determinant(identity + grad))
         energy_out[0, first + e] = elastic + volume * volumetric_energy(law[m, 0], dilation / volume)
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         energy_out[4, first + e] = R(0.0)
         # an inverted element's Q is a reflection, which would hide the inversion in its own frame
         smallest = smallest * wp.determinant(identity + W)

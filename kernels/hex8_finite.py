@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+from warp_mca.kernels.extremes import keep_functions
 from warp_mca.kernels.hexahedron import (
     edge_functions,
     frame_functions,
@@ -32,7 +32,7 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
     edge_to_node = node_force_function(precision)
     load_element = load_function(precision)
     store_force = store_function(precision)
-    keep_greatest, _ = keep_functions(R)
+    keep_strain, keep_volume, _ = keep_functions(R)
     point_gradient = gradient_function(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
@@ -109,8 +109,8 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
-        keep_greatest(STRAIN_SQUARE, e, largest, extreme_out)
-        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+        keep_strain(e, largest, extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
         half = R(0.5)
         f = edge_to_node(to_gauss(half * Sx), to_gauss(half * Sy), to_gauss(half * Sz), W)
         for a in range(8):

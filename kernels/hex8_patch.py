@@ -10,7 +10,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+from warp_mca.kernels.extremes import keep_functions
 from warp_mca.kernels.fused import fused
 from warp_mca.kernels.hex8_elastic import elastic_function, stress_functions
 from warp_mca.kernels.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
@@ -198,8 +198,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
-    keep_greatest, strain_square = keep_functions(R, together=True)
-    keep_own, _ = keep_functions(R)
+    keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -238,7 +237,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
         S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
         largest = lane_max(wp.max(trial0, trial1))
         if valid and q == 0:
-            keep_own(STRAIN_SQUARE, e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
+            keep_strain(e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
         if valid and (p0 > history[last] or p1 > history[size + last]):
             write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
@@ -307,7 +306,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
                 copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 W, J = element_rotation(Xl, ul)
-                keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+                keep_volume(e, R(1.0) - J, extreme_out)
                 flows = bool(False)
                 if wp.static(plastic):
                     flows = yielded_out[e] != 0
@@ -316,7 +315,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
                     G = R(scale) * law[m, 1]
                     f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G)
                     keep_forces(forces, lane, f)
-                    keep_greatest(STRAIN_SQUARE, e, strain_square(largest, G), extreme_out)
+                    keep_strain(e, strain_square(largest, G), extreme_out)
                     if wp.static(plastic):
                         if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
                             flows = bool(True)

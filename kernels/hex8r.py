@@ -116,7 +116,7 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def element_functions(precision: str, law_name: str, finite: bool, together: bool = False) -> tuple[Any, Any, Any]:
+def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
     The first also gives the ratio of volumes J, the second keeps the greatest strain.
@@ -132,7 +132,7 @@ def element_functions(precision: str, law_name: str, finite: bool, together: boo
     amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
-    keep_greatest, _ = keep_functions(R, together)
+    keep_strain, _, _ = keep_functions(R)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
@@ -163,7 +163,7 @@ def element_functions(precision: str, law_name: str, finite: bool, together: boo
         G = law[m, 1]
         kept = R(1.0)
         strain, N, d = deviator(H)
-        keep_greatest(STRAIN_SQUARE, e, wp.ddot(strain, strain), extreme_out)
+        keep_strain(e, wp.ddot(strain, strain), extreme_out)
         S = R(2.0) * G * strain
         if wp.static(plastic):
             eps_p = mat33()
@@ -220,7 +220,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
     store_force = store_function(precision)
-    keep_greatest, _ = keep_functions(R)
+    _, keep_volume, _ = keep_functions(R)
 
     # ln(1 + x) of small x needs the rounding that fast math gives away
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -243,7 +243,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         b, volume, W, H, J, q = shape_and_strain(x, du)
         P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
-        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)
 
@@ -308,8 +308,11 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
-        energy_out[3, first + e] = R(1.0) - extreme[VOLUME_LOSS, e]
+        identity = wp.identity(n=3, dtype=R)
+        square = wp.max(wp.ddot(strain, strain), extreme[STRAIN_SQUARE, e])
+        J = wp.determinant(identity + H) * wp.determinant(identity + W)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * square)
+        energy_out[3, first + e] = wp.min(J, R(1.0) - extreme[VOLUME_LOSS, e])
         energy_out[4, first + e] = stored
 
     return hex8r_energy

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.extremes import VOLUME_LOSS, keep_functions
+from warp_mca.kernels.extremes import keep_functions
 from warp_mca.kernels.hex8r import element_functions
 from warp_mca.kernels.overlap import begins_early
 from warp_mca.kernels.patch import (
@@ -49,8 +49,8 @@ def force_kernel(precision: str, law_name: str) -> Any:
     _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
-    keep_greatest, _ = keep_functions(R, together=True)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False, together=True)
+    _, keep_volume, _ = keep_functions(R)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False)
 
     @wp.kernel(
         enable_backward=False,
@@ -97,7 +97,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
                 b, volume, W, H, J, q = shape_and_strain(x, du)
                 P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out, extreme_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
-                keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+                keep_volume(e, R(1.0) - J, extreme_out)
             corners = corners_of(patches, coming, lane)
             wait_for_copies()
             barrier()

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.each import kind, value_function
-from warp_mca.kernels.extremes import keep_normal_force, keep_speed_function
+from warp_mca.kernels.extremes import keep_normal_force, keep_speed
 from warp_mca.kernels.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.scalars import scalars
 
@@ -81,7 +81,6 @@ def integrate_kernel(
     bound: bool = False,
     each: bool = False,
     early: bool = False,
-    lone: bool = True,
 ) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
@@ -89,12 +88,11 @@ def integrate_kernel(
     where it is not empty. speed_square_out keeps the greatest v^2 of each node. With `contact`, KEEPERS threads beyond
     the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`: some nodes are
     left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and nodes know their
-    scene. `early`: the next kernel takes its places as soon as nodes leave some. `lone`: there is one scene.
+    scene. `early`: the next kernel takes its places as soon as nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision)
-    keep_speed = keep_speed_function(lone)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(

@@ -114,7 +114,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     add_matrices = fused(precision).add_matrices
-    keep_greatest, _ = keep_functions(R)
+    keep_strain, keep_volume, _ = keep_functions(R)
     k = kinematics(precision, finite)
     deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
 
@@ -145,8 +145,8 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             pressure += R(0.25) * pressure_of(law[m, 0], dilation[group[a, e]])
         strain, N, d = deviator(H)
         S = R(2.0) * G * strain
-        keep_greatest(STRAIN_SQUARE, e, wp.ddot(strain, strain), extreme_out)
-        keep_greatest(VOLUME_LOSS, e, R(1.0) - J, extreme_out)
+        keep_strain(e, wp.ddot(strain, strain), extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
         if wp.static(plastic):
             eps_p = mat33()
             p = R(0.0)
@@ -200,7 +200,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         energy_out: wp.array2d(dtype=R),
     ):
         e = wp.tid()
-        _W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
+        W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
         m = material[e]
         elastic = R(0.0)
         for a in range(4):
@@ -215,8 +215,11 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         elastic += law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * extreme[STRAIN_SQUARE, e])
-        energy_out[3, first + e] = R(1.0) - extreme[VOLUME_LOSS, e]
+        identity = wp.identity(n=3, dtype=R)
+        square = wp.max(wp.ddot(strain, strain), extreme[STRAIN_SQUARE, e])
+        J = wp.determinant(identity + H) * wp.determinant(identity + W)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * square)
+        energy_out[3, first + e] = wp.min(J, R(1.0) - extreme[VOLUME_LOSS, e])
         energy_out[4, first + e] = R(0.0)
 
     return tet4_energy

@@ -117,7 +117,8 @@ class Solver:
         self.contact_force = wp.zeros(model.node_count if self.contacts else 0, dtype=wp.vec3d)
         by_scene = [model.passes[k * passes : (k + 1) * passes] for k in range(scenes)]
         self.normal_force = NormalForce(by_scene if passes else [], self.threads)
-        self.speed_square = wp.zeros(model.node_count, dtype=wp.float32)
+        # threads of a GPU share an entry: few of them exceed it
+        self.speed_square = wp.zeros(1 if cuda and scenes == 1 else model.node_count, dtype=wp.float32)
         self.flag = wp.zeros((scenes, len(search.FLAGS)), dtype=wp.int32)
         self.bonds = BondStage(model, self.layout)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
@@ -138,8 +139,7 @@ class Solver:
         touched, fixed, bound = bool(self.contacts), bool(model.fixed_axes.any()), self.bonds.count > 0
         rounds = min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
         early = not touched and not bound and rounds >= EARLY_ROUNDS
-        lone = scenes == 1
-        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early, lone)
+        self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early)
         self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if bound else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
@@ -174,7 +174,10 @@ class Solver:
             inputs += [role[part] if len(role) else role, self.force, scene, self.node_gravity, kick, drift]
             outputs = [contact_force, self.u[part], self.v[part], None if before is None else before[part]]
             keepers = node.KEEPERS if self.contacts and part.start == 0 else 0
-            outputs += [self.speed_square[part], self.normal_force.array if keepers else None]
+            outputs += [
+                self.speed_square[part] if len(self.speed_square) > 1 else self.speed_square,
+                self.normal_force.array if keepers else None,
+            ]
             threads = part.stop - part.start + keepers
             wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK)
 
@@ -309,7 +312,8 @@ class Solver:
         """
         with wp.ScopedDevice(self.device):
             self._integrate(-0.5 * self.dt, 0.0, self.bonds.at_rest)
-            self.speed_square.assign((self.model.V**2).sum(axis=1))  # not that before the start
+            speeds = (self.model.V**2).sum(axis=1)  # not those before the start
+            self.speed_square.assign(speeds if len(self.speed_square) > 1 else speeds.max(keepdims=True))
 
     def record_and_step(self, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True) -> None:
         """Record the state, as a row of the history or as a check between two, then advance `count` steps.
@@ -379,7 +383,8 @@ class Solver:
     def max_speed(self, scene: int = 0) -> float:
         """Greatest speed of any node of a scene, from the start on [m/s]."""
         first, end = self.layout.nodes[scene : scene + 2]
-        return math.sqrt(self.speed_square.numpy()[first:end].max())
+        squares = self.speed_square.numpy()
+        return math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
 
     def joint_impulses(self, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each joint of a scene gave to its first body [N s], by name."""
