@@ -143,7 +143,7 @@ def test_scenes_of_a_batch_give_the_bits_that_they_give_alone():
     [
         bars(True, aside=1.3e-3, along=3.0, mu=0.3, two_way=True),
         in_frame("L", ("every",), (-3.0, -2.5, 0.0)),
-        in_frame("C", ("every",), (-3.0, -2.7, -2.4), mu=0.3, two_way=True),
+        in_frame("C", ("every",), (-3.0, -2.7, -2.4), mu=0.3, two_way=True, initial_overlap="press"),
         roof(55.0, position=(0.012, 1e-5, 0.0), velocity=(20.0, -3.0, 0.0)),
     ],
     ids=["bars", "two walls", "three walls", "roof"],
