@@ -85,10 +85,10 @@ def integrate_kernel(
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
-    where it is not empty. speed_square_out keeps the greatest v^2 of each node. With `contact`, KEEPERS threads beyond
-    the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`: some nodes are
-    left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and nodes know their
-    scene. `early`: the next kernel takes its places as soon as nodes leave some.
+    where it is not empty. speed_square_out keeps the greatest v^2, see `extremes.keep_speed`. With `contact`, KEEPERS
+    threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
+    some nodes are left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and
+    nodes know their scene. `early`: the next kernel takes its places as soon as nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
