@@ -179,7 +179,10 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 @cache
 def force_kernel(precision: str, law_name: str) -> Any:
-    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law."""
+    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law.
+
+    flowing_out has the number of elements of each patch that took the return map, shape (patch_count,).
+    """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     force_pool, _ = shared_functions(precision)
@@ -276,6 +279,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
+        flowing_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=vec3),
     ):
         lane = wp.tid() & wp.static(PATCH - 1)
@@ -330,7 +334,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
             if wp.static(plastic):
                 listed = todo[0]
                 if lane == 0:
-                    patches.flowing[head[3]] = listed
+                    flowing_out[head[3]] = listed
                 for turn in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
                     item = (turn * wp.static(PATCH) + lane) >> 2
                     thread = todo[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)

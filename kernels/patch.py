@@ -48,14 +48,12 @@ class Patches:
             (4, element_count), uint32.
         places: element of the patch whose corner of each number lies in a slot, a byte each, NOWHERE where none does,
             shape (slot_count,), vec2i.
-        flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where elastic.
     """
 
     head: wp.array(dtype=wp.vec4i)
     turn: wp.array(dtype=wp.vec4i)
     corner: wp.array2d(dtype=wp.uint32)
     places: wp.array(dtype=wp.vec2i)
-    flowing: wp.array(dtype=wp.int32)
 
 
 @wp.kernel(enable_backward=False)

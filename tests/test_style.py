@@ -15,6 +15,12 @@ KERNEL_FILES = sorted((ROOT / "kernels").glob("*.py"))
 HOST_FILES = sorted([*(ROOT / "warp_mca").rglob("*.py"), *(ROOT / "scenes").glob("*.py")])
 ALLOCATE = {"zeros", "ones", "empty", "full", "array", "clone", "zeros_like", "ones_like", "empty_like", "full_like"}
 IN_PLACE = "spring"  # the one struct of arrays that kernels read and write
+STRUCTS = {  # classes of arrays that kernels take whole
+    node.name
+    for path in KERNEL_FILES
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    if isinstance(node, ast.ClassDef) and any(ast.unparse(mark) == "wp.struct" for mark in node.decorator_list)
+}
 
 
 def parse(path: Path) -> ast.Module:
@@ -82,6 +88,13 @@ def written(function: ast.FunctionDef) -> set[str]:
 
 def test_there_are_kernels_to_look_at():
     assert len(kernels()) >= 15
+    assert {"Spring", "Patches"} <= STRUCTS
+
+
+def test_a_write_to_a_member_of_a_struct_is_seen():
+    source = "@wp.kernel\ndef touch(patches: Patches, n: int):\n    patches.head[n] = 0\n"
+    (function,) = decorated(ast.parse(source), "kernel")
+    assert written(function) == {"patches"}
 
 
 @pytest.mark.parametrize("kernel", kernels())
@@ -97,7 +110,7 @@ def test_outputs_are_named_and_come_last(kernel: ast.FunctionDef):
 @pytest.mark.parametrize("function", device_functions())
 def test_only_outputs_are_written(function: ast.FunctionDef):
     names = parameters(function)
-    arrays = {name for name, kind in names.items() if kind.startswith("wp.array")} | {IN_PLACE} & set(names)
+    arrays = {name for name, kind in names.items() if kind.startswith("wp.array") or kind.split(".")[-1] in STRUCTS}
     outputs = {name for name in names if name.endswith("_out")}
     assert written(function) & arrays <= outputs | {IN_PLACE}
     assert outputs <= written(function)

@@ -22,6 +22,8 @@ class PatchStage(ElementStage):
     Attributes:
         patches: on the device.
         point: what `kernels.patch.POINT` says of each slot.
+        flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where no
+            order of patches is kept.
         most: blocks of threads that the device holds.
         blocks: of threads; each computes one patch after another.
     """
@@ -56,7 +58,7 @@ class PatchStage(ElementStage):
             self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
         self.scheduled = block.plastic and points > 1
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
-        self.patches.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
+        self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
 
     def kernels(self) -> list[Any]:
@@ -75,15 +77,15 @@ class PatchStage(ElementStage):
         """Patches in which elements yield come first, because they take longer."""
         if self.scheduled:
             for kernel, inputs, output in (
-                (patch.count_flowing, [self.patches.flowing], self.flowing_of_run),
-                (patch.schedule, [self.patches.flowing, self.flowing_of_run, self.patches.head], self.patches.turn),
+                (patch.count_flowing, [self.flowing], self.flowing_of_run),
+                (patch.schedule, [self.flowing, self.flowing_of_run, self.patches.head], self.patches.turn),
             ):
                 wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
     def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
         inputs = [X, self.point, self.patches, law, u, self.slot, self.blocks]
-        outputs = [self.yielded, self.history, self.extreme, force]
+        outputs = [self.yielded, self.history, self.extreme, *([self.flowing] if self.points > 1 else []), force]
         wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 
