@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 import warp_mca as mca
-from warp_mca import scene_file
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.scene import model_file as scene_file
 
 Sweep = tuple[list[mca.Scene], list[Mapping[str, Mesh]]]
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.elements import Element
-from warp_mca.model import Model, build_model
-from warp_mca.simulation import mesh
-from warp_mca.solver import Solver
-from warp_mca.timestep import StableStep, stable_step
+from warp_mca.model.model import Model, build_model
+from warp_mca.model.stable_step import StableStep, stable_step
+from warp_mca.runs.simulation import mesh
+from warp_mca.solve.solver import Solver
 
 STEEL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=400e6, E_t=2e9)
 SIZES = {"5k": 5_000, "50k": 50_000, "159k": 159_000, "1M": 1_000_000, "4M": 4_000_000, "16M": 16_000_000}
@@ -92,7 +92,7 @@ def assemble(element: str, count: int) -> Model:
     )
     meshes = mesh(scene)
     rest = {name: np.zeros_like(m.points) for name, m in meshes.items()}
-    with patch("warp_mca.assembly.stable_step", _stable_step):
+    with patch("warp_mca.model.assembly.stable_step", _stable_step):
         return build_model(scene, meshes, {name: m.points for name, m in meshes.items()}, rest)
 
 

@@ -28,7 +28,7 @@ name, device, precision, duration, out = sys.argv[1:]
 result = mca.run(mca.make_scene(name), device=device, precision=precision, duration=float(duration) or None)
 np.savez(out, **result.history)
 """
-LIST = "from warp_mca.registry import scene_names; print(*scene_names())"
+LIST = "from warp_mca.scene.catalogue import scene_names; print(*scene_names())"
 
 
 @contextmanager

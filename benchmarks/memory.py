@@ -23,7 +23,7 @@ def arrays(owner: Any, seen: dict[int, wp.array]) -> dict[int, wp.array]:
             if value.ptr:
                 seen[value.ptr] = value
         elif type(value).__module__.startswith("warp_mca.") or isinstance(value, list | tuple):
-            if not type(value).__module__.startswith("warp_mca.model"):
+            if not type(value).__module__.startswith("warp_mca.model.model"):
                 arrays(value, seen)
         elif type(value).__name__ in ("StructInstance", "NewStructInstance"):
             for name in value._cls.vars:

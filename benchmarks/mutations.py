@@ -24,7 +24,7 @@ from warp_mca.verify.mutations import MUTATIONS, Mutation
 
 ROOT = Path(__file__).parent.parent
 STORE = ROOT / "docs" / "mutations.json"
-GUARD = ("warp_mca/scene.py", "energy_tolerance: float = 0.01", "energy_tolerance: float = 1e9")
+GUARD = ("warp_mca/scene/scene.py", "energy_tolerance: float = 0.01", "energy_tolerance: float = 1e9")
 TREES = {"warp_mca": "warp_mca", "kernels": "warp_mca/kernels", "scenes": "warp_mca/scenes"}
 
 
@@ -53,7 +53,8 @@ def check_origin(folder: Path) -> None:
         RuntimeError: it does not.
     """
     text = (
-        "import warp_mca.kernels.j2 as a, warp_mca.elements as b, warp_mca.scenes as c; print(*map(origin, (a, b, c)))"
+        "import warp_mca.kernels.materials.j2 as a, warp_mca.elements as b, warp_mca.scenes as c; "
+        "print(*map(origin, (a, b, c)))"
     )
     command = [sys.executable, "-c", f"origin = lambda module: module.__file__; {text}"]
     said = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.split()

@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 import warp_mca as mca
-from warp_mca import scene_file
 from warp_mca.recorders import Cadence, RerunStream, UsdFile, VtkHdfFile
+from warp_mca.scene import model_file as scene_file
 
 KINDS = {
     "rerun": lambda folder, cadence: [RerunStream(folder / "a.rrd", cadence=cadence)],

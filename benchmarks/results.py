@@ -78,7 +78,7 @@ def run_case(case: Case, device: str, models: Path | None) -> dict[str, Any]:
     if models is None:
         scene, meshes = mca.make_scene("two_link", preset=case.preset, **case.settings), None
     else:
-        from warp_mca import scene_file
+        from warp_mca.scene import model_file as scene_file
 
         stored = scene_file.changed(scene_file.load(models / f"{case.preset}.mca"), case.settings)
         scene, meshes = stored.scene, stored.meshes

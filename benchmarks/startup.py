@@ -16,9 +16,9 @@ begun = time.perf_counter()
 import warp as wp
 wp.config.quiet = True
 import warp_mca as mca
-from warp_mca.model import build_model
-from warp_mca.simulation import mesh
-from warp_mca.solver import Solver
+from warp_mca.model.model import build_model
+from warp_mca.runs.simulation import mesh
+from warp_mca.solve.solver import Solver
 imported = time.perf_counter()
 scene = mca.make_scene("rod_on_wall")
 meshes = mesh(scene)

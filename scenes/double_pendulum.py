@@ -9,7 +9,7 @@ import numpy as np
 
 import warp_mca as mca
 from warp_mca import Param
-from warp_mca.chain import link_axes, perpendicular
+from warp_mca.rigid.chain import link_axes, perpendicular
 
 PRESETS: dict[str, dict[str, object]] = {"quick": {}, "stiff": {"E": 2e9}}
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import warp_mca as mca
 from warp_mca import Param
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
 
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
@@ -46,8 +46,8 @@ PRESETS: dict[str, dict[str, object]] = {
 
 def _approach_angle(length: float, radius: float, H: float, gravity: float, theta: tuple[float, float]) -> float:
     """Angle of the lower link at contact [rad], by the slender-rod chain: where the tip's mesh must be fine."""
-    from warp_mca.chain import Chain, slender_link
-    from warp_mca.rigid import swing
+    from warp_mca.rigid.chain import Chain, slender_link
+    from warp_mca.rigid.swing import swing
 
     if 2.0 * length <= H:
         raise bad_value("H", H, f"the tip reaches {2.0 * length:g} m below O and never touches the plate; lower H")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 import warp_mca as mca
-from warp_mca.handoff import hand_off
-from warp_mca.model import build_model, nodal_masses
+from warp_mca.model.model import build_model, nodal_masses
 from warp_mca.recorders.frames import skins
 from warp_mca.recorders.recorder import Frame, RunInfo, Volume
+from warp_mca.rigid.handoff import hand_off
 
 DT = 1.4e-9  # rerun stores whole nanoseconds
 STEPS = 1000  # between two frames

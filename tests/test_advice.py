@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import cli, scene_file
-from warp_mca.errors import GuardError, RequestError
+from warp_mca.base.errors import GuardError, RequestError
+from warp_mca.cli import main as cli
 from warp_mca.geometry import Mesh
 from warp_mca.geometry.quality import doubled_nodes
-from warp_mca.solver import Solver
+from warp_mca.scene import model_file as scene_file
+from warp_mca.solve.solver import Solver
 
 ALUMINIUM = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
 SHORT = mca.ImpactPhase(duration=2e-6)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import cli
-from warp_mca.results import CONTACT_FILES, FILES, HISTORY_COLUMNS, load
+from warp_mca.cli import main as cli
+from warp_mca.results.result import CONTACT_FILES, FILES, HISTORY_COLUMNS, load
 
 SCENE = '''"""A block lands on a rigid floor."""
 from typing import Annotated
@@ -218,7 +218,7 @@ def test_a_built_in_model_takes_new_parameters_unless_they_change_the_mesh(
 
 def finished(**figures: object) -> mca.Result:
     """A run without contact, for tests that are about something else."""
-    from warp_mca.results import RunFacts, summarise
+    from warp_mca.results.result import RunFacts, summarise
 
     history = {name: np.zeros(10) for name in HISTORY_COLUMNS} | {"time_s": np.arange(1, 11) * 1e-6}
     facts = RunFacts(
@@ -261,7 +261,7 @@ def test_a_run_that_is_terminated_clears_away_what_is_half_written(here: Path):
     command = """
 import os, signal, sys
 import meshio, warp_mca.recorders.mesh_file as mesh_file
-from warp_mca import cli
+from warp_mca.cli import main as cli
 whole = mesh_file._write
 def write(path, mesh):
     whole(path, mesh)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.simulation import mesh
-from warp_mca.solver import Solver
+from warp_mca.runs.simulation import mesh
+from warp_mca.solve.solver import Solver
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 R, V = 0.01, 2.0

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.contact_history import ContactHistory, contact_names, contact_warnings
-from warp_mca.model import build_model
-from warp_mca.simulation import mesh, prepare
-from warp_mca.solver import Solver
+from warp_mca.model.model import build_model
+from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
+from warp_mca.runs.simulation import mesh, prepare
+from warp_mca.solve.solver import Solver
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 SOFT = mca.Elastic(E=1e7, nu=0.3, rho=1000.0)
@@ -274,7 +274,7 @@ def test_axes_are_checked_and_unit():
 
 
 def _clock():
-    from warp_mca.simulation import Clock
+    from warp_mca.runs.simulation import Clock
 
     return Clock(), lambda stage, done: None
 
@@ -320,7 +320,7 @@ def test_forces_of_each_contact_are_saved_and_loaded(tmp_path: Path):
 
 
 def test_results_saved_before_load_without_the_new_columns(tmp_path: Path):
-    from warp_mca.results import HISTORY_COLUMNS
+    from warp_mca.results.result import HISTORY_COLUMNS
 
     result = mca.run(falling(block("a"), duration=3e-5))
     old = {name: result[name] for name in HISTORY_COLUMNS}

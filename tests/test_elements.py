@@ -16,9 +16,9 @@ from warp_mca.elements.stage import gather_lists
 from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
-from warp_mca.kernels.node import gather_function
-from warp_mca.model import build_model
-from warp_mca.solver import Solver
+from warp_mca.kernels.nodes.node import gather_function
+from warp_mca.model.model import build_model
+from warp_mca.solve.solver import Solver
 from warp_mca.verify.elements import mixed_cube
 
 gather = gather_function("float64")

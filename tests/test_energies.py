@@ -10,7 +10,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.report.energies import plot_energies, save_energies
 from warp_mca.report.style import engineering
-from warp_mca.results import HISTORY_COLUMNS, Result
+from warp_mca.results.result import HISTORY_COLUMNS, Result
 
 TIME = np.arange(1, 401) * 1e-6
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warp_mca.materials import Elastic
-from warp_mca.paths import PathHistory
 from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
 from warp_mca.report.energies import plot_energies, save_energies
 from warp_mca.report.paths import plot_paths, plot_waves, save_path_figures
 from warp_mca.report.snapshot import Skin, plot_snapshot, save_snapshot
 from warp_mca.report.style import engineering
-from warp_mca.results import HISTORY_COLUMNS, Result
+from warp_mca.results.paths import PathHistory
+from warp_mca.results.result import HISTORY_COLUMNS, Result
+from warp_mca.scene.materials import Elastic
 
 TIME = np.arange(1, 401) * 1e-6
 ALUMINIUM = Elastic(E=70e9, nu=0.27, rho=2700.0)

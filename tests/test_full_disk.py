@@ -13,10 +13,10 @@ from flying_bars import FlyingBars
 from test_results import facts, history
 
 import warp_mca as mca
-from warp_mca import scene_file
-from warp_mca.errors import McaError, RequestError
+from warp_mca.base.errors import McaError, RequestError
 from warp_mca.recorders import UsdFile, usd_file
-from warp_mca.results import Result, save, summarise
+from warp_mca.results.result import Result, save, summarise
+from warp_mca.scene import model_file as scene_file
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from recipes import FOCUS, LENGTH, R, area, plate, rod
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry import Box, Mesh, MeshFile, Sphere
 from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.degenerate import tetrahedral

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from recipes import plate, rod
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 
 
 def test_gmsh_is_silent_and_works_off_the_main_thread(capfd):

@@ -202,8 +202,8 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
 def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkeypatch):
     """Against the same graphs whose kernels begin when the one before them has ended."""
     from benchmarks.blocks import FULL, Case, Held, assemble
-    from warp_mca import solver
-    from warp_mca.kernels import node
+    from warp_mca.kernels.nodes import node
+    from warp_mca.solve import solver
 
     monkeypatch.setattr(solver, "EARLY_ROUNDS", 0)
     model, case = assemble(element, 90_000), {"elastic": Case(), "flows": Case(0.3), "everything": FULL}[name]

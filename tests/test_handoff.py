@@ -7,15 +7,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from warp_mca.chain import Chain
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.handback import hand_back
-from warp_mca.handoff import HandOff, hand_off, link_placements
-from warp_mca.materials import Elastic
-from warp_mca.rigid import chain_from_scene
+from warp_mca.rigid.chain import Chain
+from warp_mca.rigid.handback import hand_back
+from warp_mca.rigid.handoff import HandOff, hand_off, link_placements
+from warp_mca.rigid.swing import chain_from_scene
+from warp_mca.rigid.target import target_plane
 from warp_mca.scene import Body, ImpactPhase, Revolute, RigidPhase, RigidPlane, Scene, Surface, Tip
-from warp_mca.target import target_plane
+from warp_mca.scene.materials import Elastic
 
 LENGTH, RADIUS, HEIGHT = 0.21, 0.013, 0.37  # Table 1 [m]
 ALUMINIUM = Elastic(E=70e9, nu=0.27, rho=2700.0)

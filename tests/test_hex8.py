@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.hexahedron import eigenvalue_bounds, gradients, largest_eigenvalues, lumped_masses
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.kernels import hex8
-from warp_mca.kernels.rotation import nearest_rotation
-from warp_mca.kernels.scalars import scalars
-from warp_mca.materials import Elastic, J2Bilinear
-from warp_mca.timestep import stable_step
+from warp_mca.kernels.elements import hex8
+from warp_mca.kernels.elements.rotation import nearest_rotation
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.model.stable_step import stable_step
+from warp_mca.scene.materials import Elastic, J2Bilinear
 
 K, G = 50.7e9, 27.6e9
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_results import TIME, facts, history, two_bumps
 
-from warp_mca.history import contact_intervals, contact_rows, force_peaks, phases, unfinished
-from warp_mca.results import summarise
+from warp_mca.results.force_history import contact_intervals, contact_rows, force_peaks, phases, unfinished
+from warp_mca.results.result import summarise
 
 
 def half_sine(rows: int, peak: float = 1e3) -> np.ndarray:

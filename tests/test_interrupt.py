@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import warp_mca as mca
-from warp_mca import cli
+from warp_mca.cli import main as cli
 
 SCRIPT = """
 import os, signal, sys
-from warp_mca import cli
+from warp_mca.cli import main as cli
 from warp_mca.recorders.vtkhdf_file import VtkHdfFile
 
 write = VtkHdfFile.frame

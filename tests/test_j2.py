@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_mca.kernels.j2 import plastic_energy, return_map
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.j2 import plastic_energy, return_map
 
 E, NU, SIGMA_Y, E_T = 70e9, 0.27, 110e6, 27e9
 G, H = E / (2.0 * (1.0 + NU)), E * E_T / (E - E_T)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import solver
-from warp_mca.handoff import hand_off
-from warp_mca.model import build_model, nodal_masses
-from warp_mca.simulation import mesh
+from warp_mca.model.model import build_model, nodal_masses
+from warp_mca.rigid.handoff import hand_off
+from warp_mca.runs.simulation import mesh
+from warp_mca.solve import solver
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)
 HEAVY = mca.Elastic(E=1e9, nu=0.2, rho=3000.0)

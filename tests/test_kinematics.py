@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_mca.kernels.kinematics import eigen_function
-from warp_mca.kernels.lanes import side_by_side
-from warp_mca.kernels.logarithm import log_function
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.elements.kinematics import eigen_function
+from warp_mca.kernels.elements.logarithm import log_function
+from warp_mca.kernels.hardware.lanes import side_by_side
+from warp_mca.kernels.hardware.scalars import scalars
 
 PRECISIONS = ("mixed", "float64")
 

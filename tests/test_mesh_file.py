@@ -12,8 +12,8 @@ import pytest
 from flying_bars import FlyingBars
 
 import warp_mca as mca
-from warp_mca.errors import McaError, RequestError
-from warp_mca.model import build_model
+from warp_mca.base.errors import McaError, RequestError
+from warp_mca.model.model import build_model
 from warp_mca.recorders import mesh_file
 from warp_mca.recorders.mesh_file import COMPONENTS, FinalState, cells
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import geometry, materials, scene
-from warp_mca.errors import GuardError, RequestError
+from warp_mca import geometry, scene
+from warp_mca.base.errors import GuardError, RequestError
+from warp_mca.scene import materials
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=4e8, E_t=1e9, beta=0.5)
@@ -163,7 +164,7 @@ def fields() -> list[Any]:
 @pytest.mark.filterwarnings("error")
 def test_odd_values_are_refused_in_a_sentence_or_run(kind: type, name: str, monkeypatch: pytest.MonkeyPatch):
     """No traceback and no warning of NumPy, until a few steps are done."""
-    monkeypatch.setattr("warp_mca.simulation.MOST_STEPS", 1000)
+    monkeypatch.setattr("warp_mca.runs.simulation.MOST_STEPS", 1000)
     sound, tried = SOUND[kind], []
     for value in ODD:
         try:

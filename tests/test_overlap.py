@@ -1,4 +1,4 @@
-"""Kernels that begin while the one before them ends touch nothing that changes before they wait; `kernels.overlap`."""
+"""Kernels that begin while the one before them ends touch nothing that changes before they wait."""
 
 import ctypes
 import re
@@ -8,11 +8,13 @@ from types import SimpleNamespace
 import pytest
 import warp as wp
 
-from warp_mca import overlap as module
-from warp_mca.kernels import constraint, contact, hex8_patch, hex8r_patch, node, patch, sides, tet4
-from warp_mca.kernels.overlap import EARLY, LEAST_ARCH
-from warp_mca.materials import Elastic, J2Bilinear
-from warp_mca.overlap import overlap
+from warp_mca.kernels.contact import contact, sides
+from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
+from warp_mca.kernels.hardware.overlap import EARLY, LEAST_ARCH
+from warp_mca.kernels.nodes import constraint, node
+from warp_mca.scene.materials import Elastic, J2Bilinear
+from warp_mca.solve import early_launch as module
+from warp_mca.solve.early_launch import overlap
 
 KERNELS = Path(node.__file__).parent
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
@@ -56,7 +58,7 @@ def test_kernel_touches_nothing_that_changes_before_it_waits(name, k, tmp_path):
 
 
 def test_every_kernel_that_begins_early_is_tried():
-    found = [re.findall(r"begins_early\((\w+)\)", file.read_text(encoding="utf-8")) for file in KERNELS.glob("*.py")]
+    found = [re.findall(r"begins_early\((\w+)\)", file.read_text(encoding="utf-8")) for file in KERNELS.rglob("*.py")]
     assert sorted(name for names in found for name in names) == sorted(VARIANTS)
 
 

@@ -14,13 +14,13 @@ from scipy.optimize import brentq
 from test_elements import forces, solver_of
 
 import warp_mca as mca
-from warp_mca import scene_file
-from warp_mca.errors import RequestError
-from warp_mca.kernels import hex8_patch, hex8r_patch
-from warp_mca.kernels.overlap import LEAST_ARCH
-from warp_mca.materials import MATERIALS
-from warp_mca.output import NodalStress
+from warp_mca.base.errors import RequestError
+from warp_mca.kernels.elements import hex8_patch, hex8r_patch
+from warp_mca.kernels.hardware.overlap import LEAST_ARCH
 from warp_mca.recorders.colours import ColourScale
+from warp_mca.scene import model_file as scene_file
+from warp_mca.scene.materials import MATERIALS
+from warp_mca.solve.output import NodalStress
 
 
 @dataclass(frozen=True, kw_only=True)

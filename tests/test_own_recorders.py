@@ -12,7 +12,7 @@ import pytest
 from test_recording import Memory, bar
 
 import warp_mca as mca
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.recorders import FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
 from warp_mca.recorders.recorder import SURFACE
 

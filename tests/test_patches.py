@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.patches import LOT, NOWHERE, PATCH, SLOTS, Patches, compact_order, grid_points, make_patches
+from warp_mca.model.patches import LOT, NOWHERE, PATCH, SLOTS, Patches, compact_order, grid_points, make_patches
 
 
 def patch_of_elements(patches: Patches) -> np.ndarray:
@@ -143,7 +143,7 @@ def test_grids_are_those_of_each_scene_alone():
 
 
 def test_heads_hold_what_kernels_read_from_them():
-    """Bits as `kernels/patch.py` takes them apart; and the widths that they need."""
+    """Bits as `kernels/elements/patch.py` takes them apart; and the widths that they need."""
     conn = np.ascontiguousarray(mca.Box(size=(1.0, 2.0, 1.0), divisions=(9, 17, 8)).build().hexahedra.T)
     patches = make_patches(conn.astype(np.int32))
     exponent = np.arange(len(patches.start) - 1, dtype=np.int32) + 245
@@ -208,7 +208,7 @@ def test_elements_of_a_model_come_patch_by_patch():
         ),
         impact=mca.ImpactPhase(duration=1e-6),
     )
-    from warp_mca.model import build_model
+    from warp_mca.model.model import build_model
 
     meshes = mca.mesh(scene)
     X = meshes["bar"].points
@@ -221,7 +221,7 @@ def test_patches_that_yield_come_first_in_the_order_they_lie_in():
     """The kernels run on any device; a thread that starts behind the end has nothing to do."""
     import warp as wp
 
-    from warp_mca.kernels import patch
+    from warp_mca.kernels.elements import patch
 
     for count in (1, 5, 256, 1000):
         flowing = np.random.default_rng(count).integers(0, 4, count) * np.random.default_rng(7).integers(0, 2, count)

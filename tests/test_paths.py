@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry.degenerate import tetrahedral
-from warp_mca.model import build_model
-from warp_mca.paths import Probes, locate
+from warp_mca.model.model import build_model
+from warp_mca.results.paths import Probes, locate
 from warp_mca.verify.elements import mixed_cube
 
 STEEL = mca.Elastic(E=2e11, nu=0.3, rho=7850.0)

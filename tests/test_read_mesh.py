@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from recipes import area
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry import Box, Mesh, MeshFile
 from warp_mca.geometry.quality import check, volumes
 

@@ -10,14 +10,14 @@ import pytest
 from rrd import rows
 
 import warp_mca as mca
-from warp_mca.errors import GuardError, RequestError
-from warp_mca.model import build_model
-from warp_mca.output import Output
-from warp_mca.paths import locate
+from warp_mca.base.errors import GuardError, RequestError
+from warp_mca.model.model import build_model
 from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
 from warp_mca.recorders.frames import Recording, check_files, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
-from warp_mca.solver import Solver
+from warp_mca.results.paths import locate
+from warp_mca.solve.output import Output
+from warp_mca.solve.solver import Solver
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 
@@ -426,7 +426,7 @@ def test_plastic_strain_at_nodes():
 def test_a_scene_without_paths_pays_nothing_for_them(monkeypatch: pytest.MonkeyPatch):
     import dataclasses
 
-    from warp_mca import output
+    from warp_mca.solve import output
 
     monkeypatch.setattr(output.Output, "__init__", None)
     mca.run(dataclasses.replace(bar(), paths=()), duration=2e-6)
@@ -442,7 +442,7 @@ def test_a_path_that_leaves_its_body_is_refused():
 
 
 def test_results_with_paths_are_saved_and_loaded(tmp_path, plain: mca.Result):
-    from warp_mca.results import save
+    from warp_mca.results.result import save
 
     save(plain, tmp_path / "run")
     again = mca.load(tmp_path / "run")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_mca.kernels import ledger
-from warp_mca.kernels.ledger import RUN, SUM_WIDTH
-from warp_mca.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
+from warp_mca.kernels.records import ledger
+from warp_mca.kernels.records.ledger import RUN, SUM_WIDTH
+from warp_mca.runs.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
 
 COLUMNS = 8
 

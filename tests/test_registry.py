@@ -10,10 +10,18 @@ from pathlib import Path
 
 import pytest
 
-from warp_mca.errors import RequestError
-from warp_mca.registry import Param, Parameter, SceneSource, load_source, make_scene, parse_overrides, scene_names
-from warp_mca.results import Result
+from warp_mca.base.errors import RequestError
+from warp_mca.results.result import Result
 from warp_mca.scene import Scene
+from warp_mca.scene.catalogue import (
+    Param,
+    Parameter,
+    SceneSource,
+    load_source,
+    make_scene,
+    parse_overrides,
+    scene_names,
+)
 
 SCENE = '''"""A block falls.
 

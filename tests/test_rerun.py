@@ -16,12 +16,12 @@ import pytest
 from flying_bars import DT, STEPS, FlyingBars
 from rrd import rows
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.recorders import rerun_stream
 from warp_mca.recorders.colours import SLIP, STICK
 from warp_mca.recorders.rerun_stream import RerunStream
 from warp_mca.recorders.rerun_viewer import recording_in
-from warp_mca.results import HISTORY_COLUMNS
+from warp_mca.results.result import HISTORY_COLUMNS
 
 FRAMES = 9
 

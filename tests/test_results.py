@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warp_mca.errors import RequestError
-from warp_mca.folder import LONGEST_SAVE
-from warp_mca.history import (
+from warp_mca.base.errors import RequestError
+from warp_mca.base.folder import LONGEST_SAVE
+from warp_mca.results.force_history import (
     active_rows,
     contact_intervals,
     force_peaks,
@@ -23,7 +23,7 @@ from warp_mca.history import (
     reverses,
     stick_intervals,
 )
-from warp_mca.results import FILES, HISTORY_COLUMNS, Result, RunFacts, check_output, load, save, summarise
+from warp_mca.results.result import FILES, HISTORY_COLUMNS, Result, RunFacts, check_output, load, save, summarise
 
 TIME = np.arange(1, 601) * 1e-6
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from warp_mca.chain import Chain, Link, link_axes, mesh_link, slender_link
-from warp_mca.errors import RequestError
-from warp_mca.rigid import swing
+from warp_mca.base.errors import RequestError
+from warp_mca.rigid.chain import Chain, Link, link_axes, mesh_link, slender_link
+from warp_mca.rigid.swing import swing
 
 LENGTH, RADIUS, HEIGHT = 0.21, 0.013, 0.37  # Table 1 [m]
 HORIZONTAL = (0.5 * math.pi, 0.5 * math.pi)

@@ -12,8 +12,8 @@ import pytest
 import warp as wp
 
 import warp_mca as mca
-from warp_mca.errors import RequestError
-from warp_mca.simulation import divide, prepare
+from warp_mca.base.errors import RequestError
+from warp_mca.runs.simulation import divide, prepare
 
 ALUMINIUM = {"E": 70e9, "nu": 0.0, "rho": 2700.0}
 C = np.sqrt(70e9 / 2700.0)
@@ -100,7 +100,7 @@ def test_step_beyond_the_limit_blows_up_and_is_caught(monkeypatch):
 def test_free_fall_is_a_parabola_to_the_last_digit(monkeypatch):
     """Central differences are exact for it, if they start from the velocity of half a step before t = 0."""
     last = {}
-    solver = "warp_mca.solver.Solver"
+    solver = "warp_mca.solve.solver.Solver"
     monkeypatch.setattr(f"{solver}.max_plastic_strain", lambda self, scene: last.update(u=self.u.numpy()) or 0.0)
     falling = mca.Scene(**{**vars(bar()), "contacts": (), "gravity": (0.0, -1e4, 0.0)})
     result = mca.run(falling)
@@ -184,7 +184,7 @@ def test_scene_launches_only_what_it_has(monkeypatch):
 
 
 def test_elastic_scene_keeps_no_history(monkeypatch):
-    from warp_mca.solver import Solver
+    from warp_mca.solve.solver import Solver
 
     sizes = []
     monkeypatch.setattr(Solver, "compile", lambda self: sizes.extend(e.history.size for e in self.elements))

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry import Mesh
-from warp_mca.registry import load_source, make_scene, scene_names
-from warp_mca.scene_file import Origin, changed, load, save
+from warp_mca.scene.catalogue import load_source, make_scene, scene_names
+from warp_mca.scene.model_file import Origin, changed, load, save
 
 
 def cube(edge: float = 1.0) -> Mesh:
@@ -144,7 +144,7 @@ def test_only_built_in_scenes_can_be_changed(tmp_path: Path):
 def test_loading_needs_no_mesh_library(tmp_path: Path):
     stored(tmp_path / "m.mca")
     code = (
-        "import sys; from warp_mca.scene_file import load; load(sys.argv[1]);"
+        "import sys; from warp_mca.scene.model_file import load; load(sys.argv[1]);"
         "print([m for m in ('gmsh', 'meshio', 'pxr', 'rerun', 'warp') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "m.mca")], capture_output=True, text=True)
@@ -227,7 +227,7 @@ def test_a_file_that_would_unpack_to_far_more_than_it_holds_is_refused(tmp_path:
 
 def test_a_file_that_memory_does_not_hold_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     stored(tmp_path / "m.mca")
-    monkeypatch.setattr("warp_mca.scene_file._free_memory", lambda: 1e3)
+    monkeypatch.setattr("warp_mca.scene.model_file._free_memory", lambda: 1e3)
     with pytest.raises(RequestError, match=r"GB of memory, of which 1e-06 GB are free"):
         load(tmp_path / "m.mca")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 BOX = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1))

@@ -7,9 +7,9 @@ import pytest
 from sharp_edges import HARD, SOFT, STEEL, H, bars, frame, in_frame, roof
 
 import warp_mca as mca
-from warp_mca.sides import MOST, find_sides, stiffest_fold
-from warp_mca.solver import Solver
-from warp_mca.surfaces import face_geometry
+from warp_mca.model.sides import MOST, find_sides, stiffest_fold
+from warp_mca.model.surfaces import face_geometry
+from warp_mca.solve.solver import Solver
 
 
 def sides(mesh: mca.Mesh, nodes: str = "boundary") -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-KERNEL_FILES = sorted((ROOT / "kernels").glob("*.py"))
+KERNEL_FILES = sorted((ROOT / "kernels").rglob("*.py"))
 HOST_FILES = sorted([*(ROOT / "warp_mca").rglob("*.py"), *(ROOT / "scenes").glob("*.py")])
 ALLOCATE = {"zeros", "ones", "empty", "full", "array", "clone", "zeros_like", "ones_like", "empty_like", "full_like"}
 IN_PLACE = "spring"  # the one struct of arrays that kernels read and write

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.cli import main
-from warp_mca.sweep import parse_sweep
+from warp_mca.cli.main import main
+from warp_mca.runs.sweep import parse_sweep
 
 SCENE = '''
 """A block falls on a rough plane."""

@@ -9,8 +9,8 @@ import pytest
 import warp as wp
 
 import warp_mca as mca
-from warp_mca import solver, threads
-from warp_mca.cli import main
+from warp_mca.cli.main import main
+from warp_mca.solve import solver, threads
 
 
 @pytest.fixture(autouse=True)
@@ -22,7 +22,7 @@ def short_ranges(monkeypatch):
     for module in ("warp_mca.elements.stage", "warp_mca.elements.tet4_stage"):
         monkeypatch.setattr(f"{module}.ELEMENTS", threads.LANES)
     monkeypatch.setattr("warp_mca.elements.tet4_stage.NODES", threads.LANES)
-    monkeypatch.setattr("warp_mca.contact_stage.CONTACT", threads.LANES // 2)
+    monkeypatch.setattr("warp_mca.solve.contact_stage.CONTACT", threads.LANES // 2)
 
 
 def scene(element: str = "hex8", **impact: float) -> mca.Scene:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca import simulation, timestep
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
-from warp_mca.handoff import hand_off
-from warp_mca.model import Model, build_model, nodal_masses
-from warp_mca.solver import Solver
-from warp_mca.timestep import stable_step
+from warp_mca.model import stable_step as timestep
+from warp_mca.model.model import Model, build_model, nodal_masses
+from warp_mca.model.stable_step import stable_step
+from warp_mca.rigid.handoff import hand_off
+from warp_mca.runs import simulation
+from warp_mca.solve.solver import Solver
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01

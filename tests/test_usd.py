@@ -16,7 +16,7 @@ import pytest
 from flying_bars import DT, STEPS, FlyingBars
 from test_full_disk import files_up_to
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.recorders import UsdFile, usd_file
 from warp_mca.recorders.colours import PALETTE
 from warp_mca.recorders.recorder import SurfaceMesh

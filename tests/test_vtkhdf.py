@@ -22,7 +22,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.recorders import vtkhdf_file
 from warp_mca.recorders.recorder import Cadence
 from warp_mca.recorders.vtkhdf_file import FIELDS, VTK_TYPES, VtkHdfFile

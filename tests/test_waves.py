@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.paths import PathHistory
+from warp_mca.results.paths import PathHistory
 
 TIP, HINGE = 0.06, 0.21  # where the wave has become one of the rod, and hinge A [m]
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.assembly import body_materials
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry import Box, Mesh
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.quality import check
-from warp_mca.model import Model, build_model
+from warp_mca.model.assembly import body_materials
+from warp_mca.model.model import Model, build_model
 
 
 def broken(fault: str) -> Mesh:

@@ -1,6 +1,6 @@
 """Owns the law of a material of the user's own: hardening that saturates, after Voce, J. Inst. Metals 74 (1948) 537.
 
-sigma_y(p) = sigma_0 + (sigma_s - sigma_0) (1 - exp(-p / p_0)), isotropic. See `warp_mca.kernels.laws`.
+sigma_y(p) = sigma_0 + (sigma_s - sigma_0) (1 - exp(-p / p_0)), isotropic. See `warp_mca.kernels.materials.laws`.
 """
 
 from functools import cache
@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.scalars import scalars
+from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from warp_mca.errors import GuardError, McaError, RequestError
-from warp_mca.materials import Elastic, J2Bilinear
+from warp_mca.base.errors import GuardError, McaError, RequestError
 from warp_mca.scene import (
     Body,
     Contact,
@@ -26,14 +25,15 @@ from warp_mca.scene import (
     Surface,
     Tip,
 )
+from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
-    from warp_mca.batch import run_batch
     from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
-    from warp_mca.registry import Param, make_scene
     from warp_mca.report.quality import quality_table
-    from warp_mca.results import Result, load
-    from warp_mca.simulation import mesh, run
+    from warp_mca.results.result import Result, load
+    from warp_mca.runs.batch import run_batch
+    from warp_mca.runs.simulation import mesh, run
+    from warp_mca.scene.catalogue import Param, make_scene
 
 __version__ = "0.1.0"
 
@@ -44,14 +44,14 @@ _LAZY = {
     "Plate": "warp_mca.geometry",
     "Rod": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
-    "Param": "warp_mca.registry",
-    "make_scene": "warp_mca.registry",
-    "Result": "warp_mca.results",
-    "load": "warp_mca.results",
+    "Param": "warp_mca.scene.catalogue",
+    "make_scene": "warp_mca.scene.catalogue",
+    "Result": "warp_mca.results.result",
+    "load": "warp_mca.results.result",
     "quality_table": "warp_mca.report.quality",
-    "mesh": "warp_mca.simulation",
-    "run": "warp_mca.simulation",
-    "run_batch": "warp_mca.batch",
+    "mesh": "warp_mca.runs.simulation",
+    "run": "warp_mca.runs.simulation",
+    "run_batch": "warp_mca.runs.batch",
 }
 
 __all__ = [

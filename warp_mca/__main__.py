@@ -2,6 +2,6 @@
 
 import sys
 
-from warp_mca.cli import main
+from warp_mca.cli.main import main
 
 sys.exit(main())

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues,
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 
 class Hex8:
-    """See `warp_mca.kernels.hex8`; wedges and pyramids are hexahedra whose corners coincide."""
+    """See `warp_mca.kernels.elements.hex8`; wedges and pyramids are hexahedra whose corners coincide."""
 
     name = "hex8"
     corners = 8
@@ -24,6 +24,6 @@ class Hex8:
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
         from warp_mca.elements.patch_stage import hexahedral_stage
-        from warp_mca.kernels import hex8, hex8_patch
+        from warp_mca.kernels.elements import hex8, hex8_patch
 
         return hexahedral_stage(block, X, precision, hex8, hex8_patch, points=8)

@@ -11,7 +11,7 @@ from warp_mca.elements.hexahedron import CORNERS, chunks, gradients, lumped_mass
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 # Signs of the patterns eta zeta, zeta xi, xi eta, xi eta zeta at the corners, shape (4, 8).
 _PATTERNS = np.array(
@@ -52,7 +52,7 @@ def _hourglass_stiffness(volume: Array, a: Array, K: Array, G: Array) -> Array:
 
 
 class Hex8r:
-    """See `warp_mca.kernels.hex8r`; wedges and pyramids are hexahedra whose corners coincide."""
+    """See `warp_mca.kernels.elements.hex8r`; wedges and pyramids are hexahedra whose corners coincide."""
 
     name = "hex8r"
     corners = 8
@@ -92,6 +92,6 @@ class Hex8r:
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
         from warp_mca.elements.patch_stage import hexahedral_stage
-        from warp_mca.kernels import hex8r, hex8r_patch
+        from warp_mca.kernels.elements import hex8r, hex8r_patch
 
         return hexahedral_stage(block, X, precision, hex8r, hex8r_patch, points=1, rows=hex8r.HISTORY_ROWS)

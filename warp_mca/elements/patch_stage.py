@@ -8,12 +8,12 @@ import numpy as np
 import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
-from warp_mca.kernels import patch
-from warp_mca.patches import PATCH, SLOTS, Array, grid_points, make_patches
-from warp_mca.threads import Split, whole
+from warp_mca.kernels.elements import patch
+from warp_mca.model.patches import PATCH, SLOTS, Array, grid_points, make_patches
+from warp_mca.solve.threads import Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 
 class PatchStage(ElementStage):
@@ -21,7 +21,7 @@ class PatchStage(ElementStage):
 
     Attributes:
         patches: on the device.
-        point: what `kernels.patch.POINT` says of each slot.
+        point: what `kernels.elements.patch.POINT` says of each slot.
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where no
             order of patches is kept.
         most: blocks of threads that the device holds.

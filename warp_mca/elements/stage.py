@@ -9,14 +9,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels.lanes import side_by_side
-from warp_mca.kernels.laws import HISTORY_SIZE
-from warp_mca.kernels.scalars import scalars
-from warp_mca.patches import PATCH
-from warp_mca.threads import ELEMENTS, Split, whole
+from warp_mca.kernels.hardware.lanes import side_by_side
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.laws import HISTORY_SIZE
+from warp_mca.model.patches import PATCH
+from warp_mca.solve.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 Index = NDArray[np.int32]
 
@@ -31,7 +31,7 @@ class ElementStage:
         conn, material: as in `Block`.
         yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
         history: plastic strain and equivalent plastic strain of each point, in the order of
-            `kernels.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
+            `kernels.elements.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step so far [-], from
             0 on, shape (2, element_count), in the scalars of the precision.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.

@@ -11,7 +11,7 @@ from warp_mca.elements.hexahedron import chunks
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 
 def volumes(x: Array) -> Array:
@@ -26,7 +26,7 @@ def gradients(x: Array) -> Array:
 
 
 class Tet4:
-    """See `warp_mca.kernels.tet4`."""
+    """See `warp_mca.kernels.elements.tet4`."""
 
     name = "tet4"
     corners = 4

@@ -9,13 +9,13 @@ import warp as wp
 
 from warp_mca.elements.element import Array
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
-from warp_mca.kernels import tet4
-from warp_mca.kernels.lanes import side_by_side
-from warp_mca.kernels.scalars import scalars
-from warp_mca.threads import ELEMENTS, NODES, Split, whole
+from warp_mca.kernels.elements import tet4
+from warp_mca.kernels.hardware.lanes import side_by_side
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.solve.threads import ELEMENTS, NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model import Block
+    from warp_mca.model.model import Block
 
 
 class Tet4Stage(ElementStage):

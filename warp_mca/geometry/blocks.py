@@ -13,7 +13,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warp_mca.errors import RequestError
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import check_size
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_mca import validate
+from warp_mca.base import validate
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import check_size
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 
 _ROUNDING = 1e-7  # share of the mesh's extent within which places count as equal: gmsh divides arcs to about 1e-9

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boundary import boundary_faces
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca import validate
-from warp_mca.errors import RequestError, bad_value
+from warp_mca.base import validate
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.degenerate import AS_HEXAHEDRON, oriented
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.mesh import Mesh

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from warp_mca import validate
-from warp_mca.errors import bad_value
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.edit import mirror, snapped
 from warp_mca.geometry.mesh import Mesh

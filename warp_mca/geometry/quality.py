@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.elements import hexahedron, tet4
-from warp_mca.errors import RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 
 # The three neighbours of each corner, ordered so that the edges towards them are right-handed.

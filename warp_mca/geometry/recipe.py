@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 
 LIMIT = 200_000_000  # elements: more fit no machine that this runs on

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca import validate
-from warp_mca.errors import bad_value
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import mirror, pinned, snapped
 from warp_mca.geometry.hemisphere import DEPTH_LIMIT, FOCUS_LIMIT, PATCH_LIMIT, Hemisphere

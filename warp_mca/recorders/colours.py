@@ -12,10 +12,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import bad_value
-from warp_mca.materials import Material
+from warp_mca.base.errors import bad_value
+from warp_mca.base.validate import brief, is_number
 from warp_mca.scene import Scene
-from warp_mca.validate import brief, is_number
+from warp_mca.scene.materials import Material
 
 STICK, SLIP = 0xF0E442FF, 0xD55E00FF  # contact points, as 0xRRGGBBAA: Okabe and Ito's yellow and vermilion
 _NODES = """

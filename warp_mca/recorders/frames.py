@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca import validate
-from warp_mca.errors import bad_value
-from warp_mca.kernels.output import OPEN, STICK
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.kernels.records.output import OPEN, STICK
 from warp_mca.recorders.recorder import (
     CONTACT,
     NEEDS,
@@ -28,13 +28,13 @@ from warp_mca.recorders.recorder import (
     Volume,
     file_path,
 )
-from warp_mca.results import ALL_FILES
-from warp_mca.transfer import Transfer
+from warp_mca.results.result import ALL_FILES
+from warp_mca.solve.transfer import Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model import Model
-    from warp_mca.output import Output
+    from warp_mca.model.model import Model
+    from warp_mca.solve.output import Output
 
 
 def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warp_mca.errors import McaError, RequestError, bad_value
+from warp_mca.base.errors import McaError, RequestError, bad_value
 from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file, file_path
 
 if TYPE_CHECKING:
     import meshio
 
-    from warp_mca.model import Model
+    from warp_mca.model.model import Model
     from warp_mca.recorders.recorder import Frame, RunInfo
 
 USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import bad_value
-from warp_mca.files import check_folder, given_path
+from warp_mca.base.errors import bad_value
+from warp_mca.base.files import check_folder, given_path
+from warp_mca.base.validate import brief, is_list, is_number
 from warp_mca.scene import RigidPlane
-from warp_mca.validate import brief, is_list, is_number
 
 if TYPE_CHECKING:
-    from warp_mca.model import Model
+    from warp_mca.model.model import Model
     from warp_mca.scene import Scene
 
 Float = NDArray[np.float32]

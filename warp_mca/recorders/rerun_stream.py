@@ -19,10 +19,10 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
+from warp_mca.base.validate import kinds, members
 from warp_mca.recorders.colours import SLIP, STICK, ColourScale, check_limit, packed
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
-from warp_mca.validate import kinds, members
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from warp_mca.errors import McaError, bad_value
+from warp_mca.base.errors import McaError, bad_value
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
+from warp_mca.base.validate import brief, is_number
 from warp_mca.recorders.recorder import SURFACE, Cadence, Frame, RunInfo, check_file
-from warp_mca.validate import brief, is_number
 
 
 class SnapshotFile:

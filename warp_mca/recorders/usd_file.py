@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import bad_value
-from warp_mca.files import nearest
+from warp_mca.base.errors import bad_value
+from warp_mca.base.files import nearest
 from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, check_limit, levels
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, apart, check_file
 

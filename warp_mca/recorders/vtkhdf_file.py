@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.errors import RequestError, bad_value
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.recorders.mesh_file import cells
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
 
 if TYPE_CHECKING:
     import h5py
 
-    from warp_mca.model import Model
+    from warp_mca.model.model import Model
     from warp_mca.recorders.recorder import Frame, RunInfo
 
     _Datasets = dict[str, h5py.Dataset]

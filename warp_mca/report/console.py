@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from warp_mca.registry import SceneSource
     from warp_mca.report.quality import Quality
-    from warp_mca.results import Result
+    from warp_mca.results.result import Result
+    from warp_mca.scene.catalogue import SceneSource
 
 PIPED_WIDTH = 120  # characters in a line when the output is not a terminal
 

@@ -25,7 +25,7 @@ from warp_mca.report.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from warp_mca.results import Result
+    from warp_mca.results.result import Result
 
 # Change of kinetic energy, so that the small shares are not lost beside its size.
 CURVES = (

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.history import Interval, contact_intervals, intervals, phases, stick_intervals
 from warp_mca.report.style import (
     BLACK,
     BLUE,
@@ -27,12 +26,13 @@ from warp_mca.report.style import (
     save_png,
     tidy,
 )
+from warp_mca.results.force_history import Interval, contact_intervals, intervals, phases, stick_intervals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from warp_mca.results import Result
+    from warp_mca.results.result import Result
 
 COMPRESSION, RESTITUTION = "#5A5A5A", "#BDBDBD"
 REST = 1e-9  # share of the greatest energy of a run; contact forces that do less work are rounded at rest

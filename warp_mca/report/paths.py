@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from warp_mca.paths import PathHistory
-    from warp_mca.results import Result
+    from warp_mca.results.paths import PathHistory
+    from warp_mca.results.result import Result
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 
-from warp_mca.errors import bad_value
+from warp_mca.base.errors import bad_value
 from warp_mca.verify.case import CASES, Case, Level, Row, Setup, case
 
 GROUPS = ("elements", "material", "waves", "impact", "friction", "rigid")

@@ -43,10 +43,10 @@ class Imposed:
     """
 
     def __init__(self, setup: Setup, geometry: Mesh, kinematics: Kinematics = "corotational"):
-        from warp_mca.handoff import hand_off
-        from warp_mca.model import build_model, nodal_masses
-        from warp_mca.output import NodalStress
-        from warp_mca.solver import Solver
+        from warp_mca.model.model import build_model, nodal_masses
+        from warp_mca.rigid.handoff import hand_off
+        from warp_mca.solve.output import NodalStress
+        from warp_mca.solve.solver import Solver
 
         body = mca.Body(name="block", geometry=geometry, material=MATERIAL, kinematics=kinematics)
         scene = mca.Scene(name="imposed", bodies=(body,), impact=mca.ImpactPhase(duration=1.0))
@@ -262,7 +262,7 @@ def rigid_rotation(setup: Setup) -> list[Row]:
 
 
 def unconverged(gamma: float, precision: str) -> float:
-    """Error of the rotation's fixed number of iterations in simple shear [-]: see `kernels/rotation.py`."""
+    """Error of the rotation's fixed number of iterations in simple shear [-]: see `kernels/elements/rotation.py`."""
     stretch = 0.5 * (gamma + np.hypot(gamma, 2.0))
     for _ in range(2 if precision == "mixed" else 3):
         stretch = 0.5 * (stretch + 1.0 / stretch)

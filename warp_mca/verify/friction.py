@@ -23,8 +23,8 @@ def impulse(result: mca.Result) -> NDArray[np.float64]:
 
 def springs(setup: Setup, scene: mca.Scene) -> float:
     """Stiffness of all springs of the scene's contact together [N/m]: it depends on the faces of the element."""
-    from warp_mca.handoff import hand_off
-    from warp_mca.model import build_model, nodal_masses
+    from warp_mca.model.model import build_model, nodal_masses
+    from warp_mca.rigid.handoff import hand_off
 
     scene = setup.with_element(scene)
     meshes = mca.mesh(scene)

@@ -123,8 +123,8 @@ SPAN = 0.4  # of its motion [s]
 
 def _rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[Array, Array, float]:
     """Displacement of tip and of hinge A [m], each shape (2,), float64, and kinetic energy [J] after SPAN."""
-    from warp_mca.chain import Chain, mesh_link
-    from warp_mca.rigid import swing
+    from warp_mca.rigid.chain import Chain, mesh_link
+    from warp_mca.rigid.swing import swing
 
     links = [mesh_link(name, meshes[name].points, masses[name], hinge_out=(LENGTH, 0.0)) for name in ("OA", "AB")]
     chain = Chain(tuple(links), gravity=(0.0, -9.8))
@@ -186,8 +186,8 @@ class _Ends:
 )
 def fe_double_pendulum(setup: Setup) -> list[Row]:
     """Links of 1 m x 0.2 m x 0.1 m, 1000 and 2000 kg/m^3, E = 200 MPa and four times that; 0.4 s under gravity."""
-    from warp_mca.model import nodal_masses
-    from warp_mca.simulation import mesh
+    from warp_mca.model.model import nodal_masses
+    from warp_mca.runs.simulation import mesh
 
     moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))
     start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}

@@ -252,8 +252,8 @@ def yield_surface(setup: Setup) -> list[Row]:
     """20000 random states, driven beyond yield by a random strain of some percent, in both precisions."""
     import warp as wp
 
-    from warp_mca.kernels.j2 import return_map
-    from warp_mca.kernels.scalars import scalars
+    from warp_mca.kernels.hardware.scalars import scalars
+    from warp_mca.kernels.materials.j2 import return_map
 
     rng = np.random.default_rng(1)
     count, G = 20000, E / (2.0 * (1.0 + NU))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from warp_mca.verify.case import Row, Setup, case
 
 if TYPE_CHECKING:
-    from warp_mca.chain import Chain
-    from warp_mca.rigid import Swing
+    from warp_mca.rigid.chain import Chain
+    from warp_mca.rigid.swing import Swing
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ ROUND_OFF = 1e-12
 
 def slender_chain(count: int, gravity: float) -> Chain:
     """Equal slender rods of 0.21 m and 0.3 kg under `gravity` [m/s^2]."""
-    from warp_mca.chain import Chain, slender_link
+    from warp_mca.rigid.chain import Chain, slender_link
 
     length = 0.21
     links = tuple(slender_link(f"link{k}", (length, 0.0), mass=0.3, hinge_out=(length, 0.0)) for k in range(count))
@@ -31,7 +31,7 @@ def slender_chain(count: int, gravity: float) -> Chain:
 
 def crooked_chain(count: int, gravity: float) -> Chain:
     """Links of different mass and length, with centres and hinges off their axes, under `gravity` [m/s^2]."""
-    from warp_mca.chain import Chain, Link
+    from warp_mca.rigid.chain import Chain, Link
 
     links = tuple(
         Link(
@@ -48,7 +48,7 @@ def crooked_chain(count: int, gravity: float) -> Chain:
 
 def free_swing(chain: Chain, theta: Array, theta_dot: Array) -> Swing:
     """One second of the rigid phase, with nothing to touch."""
-    from warp_mca.rigid import swing
+    from warp_mca.rigid.swing import swing
 
     return swing(chain, theta, theta_dot, lambda t, _: SPAN - t, t_max=2.0 * SPAN)
 
@@ -174,10 +174,10 @@ def chain_energy(setup: Setup) -> list[Row]:
 )
 def handoff_conservation(setup: Setup) -> list[Row]:
     """The two-link manipulator at contact with inertia="mesh"; then back, with and without a vibration on top."""
-    from warp_mca.handback import hand_back
-    from warp_mca.handoff import hand_off
-    from warp_mca.model import nodal_masses
-    from warp_mca.simulation import mesh
+    from warp_mca.model.model import nodal_masses
+    from warp_mca.rigid.handback import hand_back
+    from warp_mca.rigid.handoff import hand_off
+    from warp_mca.runs.simulation import mesh
 
     scene = setup.with_element(setup.scene("two_link", rigid_inertia="mesh", duration=1e-6))
     meshes = mesh(scene)

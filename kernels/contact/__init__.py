@@ -1,0 +1,1 @@
+"""Owns the kernels of contact: search, projection, springs, friction."""

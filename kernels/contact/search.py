@@ -1,0 +1,212 @@
+"""Owns the broad phase of contact: which master faces each slave node may touch before the next search."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.projection import project_on_face
+from warp_mca.kernels.hardware.each import kind, value_function
+
+wp.set_module_options({"enable_backward": False})
+
+# Entries of the flag array that the host reads with every batch of records.
+FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
+
+
+@cache
+def bounds_kernel(each: bool) -> Any:
+    """Kernel: box of each face, deepened inwards by the face's size and widened by the margin; relative to `origin`,
+    so that float32 bounds stay fine. Clears the counts of the lists that `find_candidates` fills."""
+    of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
+
+    @wp.kernel(enable_backward=False, module="unique" if each else None)
+    def face_bounds(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        face: wp.array2d(dtype=wp.int32),
+        scene: Index,
+        scene_origin: Vector,
+        scene_margin: Real,
+        lower_out: wp.array(dtype=wp.vec3f),
+        upper_out: wp.array(dtype=wp.vec3f),
+        face_count_out: wp.array(dtype=wp.int32),
+    ):
+        f = wp.tid()
+        k = of(scene, f)
+        origin = of(scene_origin, k)
+        margin = of(scene_margin, k)
+        a = X[face[f, 0]] + u[face[f, 0]] - origin
+        b = X[face[f, 1]] + u[face[f, 1]] - origin
+        c = X[face[f, 2]] + u[face[f, 2]] - origin
+        d = X[face[f, 3]] + u[face[f, 3]] - origin
+        normal = wp.float64(0.5) * wp.cross(c - a, d - b)  # its length is the area
+        area = wp.length(normal)
+        inward = (-wp.sqrt(area) / area) * normal
+        lower = wp.min(wp.min(a, b), wp.min(c, d))
+        upper = wp.max(wp.max(a, b), wp.max(c, d))
+        reach = wp.vec3d(margin, margin, margin)
+        lower = wp.min(lower, lower + inward) - reach
+        upper = wp.max(upper, upper + inward) + reach
+        lower_out[f] = wp.vec3f(wp.float32(lower[0]), wp.float32(lower[1]), wp.float32(lower[2]))
+        upper_out[f] = wp.vec3f(wp.float32(upper[0]), wp.float32(upper[1]), wp.float32(upper[2]))
+        face_count_out[f] = 0
+
+    return face_bounds
+
+
+@cache
+def candidates_kernel(each: bool, sides: int) -> Any:
+    """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
+
+    With `each`, faces are grouped by scene, and a slave looks among those of its own. With more `sides` of the master,
+    a slave has a list for each of them, and goes by the number of that list.
+    """
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
+
+    @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
+    def find_candidates(
+        bvh: wp.uint64,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        slave: wp.array(dtype=wp.int32),
+        side: Side,
+        scene: Index,
+        origin: Vector,
+        count_out: wp.array(dtype=wp.int32),
+        candidate_out: wp.array2d(dtype=wp.int32),
+        face_count_out: wp.array(dtype=wp.int32),
+        face_slave_out: wp.array2d(dtype=wp.int32),
+        u_search_out: wp.array(dtype=wp.vec3d),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        s = wp.tid()
+        i = slave[s]
+        u_search_out[i] = u[i]
+        k = of(scene, s)
+        x = X[i] + u[i] - of(origin, k)
+        point = wp.vec3f(wp.float32(x[0]), wp.float32(x[1]), wp.float32(x[2]))
+        root = int(-1)  # of all faces
+        if wp.static(each):
+            root = wp.bvh_get_group_root(bvh, k)
+        query = wp.bvh_query_aabb(bvh, point, point, root)
+        f = int(0)
+        found = int(0)
+        if wp.static(sides > 1):
+            for p in range(wp.static(sides)):
+                count_out[wp.static(sides) * s + p] = 0
+        while wp.bvh_query_next(query, f):
+            row = wp.static(sides) * s + of_face(side, f)
+            if wp.static(sides > 1):
+                found = count_out[row]
+            if found < candidate_out.shape[1]:
+                candidate_out[row, found] = f
+                place = wp.atomic_add(face_count_out, f, 1)
+                if place < face_slave_out.shape[1]:
+                    face_slave_out[f, place] = row
+                else:
+                    flag_out[k, OVERFLOW] = 1
+            else:
+                flag_out[k, OVERFLOW] = 1
+            found += 1
+            if wp.static(sides > 1):
+                count_out[row] = wp.min(found, candidate_out.shape[1])
+        if wp.static(sides == 1):
+            count_out[s] = wp.min(found, candidate_out.shape[1])
+
+    return find_candidates
+
+
+@cache
+def clear_kernel(each: bool, sides: int) -> Any:
+    """Kernel: slave nodes whose nearest face has them in front of it hold no depth at the start.
+
+    With more `sides` of the master, a node that its nearest face has behind it holds none in the other sides. The lists
+    do not tell: of a body that is thinner than its faces are long they may hold the far side alone. Faces are looked
+    for as far away as their boxes are deep.
+    """
+    of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
+    of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
+
+    @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
+    def find_clear(
+        bvh: wp.uint64,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        slave: wp.array(dtype=wp.int32),
+        face: wp.array2d(dtype=wp.int32),
+        side: Side,
+        scene: Index,
+        origin: Vector,
+        longest: Real,
+        held_out: wp.array(dtype=wp.float64),
+    ):
+        s = wp.tid()
+        i = slave[s]
+        k = of(scene, s)
+        x = X[i] + u[i]
+        point = x - of(origin, k)
+        reach = of(longest, k)
+        lower = wp.vec3f(wp.float32(point[0] - reach), wp.float32(point[1] - reach), wp.float32(point[2] - reach))
+        upper = wp.vec3f(wp.float32(point[0] + reach), wp.float32(point[1] + reach), wp.float32(point[2] + reach))
+        root = int(-1)  # of all faces
+        if wp.static(each):
+            root = wp.bvh_get_group_root(bvh, k)
+        query = wp.bvh_query_aabb(bvh, lower, upper, root)
+        f = int(0)
+        nearest = wp.float64(wp.inf)
+        clear = bool(False)
+        behind = int(0)  # side of the nearest face
+        while wp.bvh_query_next(query, f):
+            inside, _at, away, area_normal, _triangle = project_on_face(X, u, face, f, x)
+            gap = wp.dot(away, wp.normalize(area_normal))
+            if inside and (wp.abs(gap) < nearest or (wp.abs(gap) == nearest and gap >= wp.float64(0.0))):
+                nearest = wp.abs(gap)
+                clear = gap >= wp.float64(0.0)
+                behind = of_face(side, f)
+        for p in range(wp.static(sides)):
+            if clear or p != behind:
+                held_out[wp.static(sides) * s + p] = wp.float64(0.0)
+
+    return find_clear
+
+
+# Those of a lone scene belong to this module, so they are made before it is loaded; a batch has its own modules.
+bounds_kernel(False)
+candidates_kernel(False, 1)
+clear_kernel(False, 1)
+
+
+@wp.kernel(enable_backward=False)
+def sort_lists(
+    face_count: wp.array(dtype=wp.int32),
+    face_slave_out: wp.array2d(dtype=wp.int32),
+):
+    """Sort each face's slaves, because threads filled the list in any order and sums must repeat bit for bit."""
+    f = wp.tid()
+    n = wp.min(face_count[f], face_slave_out.shape[1])
+    for a in range(1, n):
+        value = face_slave_out[f, a]
+        b = a - 1
+        while b >= 0 and face_slave_out[f, b] > value:
+            face_slave_out[f, b + 1] = face_slave_out[f, b]
+            b = b - 1
+        face_slave_out[f, b + 1] = value
+
+
+@wp.kernel(enable_backward=False)
+def mark_masters(
+    u: wp.array(dtype=wp.vec3d),
+    node: wp.array(dtype=wp.int32),
+    u_search_out: wp.array(dtype=wp.vec3d),
+):
+    """Remember where the master nodes were at the search."""
+    i = node[wp.tid()]
+    u_search_out[i] = u[i]
+
+
+@wp.func
+def moved_too_far(u: wp.vec3d, u_search: wp.vec3d, margin: wp.float64) -> bool:
+    """Whether a node moved more than half the margin since the search, so that a contact might be missed."""
+    return wp.length_sq(u - u_search) > wp.float64(0.25) * margin * margin

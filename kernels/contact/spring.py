@@ -1,0 +1,226 @@
+"""Owns the springs between slave nodes and what they touch: their state, forces, bookkeeping and sums."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.friction import release, stick_slip
+from warp_mca.kernels.records.ledger import run_of
+
+wp.set_module_options({"enable_backward": False})
+
+FAR = 1e30  # further than anything [m]
+ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
+
+
+@wp.struct
+class Spring:
+    """State of every slave node's springs; arrays have shape (slave_count,).
+
+    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1.
+    weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
+    far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
+    force and normal force while sticking, summed over the steps since the last row of the history [N]. depth: largest
+    penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
+    in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
+    stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
+    became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free.
+    """
+
+    tangential: wp.array(dtype=wp.vec3d)
+    force: wp.array(dtype=wp.vec3d)
+    face: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.vec4d)
+    energy: wp.array(dtype=wp.float64)
+    friction: wp.array(dtype=wp.float64)
+    drive: wp.array(dtype=wp.float64)
+    impulse: wp.array(dtype=wp.vec3d)
+    normal_impulse: wp.array(dtype=wp.float64)
+    stick_impulse: wp.array(dtype=wp.float64)
+    depth: wp.array(dtype=wp.float64)
+    held: wp.array(dtype=wp.float64)
+    stiffness: wp.array(dtype=wp.float64)
+    lost: wp.array(dtype=wp.float64)
+    rest: wp.array(dtype=wp.float64)
+
+
+@cache
+def rest_function(stress_free: bool) -> Any:
+    """The function that measures a gap from where a spring is free of force: the face, or the overlap at the start.
+
+    That overlap shrinks as the node moves outwards, and does not grow again.
+    """
+
+    @wp.func
+    def gap_from_rest(s: int, gap: wp.float64, spring: Spring):
+        if wp.static(stress_free):
+            rest = wp.min(spring.rest[s], wp.max(-gap, wp.float64(0.0)))
+            spring.rest[s] = rest
+            gap += rest
+        return gap
+
+    return gap_from_rest
+
+
+@cache
+def spring_function(friction: bool) -> Any:
+    """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential."""
+
+    @wp.func
+    def soften(s: int, gap: wp.float64, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring):
+        """Book what a pressed spring loses as its stiffness falls; the share that is left."""
+        # Along the normal, the work of the mean force of two steps less the change of k g^2 / 2 is
+        # (k_old - k) g_old g / 2. Along the surface the spring keeps its length f / k.
+        share = k / k_old
+        pressed = spring.force[s]
+        lost = wp.float64(0.0)
+        if wp.static(friction):
+            pressed -= spring.tangential[s]
+            lost = (wp.float64(1.0) - share) * release(spring.tangential[s], du, k_old)
+        lost -= wp.float64(0.5) * (wp.float64(1.0) - share) * wp.length(pressed) * gap
+        spring.lost[s] = spring.lost[s] + lost
+        return share
+
+    @wp.func
+    def press(
+        s: int,
+        gap: wp.float64,
+        normal: wp.vec3d,
+        du: wp.vec3d,
+        k_old: wp.float64,
+        k: wp.float64,
+        mu: wp.float64,
+        spring: Spring,
+    ):
+        """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force."""
+        # all is read before anything is written, so that a GPU waits for memory once
+        impulse = spring.impulse[s]
+        normal_impulse = spring.normal_impulse[s]
+        depth = spring.depth[s]
+        Fn = -k * gap
+        force = Fn * normal
+        squares = Fn * Fn
+        if wp.static(not friction):
+            if k < k_old:
+                soften(s, gap, du, k_old, k, spring)
+        if wp.static(friction):
+            friction_work = spring.friction[s]
+            stick_impulse = spring.stick_impulse[s]
+            f_old = spring.tangential[s]
+            if k < k_old:
+                f_old = soften(s, gap, du, k_old, k, spring) * f_old
+            Ft, work, stick = stick_slip(f_old, du, normal, mu * Fn, k)
+            force += Ft
+            squares += wp.dot(Ft, Ft)
+            spring.tangential[s] = Ft
+            spring.friction[s] = friction_work + work
+            if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
+                spring.stick_impulse[s] = stick_impulse + Fn
+        spring.energy[s] = wp.float64(0.5) * squares / k
+        spring.force[s] = force
+        spring.impulse[s] = impulse + force
+        spring.normal_impulse[s] = normal_impulse + Fn
+        spring.depth[s] = wp.max(depth, -gap)
+        return force, Fn
+
+    return press
+
+
+@cache
+def open_function(friction: bool) -> Any:
+    """The function that clears the springs of a node that lost its contact."""
+
+    @wp.func
+    def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):
+        if wp.static(friction):
+            spring.friction[s] = spring.friction[s] + release(spring.tangential[s], du, k)
+            spring.tangential[s] = wp.vec3d()
+        spring.energy[s] = wp.float64(0.0)
+        spring.force[s] = wp.vec3d()
+        spring.face[s] = -1
+
+    return open_contact
+
+
+@wp.kernel(enable_backward=False)
+def sum_springs(
+    row: wp.array(dtype=wp.int32),
+    column: int,
+    first: wp.array(dtype=wp.int32),
+    afresh: bool,
+    spring: Spring,
+    partial_out: wp.array4d(dtype=wp.float64),
+):
+    """Sums over the slaves of each scene, which begin at `first`, into PASS_COLUMNS columns, as `records.ledger` sums.
+
+    With `afresh`, what is summed over an output interval then starts again from zero. The last columns are of the state
+    at the record: the vector sum of the normal forces [N], their sum [N], the energy that the normal springs hold [J],
+    the energy that springs lost as they became softer [J], and the sum of the squares of the normal forces [N^2].
+    """
+    scene, k, lane = wp.tid()
+    energy = wp.float64(0.0)
+    friction = wp.float64(0.0)
+    drive = wp.float64(0.0)
+    impulse = wp.vec3d()
+    normal = wp.float64(0.0)
+    stick = wp.float64(0.0)
+    pressed = wp.vec3d()
+    pressure = wp.float64(0.0)
+    pressed_energy = wp.float64(0.0)
+    lost = wp.float64(0.0)
+    squares = wp.float64(0.0)
+    begin, end = run_of(first[scene], first[scene + 1], k)
+    for s in range(begin + lane, end, wp.block_dim()):
+        held = spring.energy[s]
+        energy += held
+        if held > wp.float64(0.0):
+            Ft = spring.tangential[s]
+            Fn = spring.force[s] - Ft
+            square = wp.dot(Fn, Fn)
+            pressed += Fn
+            pressure += wp.sqrt(square)
+            pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
+            squares += square
+        friction += spring.friction[s]
+        drive += spring.drive[s]
+        impulse += spring.impulse[s]
+        normal += spring.normal_impulse[s]
+        stick += spring.stick_impulse[s]
+        lost += spring.lost[s]
+        if afresh:
+            spring.impulse[s] = wp.vec3d()
+            spring.normal_impulse[s] = wp.float64(0.0)
+            spring.stick_impulse[s] = wp.float64(0.0)
+    energy_sum = wp.tile_sum(wp.tile(energy))
+    friction_sum = wp.tile_sum(wp.tile(friction))
+    drive_sum = wp.tile_sum(wp.tile(drive))
+    x_sum = wp.tile_sum(wp.tile(impulse[0]))
+    y_sum = wp.tile_sum(wp.tile(impulse[1]))
+    z_sum = wp.tile_sum(wp.tile(impulse[2]))
+    normal_sum = wp.tile_sum(wp.tile(normal))
+    stick_sum = wp.tile_sum(wp.tile(stick))
+    pressed_x_sum = wp.tile_sum(wp.tile(pressed[0]))
+    pressed_y_sum = wp.tile_sum(wp.tile(pressed[1]))
+    pressed_z_sum = wp.tile_sum(wp.tile(pressed[2]))
+    pressure_sum = wp.tile_sum(wp.tile(pressure))
+    pressed_energy_sum = wp.tile_sum(wp.tile(pressed_energy))
+    lost_sum = wp.tile_sum(wp.tile(lost))
+    squares_sum = wp.tile_sum(wp.tile(squares))
+    if lane == 0:
+        r = row[0]
+        partial_out[r, scene, column, k] = energy_sum[0]
+        partial_out[r, scene, column + 1, k] = friction_sum[0]
+        partial_out[r, scene, column + 2, k] = drive_sum[0]
+        partial_out[r, scene, column + 3, k] = x_sum[0]
+        partial_out[r, scene, column + 4, k] = y_sum[0]
+        partial_out[r, scene, column + 5, k] = z_sum[0]
+        partial_out[r, scene, column + 6, k] = normal_sum[0]
+        partial_out[r, scene, column + 7, k] = stick_sum[0]
+        partial_out[r, scene, column + 8, k] = pressed_x_sum[0]
+        partial_out[r, scene, column + 9, k] = pressed_y_sum[0]
+        partial_out[r, scene, column + 10, k] = pressed_z_sum[0]
+        partial_out[r, scene, column + 11, k] = pressure_sum[0]
+        partial_out[r, scene, column + 12, k] = pressed_energy_sum[0]
+        partial_out[r, scene, column + 13, k] = lost_sum[0]
+        partial_out[r, scene, column + 14, k] = squares_sum[0]

@@ -1,0 +1,1 @@
+"""Owns the kernels of internal forces of the elements."""

@@ -1,0 +1,147 @@
+"""Owns the trilinear hexahedron in its monomials: xi, eta, zeta, eta zeta, zeta xi, xi eta, xi eta zeta.
+
+A field over the corners turns into sums with the signs of each monomial (rows of a 7 x 3 matrix; a constant is left
+out), which is what one-point elements need: the first three give the edges, the others the hourglass modes.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.fused import NOTHING, fused
+from warp_mca.kernels.elements.rotation import nearest_rotation
+from warp_mca.kernels.hardware.scalars import scalars
+
+wp.set_module_options({"enable_backward": False})
+
+VOLUME_SCALE = 1.0 / 64.0  # of a volume over what `mean_gradients` gives, and of gradients times volume
+
+
+@cache
+def pattern_sum_function(scalar: Any) -> Any:
+    """The function corner values -> pattern sums, of a scalar type, integers too."""
+    mat73, mat83 = wp.types.matrix((7, 3), scalar), wp.types.matrix((8, 3), scalar)
+
+    @wp.func
+    def to_patterns(x: mat83):
+        p = mat73()
+        # along xi
+        s0 = x[1] + x[0]
+        s1 = x[2] + x[3]
+        s2 = x[5] + x[4]
+        s3 = x[6] + x[7]
+        d0 = x[1] - x[0]
+        d1 = x[2] - x[3]
+        d2 = x[5] - x[4]
+        d3 = x[6] - x[7]
+        # along eta, then zeta
+        ss_low = s0 + s1
+        ss_top = s2 + s3
+        sd_low = s1 - s0
+        sd_top = s3 - s2
+        ds_low = d0 + d1
+        ds_top = d2 + d3
+        dd_low = d1 - d0
+        dd_top = d3 - d2
+        p[0] = ds_low + ds_top
+        p[1] = sd_low + sd_top
+        p[2] = ss_top - ss_low
+        p[3] = sd_top - sd_low
+        p[4] = ds_top - ds_low
+        p[5] = dd_low + dd_top
+        p[6] = dd_top - dd_low
+        return p
+
+    return to_patterns
+
+
+@cache
+def pattern_functions(precision: str) -> tuple[Any, Any]:
+    """Functions (corner values -> pattern sums; pattern forces -> corner forces, the transpose)."""
+    t = scalars(precision)
+    mat73, mat83 = t.mat73, t.mat83
+
+    @wp.func
+    def to_corners(p: mat73):
+        f = mat83()
+        ds_low = p[0] - p[4]
+        ds_top = p[0] + p[4]
+        sd_low = p[1] - p[3]
+        sd_top = p[1] + p[3]
+        dd_low = p[5] - p[6]
+        dd_top = p[5] + p[6]
+        s0 = -p[2] - sd_low
+        s1 = sd_low - p[2]
+        s2 = p[2] - sd_top
+        s3 = p[2] + sd_top
+        d0 = ds_low - dd_low
+        d1 = ds_low + dd_low
+        d2 = ds_top - dd_top
+        d3 = ds_top + dd_top
+        f[0] = s0 - d0
+        f[1] = s0 + d0
+        f[2] = s1 + d1
+        f[3] = s1 - d1
+        f[4] = s2 - d2
+        f[5] = s2 + d2
+        f[6] = s3 + d3
+        f[7] = s3 - d3
+        return f
+
+    return pattern_sum_function(t.real), to_corners
+
+
+@cache
+def mean_functions(precision: str) -> tuple[Any, Any]:
+    """Functions (patterns -> mean gradients times volume, and volume; mean displacement gradient).
+
+    The volume is cubic in the patterns: with edges a and hourglass vectors h,
+    V = 8 ([a1 a2 a3] + ([a1 h3 h2] + [a2 h1 h3] + [a3 h2 h1]) / 3); gradients are its derivatives, none along the last.
+    """
+    t = scalars(precision)
+    R, mat33, mat63, mat73 = t.real, t.mat33, t.mat63, t.mat73
+    add_cross = fused(precision).add_cross
+
+    @wp.func
+    def mean_gradients(x: mat73):
+        third = R(1.0) / R(3.0)
+        b = mat63()
+        h1 = third * x[3]
+        h2 = third * x[4]
+        h3 = third * x[5]
+        area = wp.cross(x[1], x[2])
+        b[0] = add_cross(area, h3, x[4])
+        b[1] = add_cross(wp.cross(x[2], x[0]), h1, x[5])
+        b[2] = add_cross(wp.cross(x[0], x[1]), h2, x[3])
+        b[3] = add_cross(wp.cross(h3, x[1]), x[2], h2)
+        b[4] = add_cross(wp.cross(h1, x[2]), x[0], h3)
+        b[5] = add_cross(wp.cross(h2, x[0]), x[1], h1)
+        bent = wp.dot(x[3], b[3]) + wp.dot(x[4], b[4]) + wp.dot(x[5], b[5])  # Euler's theorem: of second degree in h
+        return b, wp.dot(x[0], area) + R(0.5) * bent
+
+    @wp.func
+    def mean_gradient_of(u: mat73, b: mat63, volume: R):
+        H = mat33(R(NOTHING))
+        for p in range(6):
+            H = H + wp.outer(u[p], b[p])
+        return H / volume
+
+    return mean_gradients, mean_gradient_of
+
+
+@cache
+def mean_frame(precision: str, finite: bool = False) -> Any:
+    """The function H -> (rotation of the mean deformation gradient I + H as W = Q - I, H in the rotated frame)."""
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    polar_rotation = nearest_rotation(precision, finite)
+    add_matrices = fused(precision).add_matrices
+
+    @wp.func
+    def rotated(H: mat33):
+        F = wp.identity(n=3, dtype=R) + H
+        W = polar_rotation(F)
+        return W, add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without the digits that would cancel
+
+    return rotated

@@ -1,0 +1,274 @@
+"""Owns the 4-node tetrahedron with averaged nodal pressure.
+
+The volume change is averaged over the elements of one material around each node, so that neither nearly
+incompressible elasticity nor plastic flow locks: Bonet and Burton, Commun. Numer. Meth. Engng 14 (1998) 437. Three
+kernels follow each other: volume changes of elements, their means at nodes, forces.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.fused import fused
+from warp_mca.kernels.elements.hexahedron import history_functions, stress_function
+from warp_mca.kernels.elements.kinematics import kinematics
+from warp_mca.kernels.elements.patterns import mean_frame
+from warp_mca.kernels.hardware.overlap import begins_early, wait_for_previous
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.materials.laws import law_functions
+from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def gradient_function(precision: str, finite: bool) -> Any:
+    """The function (X, conn, u, e) -> (W, H, cofactors of the edges as rows, volume, J): rotation W = Q - I."""
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    rotated = mean_frame(precision, finite)
+
+    @wp.func
+    def edge(field: wp.array(dtype=wp.vec3d), i: int, j: int):
+        d = field[j] - field[i]
+        return vec3(R(d[0]), R(d[1]), R(d[2]))
+
+    @wp.func
+    def tet_gradient(
+        X: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), u: wp.array(dtype=wp.vec3d), e: int
+    ):
+        n = conn[0, e]
+        d0 = edge(X, n, conn[1, e])
+        d1 = edge(X, n, conn[2, e])
+        d2 = edge(X, n, conn[3, e])
+        l0 = edge(u, n, conn[1, e])
+        l1 = edge(u, n, conn[2, e])
+        l2 = edge(u, n, conn[3, e])
+        c0 = wp.cross(d1, d2)
+        c1 = wp.cross(d2, d0)
+        c2 = wp.cross(d0, d1)
+        det = wp.dot(d0, c0)
+        inverse = R(1.0) / det
+        H = inverse * (wp.outer(l0, c0) + wp.outer(l1, c1) + wp.outer(l2, c2))
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H)
+        W, H = rotated(H)
+        rows = mat33(c0[0], c0[1], c0[2], c1[0], c1[1], c1[2], c2[0], c2[1], c2[2])
+        return W, H, rows, det / R(6.0), J
+
+    return tet_gradient
+
+
+@cache
+def dilation_kernel(precision: str, finite: bool) -> Any:
+    """Kernel: change of volume of each element [m^3]."""
+    R = scalars(precision).real
+    tet_gradient = gradient_function(precision, finite)
+    dilation_of = kinematics(precision, finite).dilation
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def tet4_dilation(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        u: wp.array(dtype=wp.vec3d),
+        growth_out: wp.array(dtype=R),
+    ):
+        wait_for_previous()
+        e = wp.tid()
+        _W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
+        growth_out[e] = volume * dilation_of(H)
+
+    return begins_early(tet4_dilation)
+
+
+@cache
+def average_kernel(precision: str) -> Any:
+    """Kernel: mean dilatation J - 1 [-] of the elements around each pressure node."""
+    R = scalars(precision).real
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def tet4_average(
+        offset: wp.array(dtype=wp.int32),
+        element: wp.array(dtype=wp.int32),
+        inverse_volume: wp.array(dtype=R),
+        growth: wp.array(dtype=R),
+        dilation_out: wp.array(dtype=R),
+    ):
+        wait_for_previous()
+        i = wp.tid()
+        total = R(0.0)
+        for j in range(offset[i], offset[i + 1]):
+            total += growth[element[j]]
+        dilation_out[i] = inverse_volume[i] * total
+
+    return begins_early(tet4_average)
+
+
+@cache
+def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    tet_gradient = gradient_function(precision, finite)
+    read_plastic_strain, write_plastic_strain = history_functions(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
+    add_matrices = fused(precision).add_matrices
+    keep_strain, keep_volume, _ = keep_functions(R)
+    k = kinematics(precision, finite)
+    deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
+
+    # ln(1 + x) of small x needs the rounding that fast math gives away
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
+    def tet4_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        count: int,
+        group: wp.array2d(dtype=wp.int32),
+        dilation: wp.array(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        wait_for_previous()
+        e = wp.tid()
+        W, H, c, _volume, J = tet_gradient(X, conn, u, e)
+        m = material[e]
+        G = law[m, 1]
+        pressure = R(0.0)
+        for a in range(4):
+            pressure += R(0.25) * pressure_of(law[m, 0], dilation[group[a, e]])
+        strain, N, d = deviator(H)
+        S = R(2.0) * G * strain
+        keep_strain(e, wp.ddot(strain, strain), extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
+        if wp.static(plastic):
+            eps_p = mat33()
+            p = R(0.0)
+            flag = yielded_out[e]
+            if flag != 0:
+                eps_p, p = read_plastic_strain(history_out, 0, e)
+            S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
+            if p_new > p:
+                write_plastic_strain(history_out, 0, e, eps_new, p_new)
+                if flag == 0:
+                    yielded_out[e] = int(1)
+        P = nominal(H, S, N, d, pressure)
+        P = R(-0.5) * R(THIRD) * add_matrices(P, W, P)
+        f0 = P * c[0]
+        f1 = P * c[1]
+        f2 = P * c[2]
+        for i in range(3):  # by components, as in `hexahedron.store_function`
+            force_out[slot + e][i] = -f0[i] - f1[i] - f2[i]
+            force_out[slot + count + e][i] = f0[i]
+            force_out[slot + 2 * count + e][i] = f1[i]
+            force_out[slot + 3 * count + e][i] = f2[i]
+
+    return begins_early(tet4_force)
+
+
+@cache
+def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    tet_gradient = gradient_function(precision, finite)
+    read_plastic_strain, _ = history_functions(precision)
+    plastic, functions = bool(law_name), law_functions(law_name, precision)
+    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
+    k = kinematics(precision, finite)
+    deviator, volumetric_energy = k.deviator, k.volumetric_energy
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
+    def tet4_energy(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        yielded: wp.array(dtype=wp.int32),
+        history: wp.array2d(dtype=R),
+        extreme: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        first: int,
+        group: wp.array2d(dtype=wp.int32),
+        dilation: wp.array(dtype=R),
+        energy_out: wp.array2d(dtype=R),
+    ):
+        e = wp.tid()
+        W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
+        m = material[e]
+        elastic = R(0.0)
+        for a in range(4):
+            elastic += R(0.25) * volumetric_energy(law[m, 0], dilation[group[a, e]])
+        strain, _N, _d = deviator(H)
+        eps_p = mat33()
+        dissipated = R(0.0)
+        if wp.static(plastic):
+            if yielded[e] != 0:
+                eps_p, p = read_plastic_strain(history, 0, e)
+                dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
+        elastic += law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
+        energy_out[0, first + e] = volume * elastic
+        energy_out[1, first + e] = dissipated
+        identity = wp.identity(n=3, dtype=R)
+        square = wp.max(wp.ddot(strain, strain), extreme[STRAIN_SQUARE, e])
+        J = wp.determinant(identity + H) * wp.determinant(identity + W)
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * square)
+        energy_out[3, first + e] = wp.min(J, R(1.0) - extreme[VOLUME_LOSS, e])
+        energy_out[4, first + e] = R(0.0)
+
+    return tet4_energy
+
+
+@cache
+def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    tet_gradient = gradient_function(precision, finite)
+    read_plastic_strain, _ = history_functions(precision)
+    plastic = bool(law_name)
+    write_stress = stress_function(precision)
+    k = kinematics(precision, finite)
+    deviator, pressure_of, cauchy = k.deviator, k.pressure, k.cauchy
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def tet4_stress(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        yielded: wp.array(dtype=wp.int32),
+        history: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        element: wp.array(dtype=wp.int32),
+        first: int,
+        group: wp.array2d(dtype=wp.int32),
+        dilation: wp.array(dtype=R),
+        stress_out: wp.array2d(dtype=wp.float32),
+    ):
+        item = wp.tid()
+        e = element[item]
+        W, H, _c, _volume, _J = tet_gradient(X, conn, u, e)
+        m = material[e]
+        pressure = R(0.0)
+        for a in range(4):
+            pressure += R(0.25) * pressure_of(law[m, 0], dilation[group[a, e]])
+        eps_p = mat33()
+        p = R(0.0)
+        if wp.static(plastic):
+            if yielded[e] != 0:
+                eps_p, p = read_plastic_strain(history, 0, e)
+        strain, N, d = deviator(H)
+        local = cauchy(H, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure)
+        Q = wp.identity(n=3, dtype=R) + W
+        sigma = Q * local * wp.transpose(Q)
+        for a in range(4):
+            write_stress(stress_out, first + 4 * item + a, sigma, p)
+
+    return tet4_stress

@@ -1,0 +1,1 @@
+"""Owns the kernels of what depends on the device: scalars, lanes, shared memory, launches."""

@@ -1,0 +1,169 @@
+"""Owns how bound nodes are advanced: pairs in a revolute joint, and nodes with prescribed velocities."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.hardware.each import kind, value_function
+from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
+from warp_mca.kernels.records.extremes import keep_speed
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Bonds:
+    """What binds the nodes of a model.
+
+    Attributes:
+        first, second: nodes of each tied pair, second -1 where that is the ground, shape (pair_count,), int32.
+        node: driven nodes, shape (driven_count,), int32.
+        begin, end: entries of the table of each driven node's axes, -1 where an axis is free, shape (driven_count,),
+            vec3i.
+        times, values: of all tables [s], [m/s], float64.
+    """
+
+    first: wp.array(dtype=wp.int32)
+    second: wp.array(dtype=wp.int32)
+    node: wp.array(dtype=wp.int32)
+    begin: wp.array(dtype=wp.vec3i)
+    end: wp.array(dtype=wp.vec3i)
+    times: wp.array(dtype=wp.float64)
+    values: wp.array(dtype=wp.float64)
+
+
+@wp.func
+def weighted_mean(m_a: wp.float64, a: wp.vec3d, m_b: wp.float64, b: wp.vec3d) -> wp.vec3d:
+    """Mass-weighted mean of two vectors: the common velocity that keeps their momentum."""
+    return (m_a * a + m_b * b) / (m_a + m_b)
+
+
+@wp.func
+def table_value(times: wp.array(dtype=wp.float64), values: wp.array(dtype=wp.float64), a: int, b: int, t: wp.float64):
+    """Linear interpolation in the entries [a, b) of a table, constant beyond its ends."""
+    if b == a + 1:
+        return values[a]
+    if t <= times[a]:
+        return values[a]
+    for k in range(a + 1, b):
+        if t <= times[k]:
+            s = (t - times[k - 1]) / (times[k] - times[k - 1])
+            return values[k - 1] + s * (values[k] - values[k - 1])
+    return values[b - 1]
+
+
+@wp.func
+def drive(
+    k: int,
+    m: wp.float64,
+    dt: wp.float64,
+    bonds: Bonds,
+    free: wp.vec3d,
+    work_out: wp.array(dtype=wp.vec3d),
+    work_after_out: wp.array(dtype=wp.vec3d),
+    clock_out: wp.array(dtype=wp.int32),
+):
+    """v(n+1/2) of a node whose driven axes take theirs from a table at its own time; sums the work that this puts in.
+
+    The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
+    v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each node counts its own steps in
+    clock_out, so that none waits for a common clock.
+    """
+    t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
+    clock_out[k] = clock_out[k] + 1
+    begin = bonds.begin[k]
+    end = bonds.end[k]
+    v = free
+    work = work_after_out[k]
+    after = work
+    for c in range(3):
+        if begin[c] >= 0:
+            target = table_value(bonds.times, bonds.values, begin[c], end[c], t)
+            before = table_value(bonds.times, bonds.values, begin[c], end[c], t - dt)
+            half_impulse = wp.float64(0.5) * m * (target - free[c])
+            v[c] = target
+            work[c] = work[c] + half_impulse * before
+            after[c] = work[c] + half_impulse * target
+    work_out[k] = work
+    work_after_out[k] = after
+    return v
+
+
+@cache
+def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
+    """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
+
+    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground.
+    impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
+    """
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    vec3 = scalars(precision).vec3
+    gather = gather_function(precision)
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def advance_bound(
+        mass: wp.array(dtype=wp.float64),
+        inverse_mass: wp.array(dtype=wp.float64),
+        near: wp.array(dtype=wp.vec2i),
+        more: wp.array(dtype=wp.vec4i),
+        role: wp.array(dtype=wp.uint8),
+        force: wp.array(dtype=vec3),
+        scene: Index,
+        gravity: Vector,
+        bonds: Bonds,
+        dt: wp.float64,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d),
+        v_before_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
+        impulse_out: wp.array(dtype=wp.vec3d),
+        work_out: wp.array(dtype=wp.vec3d),
+        work_after_out: wp.array(dtype=wp.vec3d),
+        clock_out: wp.array(dtype=wp.int32),
+    ):
+        wait_for_previous()
+        let_next_begin()
+        k = wp.tid()
+        pairs = bonds.first.shape[0]
+        i = int(-1)
+        if k < pairs:
+            i = bonds.first[k]
+        else:
+            i = bonds.node[k - pairs]
+        total = gather(near[i], more, force)
+        if wp.static(contact):
+            total += take_contact(i, contact_force_out)
+        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
+        free = v_out[i] + dt * a
+        u_free = u_out[i] + dt * free
+        if v_before_out.shape[0] > 0:
+            v_before_out[i] = v_out[i]
+        u = wp.vec3d()
+        v = wp.vec3d()
+        if k < pairs:
+            j = bonds.second[k]
+            if j >= 0:
+                if v_before_out.shape[0] > 0:
+                    v_before_out[j] = v_out[j]
+                total = gather(near[j], more, force)
+                if wp.static(contact):
+                    total += take_contact(j, contact_force_out)
+                v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
+                u = weighted_mean(mass[i], u_free, mass[j], u_out[j] + dt * v_j)
+                v = weighted_mean(mass[i], free, mass[j], v_j)
+                u_out[j] = u
+                v_out[j] = v
+                keep_speed(j, v, speed_square_out)
+            impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
+        else:
+            v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
+            u = u_free + dt * (v - free)
+        u_out[i] = u
+        v_out[i] = v
+        keep_speed(i, v, speed_square_out)
+
+    return begins_early(advance_bound)

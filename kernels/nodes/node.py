@@ -1,0 +1,145 @@
+"""Owns the nodal stage: forces gathered from the elements, velocity and displacement advanced."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.hardware.each import kind, value_function
+from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
+
+wp.set_module_options({"enable_backward": False})
+
+# In the role of a node, whose lowest three bits are its axes at rest:
+BOUND = 8  # `kernels.nodes.constraint` advances it
+TOUCHABLE = 16  # it belongs to a surface of a contact
+
+KEEPERS = 32  # threads that keep the greatest normal force of each scene
+
+
+@cache
+def gather_function(precision: str) -> Any:
+    """The function that sums the forces of elements on a node, in the slots that `near` and `more` list.
+
+    Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`.
+    """
+    vec3 = scalars(precision).vec3
+
+    @wp.func
+    def force_at(slot: int, force: wp.array(dtype=vec3)):
+        f = force[slot]
+        return wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
+
+    @wp.func
+    def gather(pair: wp.vec2i, more: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
+        total = force_at(pair[0], force)
+        second = force_at(wp.max(pair[1], 0), force)
+        if pair[1] >= 0:
+            total += second
+        row = -2 - pair[1]
+        end = row
+        if row >= 0:
+            end += more[row][3]
+        while row < end:
+            r = more[row]
+            total += force_at(r[0], force)
+            if r[1] >= 0:
+                total += force_at(r[1], force)
+            if r[2] >= 0:
+                total += force_at(r[2], force)
+            row += 1
+        return total
+
+    return gather
+
+
+@wp.func
+def take_contact(i: int, contact_force_out: wp.array(dtype=wp.vec3d)):
+    """The contact force on a node, which is given once."""
+    fc = contact_force_out[i]
+    if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
+        contact_force_out[i] = wp.vec3d()
+    return fc
+
+
+@wp.func
+def hold(role: int, a: wp.vec3d):
+    """The acceleration without that of the axes at rest."""
+    for k in range(3):
+        if (role >> k) & 1 != 0:
+            a[k] = wp.float64(0.0)
+    return a
+
+
+@cache
+def integrate_kernel(
+    precision: str,
+    contact: bool,
+    fixed: bool,
+    bound: bool = False,
+    each: bool = False,
+    early: bool = False,
+) -> Any:
+    """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
+
+    Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
+    where it is not empty. speed_square_out keeps the greatest v^2, see `extremes.keep_speed`. With `contact`, KEEPERS
+    threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
+    some nodes are left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and
+    nodes know their scene. `early`: the next kernel takes its places as soon as nodes leave some.
+    """
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    vec3 = scalars(precision).vec3
+    gather = gather_function(precision)
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def integrate(
+        inverse_mass: wp.array(dtype=wp.float64),
+        near: wp.array(dtype=wp.vec2i),
+        more: wp.array(dtype=wp.vec4i),
+        role: wp.array(dtype=wp.uint8),
+        force: wp.array(dtype=vec3),
+        scene: Index,
+        gravity: Vector,
+        kick: wp.float64,
+        drift: wp.float64,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d),
+        v_before_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
+        normal_force_out: wp.array2d(dtype=wp.int64),
+    ):
+        if wp.static(early):
+            let_next_begin()
+        i = wp.tid()
+        beyond = i - u_out.shape[0]
+        if wp.static(contact):
+            i = wp.min(i, u_out.shape[0] - 1)
+        pair = near[i]
+        inverse = inverse_mass[i]
+        wait_for_previous()
+        if wp.static(contact):
+            if beyond >= 0:  # no node waits for the sums
+                keep_normal_force(beyond, wp.static(KEEPERS), normal_force_out)
+                return
+        if wp.static(bound):
+            if int(role[i]) & wp.static(BOUND) != 0:
+                return
+        total = gather(pair, more, force)
+        if wp.static(contact):
+            if int(role[i]) & wp.static(TOUCHABLE) != 0:
+                total += take_contact(i, contact_force_out)
+        a = inverse * total + of(gravity, of(scene, i))
+        if wp.static(fixed):
+            a = hold(int(role[i]), a)
+        v = v_out[i] + kick * a
+        if v_before_out.shape[0] > 0:
+            v_before_out[i] = v_out[i]
+        v_out[i] = v
+        u_out[i] = u_out[i] + drift * v
+        keep_speed(i, v, speed_square_out)
+
+    return begins_early(integrate)

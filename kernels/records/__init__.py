@@ -1,0 +1,1 @@
+"""Owns the kernels of sums and fields that a run records."""

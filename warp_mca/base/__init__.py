@@ -1,0 +1,1 @@
+"""Owns what every part uses: errors, validation, files, rotations."""

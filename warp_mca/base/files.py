@@ -1,0 +1,48 @@
+"""Owns what users give as paths: whether one is a path, and can be written."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from warp_mca.base.errors import bad_value
+from warp_mca.base.validate import brief
+
+
+def given_path(field: str, value: object, remedy: str) -> Path:
+    """What the user named `field` as a path; an empty name would be the folder that one is in.
+
+    Raises:
+        RequestError: it is no path.
+    """
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not (isinstance(text, str) and text and "\0" not in text):
+        raise bad_value(field, brief(value), remedy)
+    return Path(text)
+
+
+def nearest(path: Path) -> Path:
+    """The path itself, or the closest of its parents that exists."""
+    return next(p for p in (path, *path.absolute().parents) if p.exists())
+
+
+def check_folder(field: str, path: Path) -> None:
+    """Refuses a path that cannot be made: what exists of it takes no file.
+
+    Raises:
+        RequestError: so it is, of what the user named `field`.
+    """
+    try:
+        existing = nearest(path)
+    except FileNotFoundError:  # the working directory is gone, which is no fault of the name
+        raise
+    except OSError as error:  # as of a name that is too long
+        raise bad_value(field, str(path), f"{error.strerror or error}; name another") from error
+    if not existing.is_dir():
+        raise bad_value(field, str(path), f"{existing} is not a folder; name another")
+    try:  # root may write to folders that take no file all the same
+        tempfile.TemporaryDirectory(prefix=".warp_mca-", dir=existing).cleanup()
+    except OSError as error:
+        what = f"{existing} cannot be written to ({error.strerror or error}); name another"
+        raise bad_value(field, str(path), what) from error

@@ -1,0 +1,197 @@
+"""Owns the checks of what users give: values of scenes, recipes and runs, code of their own, damaged files."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+import struct
+import tokenize
+import traceback
+import zipfile
+import zlib
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from warp_mca.base.errors import McaError, bad_value
+
+# What reading a damaged file can raise, from the archive down to the checks of the classes that are made from it.
+# `zipfile` raises RuntimeError where a damaged byte says encrypted, or packed in a way that it does not know; NumPy's
+# reader of headers raises TokenError and SyntaxError, and MemoryError where the shape is damaged; JSON RecursionError.
+DAMAGE = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+    RuntimeError,
+    SyntaxError,
+    tokenize.TokenError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+MOST = 1_000_000_000  # of anything that is counted; memory ends before
+
+
+def plain(item: Any) -> None:
+    """Turn the numbers and sequences among a dataclass's values into Python's own: float, int, bool and tuple.
+
+    NumPy arrays, lists and fractions then compare, hash and print like the numbers that they stand for. A number stays
+    an int only in a field whose annotation says int. All other values stay as they are, for the checks that follow.
+    """
+    for field in dataclasses.fields(item):
+        whole = re.search(r"\bint\b", str(field.type)) is not None
+        value = getattr(item, field.name)
+        value = value.tolist() if isinstance(value, np.ndarray) else value
+        if _is_sequence(value):
+            value = tuple(_plain_number(entry, whole) for entry in value)
+        object.__setattr__(item, field.name, _plain_number(value, whole))
+
+
+def _plain_number(value: object, whole: bool) -> object:
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # no float holds it
+            return int(value) if whole and isinstance(value, Integral) else float(value)
+    return value
+
+
+def positive(owner: str, /, **values: float) -> None:
+    """Each value must be a finite number above 0."""
+    for name, value in values.items():
+        if not (is_number(value) and value > 0.0):
+            raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
+
+
+def finite(owner: str, /, **values: float) -> None:
+    """Each value must be a finite number."""
+    for name, value in values.items():
+        if not is_number(value):
+            raise bad_value(f"{owner}.{name}", value, "give a finite number")
+
+
+def counts(owner: str, /, **values: int) -> None:
+    """Each value must be a whole number above 0."""
+    for name, value in values.items():
+        if not _is_count(value):
+            raise bad_value(f"{owner}.{name}", value, f"give a whole number above 0, at most {MOST:,}")
+
+
+def even_counts(owner: str, /, **values: int) -> None:
+    """Each value must be an even number above 0, so that the middle is a grid line."""
+    for name, value in values.items():
+        if not (_is_count(value) and value % 2 == 0):
+            raise bad_value(f"{owner}.{name}", value, f"give an even number above 0, at most {MOST:,}")
+
+
+def flags(owner: str, /, **values: bool) -> None:
+    """Each value must be True or False."""
+    kinds(owner, bool, "give True or False", **values)
+
+
+def entries(owner: str, count: int, /, **values: tuple) -> None:
+    """Each value must be a tuple of `count` entries."""
+    for name, value in values.items():
+        if not (isinstance(value, (tuple, list)) and len(value) == count):
+            raise bad_value(f"{owner}.{name}", value, f"give {count} numbers")
+
+
+def vectors(owner: str, /, **values: Sequence[float]) -> None:
+    """Each value must be three finite numbers."""
+    for name, value in values.items():
+        if not (is_list(value) and len(value) == 3):
+            raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
+
+
+def kinds(owner: str, kind: type | tuple[type, ...], remedy: str, /, **values: object) -> None:
+    """Each value must be an instance of `kind`."""
+    for name, value in values.items():
+        kind_of(f"{owner}.{name}", value, kind, remedy)
+
+
+def texts(owner: str, /, **values: str) -> None:
+    """Each value must be a text that files can hold."""
+    kinds(owner, str, "give a text", **values)
+    for name, value in values.items():
+        if not value.isascii() and value != value.encode(errors="replace").decode():  # half of a character
+            raise bad_value(f"{owner}.{name}", value, "give a text of whole characters")
+
+
+def members(owner: str, kind: type, /, **values: Sequence[object]) -> None:
+    """Each value must be a tuple or list of instances of `kind`."""
+    for name, value in values.items():
+        kind_of(f"{owner}.{name}", value, (tuple, list), f"give a tuple of {kind.__name__}")
+        for k, item in enumerate(value):
+            kind_of(f"{owner}.{name}[{k}]", item, kind, f"give a {kind.__name__}")
+
+
+def kind_of(field: str, value: object, kind: type | tuple[type, ...], remedy: str) -> None:
+    """The value of that field must be an instance of `kind`."""
+    if not isinstance(value, kind):
+        raise bad_value(field, brief(value), remedy)
+
+
+def brief(value: object) -> object:
+    """The value for a message, or the name of its class where it may be long."""
+    return value if value is None or isinstance(value, str | Real) else type(value).__name__
+
+
+def call(field: str, value: object, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """What a user's function returns.
+
+    Args:
+        field, value: that the function belongs to, for the message.
+        what: name of the function, for the message.
+        function, args, kwargs: what to call.
+
+    Raises:
+        RequestError: it raised something else than an McaError.
+    """
+    try:
+        found = function(*args, **kwargs)
+    except McaError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a user's code raises; not status 0
+        line = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(line.filename).name}, line {line.lineno}"
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        raise bad_value(field, value, f"{what} failed with {words} ({where})") from error
+    if inspect.iscoroutine(found):
+        found.close()  # or Python warns that nobody awaited it
+    return found
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a finite real number; text, None, sequences and truth values are none."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number that no float holds
+        return False
+
+
+def is_list(value: object) -> bool:
+    """Whether it is a sequence of finite numbers; sets, mappings and generators have no places."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1 and all(map(is_number, value))
+    return _is_sequence(value) and all(map(is_number, value))
+
+
+def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview)
+
+
+def _is_count(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 < int(value) <= MOST

@@ -1,0 +1,145 @@
+"""Owns the joining of models: the scenes of a batch one after the other in one model, each as it would be alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.model.assembly import GROUND, Block
+from warp_mca.model.layout import Layout, offsets
+from warp_mca.model.model import Model
+from warp_mca.results.paths import Probes
+from warp_mca.runs.account import Prepared
+
+Index = NDArray[np.int32]
+
+
+def join_models(models: Sequence[Model]) -> Model:
+    """One model of several scenes; a scene alone is its own model.
+
+    Contact passes stay apart, those of each scene in turn: the solver runs the first of each scene in one launch, then
+    the second.
+    """
+    if len(models) == 1:
+        return models[0]
+    nodes = offsets([model.node_count for model in models])
+    elements = offsets([model.element_count for model in models])
+    pairs = offsets([len(model.joint_first) for model in models])
+    blocks, order, ranges = _blocks(models, nodes, elements)
+    fastest = int(np.argmin([model.stable.dt for model in models]))
+    stable = models[fastest].stable
+
+    def shifted(name: str, start: Index) -> Index:
+        """Numbers of what begins at `start` in each scene; GROUND stays."""
+        values = [getattr(model, name) for model in models]
+        return np.concatenate([np.where(v == GROUND, v, v + s) for v, s in zip(values, start, strict=False)])
+
+    return Model(
+        X=np.concatenate([model.X for model in models]),
+        V=np.concatenate([model.V for model in models]),
+        mass=np.concatenate([model.mass for model in models]),
+        blocks=blocks,
+        law=_laws(models),
+        fixed_axes=np.concatenate([model.fixed_axes for model in models]),
+        prescribed_node=shifted("prescribed_node", nodes),
+        prescribed_axis=np.concatenate([model.prescribed_axis for model in models]),
+        **_tables(models),
+        joint_first=shifted("joint_first", nodes),
+        joint_second=shifted("joint_second", nodes),
+        hinges=tuple(
+            replace(hinge, start=hinge.start + int(start), end=hinge.end + int(start))
+            for model, start in zip(models, pairs, strict=False)
+            for hinge in model.hinges
+        ),
+        passes=tuple(
+            replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
+            for model, start in zip(models, nodes, strict=False)
+            for item in model.passes
+        ),
+        contact_axes=np.concatenate([model.contact_axes for model in models]),
+        gravity=np.concatenate([model.gravity for model in models]),
+        points=shifted("points", nodes),
+        node_start=_starts(models, "node_start", nodes),
+        element_start=_starts(models, "element_start", elements),
+        element_of=order,
+        stable=replace(stable, element=stable.element + int(elements[fastest])),
+        batch=Layout(
+            nodes=nodes,
+            hinges=offsets([len(model.hinges) for model in models]),
+            elements=ranges,
+        ),
+    )
+
+
+def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tuple[Block, ...], Index, Index]:
+    """Blocks of all scenes, the order of the elements in the joined meshes, and `Layout.elements`."""
+    laws = offsets([len(model.law) for model in models])
+    # in the order that a scene alone has them in, so that sums over elements come out alike
+    kinds = sorted({block.kind for model in models for block in model.blocks})
+    blocks, order, first = [], [], 0
+    ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
+    for column, kind in enumerate(kinds):
+        conn, material, end = [], [], first
+        for k, model in enumerate(models):
+            ranges[k, column] = end
+            for block in model.blocks:
+                if block.kind == kind:
+                    count = block.conn.shape[1]
+                    conn.append(block.conn + nodes[k])
+                    material.append(block.material + laws[k])
+                    order.append(model.element_of[block.first : block.first + count] + elements[k])
+                    end += count
+            ranges[k, column, 1] = end
+        _, law, element, finite = kind
+        blocks.append(
+            Block(
+                element=element,
+                law=law,
+                finite=finite,
+                conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
+                material=np.concatenate(material),
+                first=first,
+                ends=tuple((ranges[:, column, 1] - first).tolist()),
+            )
+        )
+        first = end
+    return tuple(blocks), np.concatenate(order), ranges
+
+
+def _laws(models: Sequence[Model]) -> NDArray[np.float64]:
+    """Parameters of the materials of all scenes, as `Model.law`."""
+    width = max(model.law.shape[1] for model in models)
+    return np.concatenate([np.pad(model.law, ((0, 0), (0, width - model.law.shape[1]))) for model in models])
+
+
+def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
+    """Tables of driven axes, and the one of each axis."""
+    entries = offsets([len(model.table_time) for model in models])
+    tables = offsets([len(model.table_offset) - 1 for model in models])
+    starts = [model.table_offset[:-1] + start for model, start in zip(models, entries, strict=False)]
+    numbers = [model.prescribed_table + start for model, start in zip(models, tables, strict=False)]
+    return {
+        "prescribed_table": np.concatenate(numbers),
+        "table_offset": np.append(np.concatenate(starts), entries[-1]).astype(np.int32),
+        "table_time": np.concatenate([model.table_time for model in models]),
+        "table_value": np.concatenate([model.table_value for model in models]),
+    }
+
+
+def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:
+    """First node or element of each body; bodies go by the number of their scene and their name."""
+    return {
+        f"{k}/{body}": start + int(first[k])
+        for k, model in enumerate(models)
+        for body, start in getattr(model, name).items()
+    }
+
+
+def join_probes(ready: Sequence[Prepared]) -> Probes:
+    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes."""
+    nodes = offsets([item.model.node_count for item in ready])
+    corner = [item.probes.corner + start for item, start in zip(ready, nodes, strict=False)]
+    return Probes({}, np.concatenate(corner), np.concatenate([item.probes.weight for item in ready]))

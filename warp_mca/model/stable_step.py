@@ -1,0 +1,161 @@
+"""Owns the stable time step: the largest eigenvalue of any element, contact springs counted in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.elements import Element
+from warp_mca.elements.hexahedron import CHUNK, chunks
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+BATCH = 256  # elements whose exact eigenvalues are found at a time
+MOST = 100 * BATCH  # of them: 24 x 24 problems cost 50 us each
+# Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring alone
+# holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
+BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9
+KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
+
+
+@dataclass(frozen=True)
+class StableStep:
+    """Largest stable step of the model.
+
+    Attributes:
+        dt: 2 / omega_max [s].
+        element: the element that sets it.
+        contact_share: share of omega_max^2 that contact springs add there [-].
+        shortened: how many times shorter than the step of half of the elements it is, contact springs aside [-].
+    """
+
+    dt: float
+    element: int
+    contact_share: float
+    shortened: float
+
+
+@np.errstate(divide="ignore", over="ignore", invalid="ignore")  # bounds that are not numbers are refused
+def stable_step(
+    formulation: Element, X: Array, conn: Index, K: Array, G: Array, mass: Array, contact: Array, index: Index
+) -> StableStep:
+    """Stable step from max over elements of (element eigenvalue + contact eigenvalue), both upper bounds of their part.
+
+    Springs that dominate count for more, since they open and close.
+
+    The largest eigenvalue of an assembly never exceeds the largest of its elements (Irons and Treharne, 1971). A
+    coarse bound ranks the elements, a closer one those that could still be the worst after the first exact
+    eigenvalues, and exact ones decide.
+
+    Args:
+        formulation: of the elements.
+        X: positions of the nodes [m], shape (node_count, 3), float64.
+        conn: nodes of each element, shape (element_count, corners), int32. K, G: moduli [Pa], shape (element_count,).
+        mass: lumped masses [kg], shape (element_count, corners).
+        contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,).
+        index: number that each element goes by, shape (element_count,).
+
+    Raises:
+        RequestError: a bound is not finite.
+    """
+
+    def exact(part: NDArray[np.intp]) -> Array:
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is refused
+                return formulation.largest_eigenvalues(X[conn[part]], K[part], G[part], mass[part]) + contact[part]
+        except np.linalg.LinAlgError as error:
+            raise _out_of_range(int(index[part[0]]), float(bound.max())) from error
+
+    def bounds(part: NDArray[np.intp] | slice, coarse: bool) -> Array:
+        return formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse) + contact[part]
+
+    bound = np.empty(len(conn))
+    for part in chunks(len(conn), CHUNK):
+        bound[part] = bounds(part, True)
+    if not np.isfinite(bound).all():
+        raise _out_of_range(int(index[np.argmin(np.isfinite(bound))]), float(bound.max()))
+    usual = float(np.median(bound))
+    first = _greatest(bound, BATCH)
+    value = exact(first)
+    worst, element = float(value.max()), int(first[value.argmax()])
+    bound[first] = 0.0
+    left = np.flatnonzero(bound > worst)
+    if len(left) > MOST:
+        left = left[_different(X, conn[left], bound[left])]
+    for part in chunks(len(left), CHUNK):
+        bound[left[part]] = bounds(left[part], False)
+    left = left[bound[left] > worst]
+    left = left[np.argsort(-bound[left], kind="stable")]
+    for start in range(0, len(left), BATCH):
+        part = left[start : start + BATCH]
+        if bound[part[0]] <= worst:
+            break
+        if start >= MOST:  # the bound of what is left does as well
+            worst, element = float(bound[part[0]]), int(part[0])
+            break
+        value = exact(part)
+        if value.max() > worst:
+            worst, element = float(value.max()), int(part[value.argmax()])
+    own = worst - float(contact[element])
+    stiff = np.flatnonzero(_switching(contact, 1.0) > worst)
+    if len(stiff):
+        bound = formulation.eigenvalue_bounds(X[conn[stiff]], K[stiff], G[stiff], mass[stiff], False)
+        value = _switching(contact[stiff], contact[stiff] / (bound + contact[stiff]))
+        most = int(value.argmax())
+        if value[most] > worst:
+            worst, element, own = float(value[most]), int(stiff[most]), float(bound[most])
+    return StableStep(
+        dt=2.0 / math.sqrt(worst),
+        element=int(index[element]),
+        contact_share=1.0 - own / worst,
+        shortened=math.sqrt(own / usual),
+    )
+
+
+def _out_of_range(element: int, bound: float) -> RequestError:
+    remedy = "moduli and penalty over density exceed the range of numbers there; check their units"
+    return bad_value(f"largest eigenvalue of element {element} [1/s^2]", bound, remedy)
+
+
+def _switching(contact: Array, share: Array | float) -> Array:
+    """Eigenvalue [1/s^2] that stands for a contact spring which opens and closes.
+
+    Central differences keep a linear spring bounded up to (omega dt)^2 = 4. A node that bounces on a spring of one side
+    gains energy from less on, because it is pushed back for whole steps only.
+
+    Args:
+        contact: of the spring on its node [1/s^2].
+        share: of the spring in the eigenvalue of node and element [-].
+    """
+    return (2.0 * USUAL_SCALE) ** 2 / (BOUNCE + SUPPORT * (1.0 - share)) * contact
+
+
+def _greatest(value: Array, count: int) -> NDArray[np.intp]:
+    """Indices of the `count` greatest values, from the greatest on."""
+    least = np.partition(value, len(value) - count)[len(value) - count] if count < len(value) else -np.inf
+    found = np.flatnonzero(value >= least)
+    return found[np.argsort(-value[found], kind="stable")][:count]
+
+
+def _different(X: Array, conn: Index, bound: Array) -> NDArray[np.intp]:
+    """First of each lot of elements whose shapes and bounds agree to a millionth of the greatest, in order."""
+    size = max(float(np.abs(X[conn[:, k]] - X[conn[:, 0]]).max()) for k in range(1, conn.shape[1]))
+
+    def digits(part: NDArray[np.intp] | slice) -> NDArray[np.int64]:
+        shape = (X[conn[part]] - X[conn[part, :1]]).reshape(-1, 3 * conn.shape[1]) / size
+        return np.rint(1e6 * np.column_stack([bound[part] / bound.max(), shape])).astype(np.int64)
+
+    key = np.empty(len(conn), dtype=np.int64)
+    for part in chunks(len(conn), CHUNK):
+        key[part] = (digits(part) * KEY[: 1 + 3 * conn.shape[1]]).sum(axis=1)
+    _, first, lot = np.unique(key, return_index=True, return_inverse=True)
+    kept = np.zeros(len(conn), dtype=bool)
+    kept[first] = True
+    for part in chunks(len(conn), CHUNK):  # lots that only have a key in common are told apart
+        kept[part] |= (digits(part) != digits(first[lot[part]])).any(axis=1)
+    return np.flatnonzero(kept)

@@ -1,0 +1,1 @@
+"""Owns what a run leaves behind: results, histories of forces and paths, files."""

@@ -1,0 +1,162 @@
+"""Owns what a run recorded of each contact by itself (forces.npz), and what the summary says of it."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.results.force_history import contact_intervals, unfinished
+from warp_mca.scene import Contact, RigidPlane
+
+Array = NDArray[np.float64]
+
+ONE_WAY = 0.1  # least share of the normal forces that their vector sum keeps, for them to have a direction
+OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactHistory:
+    """One contact of the scene in every output interval. Forces act on the slave; those of both passes count.
+
+    Attributes:
+        name: of the contact, see `contact_names`.
+        force: whole force, mean over the interval [N], shape (row_count, 3), float64.
+        pressure: normal forces of all slave nodes, added up as they are, mean over the interval [N], shape
+            (row_count,), float64.
+        normal_force: vector sum of the normal forces at the end of the interval [N], shape (row_count, 3), float64.
+        closing_speed: speed at which the touching surfaces approach each other along their normal, mean over the
+            interval and over the nodes that touch, weighted with their normal forces [m/s], shape (row_count,),
+            float64; negative while they part, nan where nothing touched and in the first row.
+    """
+
+    name: str
+    force: Array
+    pressure: Array
+    normal_force: Array
+    closing_speed: Array
+
+    @property
+    def normal(self) -> Array | None:
+        """Direction of the normal impulse on the slave [-], shape (3,), or None where it has none.
+
+        It has none without contact, and where normal forces cancel, as around a clamped body.
+        """
+        total = self.normal_force.sum(axis=0)
+        size, most = np.linalg.norm(total), np.linalg.norm(self.normal_force, axis=1).sum()
+        return total / size if size > ONE_WAY * most else None
+
+    @property
+    def touched(self) -> bool:
+        """Whether the surfaces pressed on each other."""
+        return bool(self.pressure.max(initial=0.0) > 0.0)
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether the contact was still in progress in the last row."""
+        return unfinished(self.pressure)
+
+    def summary(self, time: Array) -> dict[str, Any]:
+        """What `contacts_by_pair` of the summary says of it.
+
+        Args:
+            time: ends of the output intervals [s], shape (row_count,).
+        """
+        size = np.linalg.norm(self.force, axis=1)
+        step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+        return {
+            "name": self.name,
+            "intervals": [list(span) for span in contact_intervals(time, self.pressure)],
+            "contact_open_at_end": self.unfinished,
+            "F_max": self.force[int(np.argmax(size))].tolist() if len(size) else [0.0, 0.0, 0.0],
+            "impulse": (step * self.force.sum(axis=0)).tolist(),
+            "normal": None if self.normal is None else self.normal.tolist(),
+        }
+
+
+def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
+    """A name for each contact: its own, or "slave–master" by their bodies, numbered from the second of a pair on."""
+    taken = {contact.name for contact in contacts if contact.name is not None}
+    names: list[str] = []
+    for contact in contacts:
+        name = contact.name
+        if name is None:
+            master = "plane" if isinstance(contact.master, RigidPlane) else contact.master.body
+            pair = f"{contact.slave.body}–{master}"
+            numbered = (pair if k == 1 else f"{pair} {k}" for k in range(1, len(contacts) + 1))
+            name = next(text for text in numbered if text not in taken)
+            taken.add(name)
+        names.append(name)
+    return tuple(names)
+
+
+def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[str]:
+    """What a run should say of its contacts: none touched, some did not end, normals off the axes of F_n and F_t.
+
+    Args:
+        contacts: of the scene.
+        axes: as `Model.contact_axes`.
+    """
+    found: list[str] = []
+    if contacts and not any(contact.touched for contact in contacts):
+        found.append("no contact closed in the simulated time: give a longer duration, or check positions and speeds")
+    if names := [contact.name for contact in contacts if contact.unfinished]:
+        which = f"contact {names[0]} was" if len(names) == 1 else f"contacts {', '.join(names)} were"
+        found.append(
+            f"{which} still in progress when the run ended: impulse, duration and peaks are those so far; give a "
+            "longer duration if it should end"
+        )
+    for contact, (normal, tangent) in zip(contacts, axes, strict=True):
+        if contact.normal is not None:
+            found += _off_axis(contact.name, contact.normal, normal, tangent)
+    return found
+
+
+def _off_axis(name: str, true: Array, normal: Array, tangent: Array) -> list[str]:
+    """A warning where the `true` normal of a contact is off its axes [-], each shape (3,); `normal` may be 0."""
+    if normal.any():
+        column, axis, angle = "F_n_N", normal, math.degrees(math.acos(np.clip(true @ normal, -1.0, 1.0)))
+    else:  # normal forces add up as they are; tangential force must not hold some of them
+        column, axis, angle = "F_t_N", tangent, math.degrees(math.asin(min(abs(true @ tangent), 1.0)))
+    if angle <= OFF_AXIS:
+        return []
+    seen, along = (", ".join(f"{x:.3g}" for x in vector) for vector in (true, axis))
+    off = f"{angle:.0f} degrees off the axis ({along}) of" if normal.any() else f"not across the axis ({along}) of"
+    return [
+        f"contact {name}: its normal force is along ({seen}), {off} {column}; set Contact.normal and tangent, or read "
+        "the force vectors in forces.npz"
+    ]
+
+
+def save_contacts(file: Path, time: Array, contacts: Sequence[ContactHistory]) -> None:
+    """Write time_s, and for each contact NAME/force_N and the other arrays of `ContactHistory`, as an npz archive."""
+    arrays: dict[str, Array] = {"time_s": time}
+    for contact in contacts:
+        arrays[f"{contact.name}/force_N"] = contact.force
+        arrays[f"{contact.name}/pressure_N"] = contact.pressure
+        arrays[f"{contact.name}/normal_force_N"] = contact.normal_force
+        arrays[f"{contact.name}/closing_speed"] = contact.closing_speed
+    with file.open("wb") as stream:
+        np.savez(stream, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def load_contacts(file: str | os.PathLike[str]) -> tuple[ContactHistory, ...]:
+    """The contacts that `save_contacts` wrote."""
+    with np.load(file) as arrays:
+        names = [key.removesuffix("/force_N") for key in arrays if key.endswith("/force_N")]
+        return tuple(
+            ContactHistory(
+                name=name,
+                force=arrays[f"{name}/force_N"],
+                pressure=arrays[f"{name}/pressure_N"],
+                normal_force=arrays[f"{name}/normal_force_N"],
+                closing_speed=arrays[f"{name}/closing_speed"],
+            )
+            for name in names
+        )

@@ -1,0 +1,1 @@
+"""Owns the large timescale: chains of rigid links, hand-off and hand-back."""

@@ -1,0 +1,229 @@
+"""Owns the mechanics of a planar chain of rigid links: mass matrix, forces, energy, momentum, reactions.
+
+Angles follow `RigidPhase`: a link at theta has its frame's x axis along d = (-sin theta, -cos theta) and its y axis
+along f = (cos theta, -sin theta), d turned by +90 degrees about +z. A growing theta turns the link clockwise:
+omega_z = -theta_dot. With u_i, w_i the hinge vector and the first moment of link i in the world, Lagrange's equations
+
+    M(theta) theta'' + C(theta, theta') + G(theta) = 0
+
+generalise Eq. (5) of the paper to n links with any centre of mass and hinge:
+
+    M_ij = u_i . w_j (i < j),  M_ii = I_i + m_i |c_i|^2 + m_(>i) |h_i|^2,  w_i = R_i (m_i c_i + m_(>i) h_i)
+    C_j  = sum_(i<j) (u_i . z x w_j) theta_i'^2 - sum_(i>j) (u_j . z x w_i) theta_i'^2,  G_j = g . z x w_j
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import bad_value
+
+Vec2 = tuple[float, float]
+Array = NDArray[np.float64]
+
+
+def perpendicular(vectors: Array) -> Array:
+    """z x v for planar vectors v, shape (..., 2), float64: a turn by +90 degrees about +z."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
+def link_axes(theta: Array) -> tuple[Array, Array]:
+    """World directions d, f of the links' x and y axes [-], each shape (..., 2), float64, for theta (...,) [rad]."""
+    sine, cosine = np.sin(theta), np.cos(theta)
+    return np.stack([-sine, -cosine], axis=-1), np.stack([cosine, -sine], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """One rigid link. Its frame is the body's frame, shifted to the inbound hinge.
+
+    Attributes:
+        body: name of the body that it stands for.
+        mass: [kg].
+        centre: of mass, in the link's frame [m].
+        inertia: about the centre of mass and the z axis [kg m^2].
+        hinge_out: the next link's hinge in this link's frame [m]; of no account on the last link.
+        hinge_in: the inbound hinge in the body's frame [m].
+    """
+
+    body: str
+    mass: float
+    centre: Vec2
+    inertia: float
+    hinge_out: Vec2 = (0.0, 0.0)
+    hinge_in: Vec2 = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass) and self.mass > 0.0):
+            raise bad_value(f"mass of link {self.body}", self.mass, "give a finite number of kg above 0")
+        if not (math.isfinite(self.inertia) and self.inertia >= 0.0):
+            raise bad_value(f"inertia of link {self.body}", self.inertia, "give a finite number of kg m^2, 0 or above")
+
+
+def slender_link(
+    body: str, end: Vec2, *, mass: float, hinge_out: Vec2 = (0.0, 0.0), hinge_in: Vec2 = (0.0, 0.0)
+) -> Link:
+    """A uniform slender rod from the inbound hinge to `end` [m] in the link's frame; inertia m l^2 / 12 (Eq. 3)."""
+    inertia = mass * (end[0] ** 2 + end[1] ** 2) / 12.0
+    centre = (0.5 * end[0], 0.5 * end[1])
+    return Link(body=body, mass=mass, centre=centre, inertia=inertia, hinge_out=hinge_out, hinge_in=hinge_in)
+
+
+def mesh_link(
+    body: str, points: Array, masses: Array, *, hinge_out: Vec2 = (0.0, 0.0), hinge_in: Vec2 = (0.0, 0.0)
+) -> Link:
+    """A link with the planar mass, centre and inertia of lumped nodal masses.
+
+    These sums are what the finite-element model will carry, so a rigid motion keeps momentum, angular momentum and
+    kinetic energy to round-off when it is handed over.
+
+    Args:
+        body: its name.
+        points: node positions in the body's frame [m], shape (node_count, 3), float64.
+        masses: lumped nodal masses [kg], shape (node_count,), float64.
+        hinge_out: the next hinge in the link's frame [m].
+        hinge_in: the inbound hinge in the body's frame [m].
+
+    Raises:
+        RequestError: one mass for each node is not given.
+    """
+    if masses.shape != (len(points),):
+        raise bad_value(
+            f"shape of the nodal masses of {body}", masses.shape, f"give one for each of {len(points)} nodes"
+        )
+    arms = points[:, :2] - np.asarray(hinge_in)
+    mass = masses.sum()
+    centre = masses @ arms / mass
+    inertia = masses @ ((arms - centre) ** 2).sum(axis=1)
+    return Link(
+        body=body,
+        mass=float(mass),
+        centre=(float(centre[0]), float(centre[1])),
+        inertia=float(inertia),
+        hinge_out=hinge_out,
+        hinge_in=hinge_in,
+    )
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Rigid links, each hinged to the one before it and the first to the ground.
+
+    Every `theta`, `theta_dot` below is an array of shape (link_count,), float64, in rad and rad/s.
+
+    Attributes:
+        links: from the ground outwards.
+        origin: world position of the ground hinge [m].
+        gravity: [m/s^2].
+    """
+
+    links: tuple[Link, ...]
+    origin: Vec2 = (0.0, 0.0)
+    gravity: Vec2 = (0.0, -9.8)
+
+    @cached_property
+    def _hinge_out(self) -> Array:
+        return np.array([link.hinge_out for link in self.links], dtype=np.float64)
+
+    @cached_property
+    def _mass(self) -> Array:
+        return np.array([link.mass for link in self.links])
+
+    @cached_property
+    def _centre(self) -> Array:
+        return np.array([link.centre for link in self.links], dtype=np.float64)
+
+    @cached_property
+    def _moments(self) -> tuple[Array, Array]:
+        """First moment [kg m], shape (link_count, 2), and inertia about the inbound hinge [kg m^2] of each link, with
+        the mass of all links beyond it put at its outbound hinge."""
+        beyond = np.cumsum(self._mass[::-1])[::-1] - self._mass
+        first = self._mass[:, None] * self._centre + beyond[:, None] * self._hinge_out
+        own = np.array([link.inertia for link in self.links])
+        second = own + self._mass * (self._centre**2).sum(axis=1) + beyond * (self._hinge_out**2).sum(axis=1)
+        return first, second
+
+    def _turn(self, theta: Array, vectors: Array) -> Array:
+        d, f = link_axes(theta)
+        return vectors[:, :1] * d + vectors[:, 1:] * f
+
+    def mass_matrix(self, theta: Array) -> Array:
+        """M(theta) [kg m^2], shape (link_count, link_count), float64."""
+        first, second = self._moments
+        upper = np.triu(self._turn(theta, self._hinge_out) @ self._turn(theta, first).T, 1)
+        return upper + upper.T + np.diag(second)
+
+    def rate_force(self, theta: Array, theta_dot: Array) -> Array:
+        """C(theta, theta_dot) [N m], shape (link_count,), float64."""
+        w = self._turn(theta, self._moments[0])
+        upper = np.triu(self._turn(theta, self._hinge_out) @ perpendicular(w).T, 1)
+        return (upper.T - upper) @ theta_dot**2
+
+    def gravity_force(self, theta: Array) -> Array:
+        """G(theta) [N m], shape (link_count,), float64."""
+        return perpendicular(self._turn(theta, self._moments[0])) @ np.asarray(self.gravity)
+
+    def acceleration(self, theta: Array, theta_dot: Array) -> Array:
+        """theta'' = -M^-1 (C + G) [rad/s^2], shape (link_count,), float64."""
+        force = self.rate_force(theta, theta_dot) + self.gravity_force(theta)
+        return -np.asarray(np.linalg.solve(self.mass_matrix(theta), force), dtype=np.float64)
+
+    def kinetic_energy(self, theta: Array, theta_dot: Array) -> float:
+        """T = theta' . M theta' / 2 [J]."""
+        return float(0.5 * theta_dot @ self.mass_matrix(theta) @ theta_dot)
+
+    def potential_energy(self, theta: Array) -> float:
+        """V = -g . (first moment of the chain about the ground hinge) [J]."""
+        return float(-self._turn(theta, self._moments[0]).sum(axis=0) @ np.asarray(self.gravity))
+
+    def hinges(self, theta: Array, theta_dot: Array) -> tuple[Array, Array]:
+        """World positions [m] and velocities [m/s] of the inbound hinges, each shape (link_count, 2), float64.
+
+        The arithmetic is that of `Placement.place`, so a node on a hinge lands on it without round-off.
+        """
+        arms = self._turn(theta, self._hinge_out)
+        turning = -theta_dot[:, None] * perpendicular(arms)
+        positions = np.empty_like(arms)
+        velocities = np.zeros_like(arms)
+        positions[0] = self.origin
+        for i in range(len(arms) - 1):
+            positions[i + 1] = positions[i] + arms[i]
+            velocities[i + 1] = velocities[i] + turning[i]
+        return positions, velocities
+
+    def at(self, index: int, point: Vec2, theta: Array, theta_dot: Array) -> tuple[Array, Array]:
+        """World position [m] and velocity [m/s], each shape (2,), float64, of a point in the frame of link `index`."""
+        positions, velocities = self.hinges(theta, theta_dot)
+        d, f = link_axes(theta[index])
+        arm = point[0] * d + point[1] * f
+        return positions[index] + arm, velocities[index] - theta_dot[index] * perpendicular(arm)
+
+    def momentum(self, theta: Array, theta_dot: Array) -> Array:
+        """Linear momentum [kg m/s], shape (2,), float64."""
+        return -theta_dot @ perpendicular(self._turn(theta, self._moments[0]))
+
+    def angular_momentum(self, theta: Array, theta_dot: Array) -> float:
+        """z component of the angular momentum about the ground hinge [kg m^2/s]."""
+        positions, velocities = self.hinges(theta, theta_dot)
+        arms = self._turn(theta, self._centre)
+        r = positions - np.asarray(self.origin) + arms
+        v = velocities - theta_dot[:, None] * perpendicular(arms)
+        spin = sum(link.inertia * -rate for link, rate in zip(self.links, theta_dot, strict=True))
+        return float(self._mass @ (r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0]) + spin)
+
+    def reactions(self, theta: Array, theta_dot: Array) -> Array:
+        """Force on each link at its inbound hinge [N], shape (link_count, 2), float64: sum_(j>=k) m_j (a_j - g)."""
+        theta_ddot = self.acceleration(theta, theta_dot)
+
+        def accelerate(arms: Array) -> Array:
+            return -theta_ddot[:, None] * perpendicular(arms) - theta_dot[:, None] ** 2 * arms
+
+        beyond = np.cumsum(accelerate(self._turn(theta, self._hinge_out)), axis=0)
+        hinge = np.vstack([np.zeros(2), beyond[:-1]])
+        needed = self._mass[:, None] * (hinge + accelerate(self._turn(theta, self._centre)) - np.asarray(self.gravity))
+        return np.cumsum(needed[::-1], axis=0)[::-1]

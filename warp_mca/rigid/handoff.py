@@ -1,0 +1,242 @@
+"""Owns the hand-off from rigid bodies to the nodes of their finite elements at contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_mca.base.errors import bad_value
+from warp_mca.base.rotation import turn
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.rigid.chain import Array, Chain, link_axes
+from warp_mca.rigid.swing import Swing, chain_from_scene, swing
+from warp_mca.rigid.target import TargetPlane, target_plane, tip_gap
+from warp_mca.scene import Body, RigidPlane, Scene, Surface
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """A body's rigid pose and motion in the world at the start of the impact phase.
+
+    Attributes:
+        pivot: a point in the body's frame [m], shape (3,), float64.
+        origin: where the pivot lies in the world [m], shape (3,), float64.
+        rotation: from the body's frame to the world [-], shape (3, 3), float64.
+        velocity: of the pivot [m/s], shape (3,), float64.
+        angular_velocity: [rad/s], shape (3,), float64.
+    """
+
+    pivot: Array
+    origin: Array
+    rotation: Array
+    velocity: Array
+    angular_velocity: Array
+
+    def place(self, points: Array) -> tuple[Array, Array]:
+        """World positions X = origin + R (x - pivot) [m] and velocities V = velocity + omega x R (x - pivot) [m/s].
+
+        The products are written out so that every point sees the same operations in the same order as the chain's
+        hinges do: coincident nodes of two links on their hinge coincide afterwards too, and z of a link is copied.
+
+        Args:
+            points: in the body's frame [m], shape (count, 3), float64.
+
+        Returns:
+            X and V, each shape (count, 3), float64.
+        """
+        u = points - self.pivot
+        r = np.stack([u[:, 0] * row[0] + u[:, 1] * row[1] + u[:, 2] * row[2] for row in self.rotation], axis=1)
+        return self.origin + r, self.velocity + np.cross(self.angular_velocity, r)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Momenta:
+    """What the hand-off must keep, summed over the links.
+
+    Attributes:
+        momentum: linear, x and y [kg m/s], shape (2,), float64.
+        angular_momentum: about the ground hinge, z [kg m^2/s].
+        kinetic_energy: [J].
+    """
+
+    momentum: Array
+    angular_momentum: float
+    kinetic_energy: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandOff:
+    """Initial state of the impact phase, and how it came about.
+
+    Attributes:
+        positions: world positions X of the nodes by body name [m], each shape (node_count, 3), float64.
+        velocities: world velocities V of the nodes by body name [m/s], each shape (node_count, 3), float64.
+        placements: rigid pose and motion of each body by name.
+        t_contact: time of the first touch [s]; 0 without a rigid phase.
+        theta: angles of the links [rad], shape (link_count,), float64; empty without a rigid phase.
+        theta_dot: angular velocities of the links [rad/s], shape (link_count,), float64; empty likewise.
+        v_n: speed of the centre of the tip's sphere towards the target (downwards on a floor) [m/s]; None without.
+        v_t: speed of that centre along the target in the xy plane (along +x on a floor) [m/s]; None without.
+        contact_point: where the sphere touches the plane [m], shape (3,), float64; None without.
+        energy_drift: largest error of the rigid phase's energy over its largest kinetic energy [-].
+        rigid: momenta of the chain's rigid links at contact; None without a rigid phase.
+        nodes: the same summed over the nodes of the links with their lumped masses; None without.
+        momentum_mismatch: |difference| of the linear momenta over sum(m |V|) [-].
+        angular_momentum_mismatch: |difference| of the angular momenta over sum(m |r| |V|) [-].
+        energy_mismatch: |difference| of the kinetic energies over that of the nodes [-]. All three are round-off with
+            inertia="mesh" and a few per cent with "slender".
+        chain: the rigid links; None without a rigid phase.
+        swing: the trajectory up to contact; None without.
+    """
+
+    positions: dict[str, Array]
+    velocities: dict[str, Array]
+    placements: dict[str, Placement]
+    t_contact: float = 0.0
+    theta: Array
+    theta_dot: Array
+    v_n: float | None = None
+    v_t: float | None = None
+    contact_point: Array | None = None
+    energy_drift: float = 0.0
+    rigid: Momenta | None = None
+    nodes: Momenta | None = None
+    momentum_mismatch: float = 0.0
+    angular_momentum_mismatch: float = 0.0
+    energy_mismatch: float = 0.0
+    chain: Chain | None = None
+    swing: Swing | None = None
+
+
+def hand_off(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> HandOff:
+    """Place every body for the impact phase.
+
+    Links take the exact rigid motion of the chain at contact. Other bodies move on with their own velocity and angular
+    velocity during the swing; with `centre_target` the target's body is then moved along its plane until its frame's
+    origin lies under the tip. Without a rigid phase all bodies take their own initial pose and motion.
+
+    Args:
+        scene: with or without a rigid phase.
+        meshes: by body name, in the bodies' frames.
+        nodal_masses: lumped masses by body name [kg], each shape (node_count,), float64.
+
+    Raises:
+        RequestError: the joints form no planar chain, a link moves by itself, or the tip never reaches its target.
+    """
+    if scene.rigid is None:
+        placements = {body.name: _own_placement(body, 0.0) for body in scene.bodies}
+        positions, velocities = _place(placements, meshes)
+        none = np.zeros(0)
+        return HandOff(positions=positions, velocities=velocities, placements=placements, theta=none, theta_dot=none)
+    chain = chain_from_scene(scene, meshes, nodal_masses)
+    _check_bodies(scene, scene.rigid.target, chain)
+    tip, plane = scene.rigid.tip, target_plane(scene, scene.rigid.target, meshes)
+    run = swing(chain, scene.rigid.theta, scene.rigid.theta_dot, tip_gap(chain, tip, plane), scene.rigid.t_max)
+    placements = {body.name: _own_placement(body, run.t_contact) for body in scene.bodies}
+    placements |= link_placements(chain, run.theta, run.theta_dot)
+    centre, velocity = (part[0] for part in placements[tip.body].place(np.array([tip.centre])))
+    if scene.rigid.centre_target and isinstance(scene.rigid.target, Surface):
+        name = scene.rigid.target.body
+        placements[name] = _move_under(placements[name], centre, plane.normal)
+    positions, velocities = _place(placements, meshes)
+    return HandOff(
+        positions=positions,
+        velocities=velocities,
+        placements=placements,
+        t_contact=run.t_contact,
+        theta=run.theta,
+        theta_dot=run.theta_dot,
+        **_approach(centre, velocity, tip.radius, plane),
+        energy_drift=run.energy_drift,
+        **_balance(chain, run, positions, velocities, nodal_masses),
+        chain=chain,
+        swing=run,
+    )
+
+
+def _own_placement(body: Body, t: float) -> Placement:
+    """Pose and motion of a free body after t [s] at its own velocity and angular velocity."""
+    omega, velocity = np.array(body.angular_velocity), np.array(body.velocity)
+    return Placement(
+        pivot=np.zeros(3),
+        origin=np.array(body.position) + velocity * t,
+        rotation=turn(omega * t) @ turn(body.rotation),
+        velocity=velocity,
+        angular_velocity=omega,
+    )
+
+
+def link_placements(chain: Chain, theta: Array, theta_dot: Array) -> dict[str, Placement]:
+    """Pose and motion of each link by body name: R = [d f z], omega = (0, 0, -theta_dot), about its inbound hinge."""
+    hinges, speeds = chain.hinges(theta, theta_dot)
+    d, f = link_axes(theta)
+    return {
+        link.body: Placement(
+            pivot=np.array([*link.hinge_in, 0.0]),
+            origin=np.array([*hinges[i], 0.0]),
+            rotation=np.array([[d[i, 0], f[i, 0], 0.0], [d[i, 1], f[i, 1], 0.0], [0.0, 0.0, 1.0]]),
+            velocity=np.array([*speeds[i], 0.0]),
+            angular_velocity=np.array([0.0, 0.0, -theta_dot[i]]),
+        )
+        for i, link in enumerate(chain.links)
+    }
+
+
+def _move_under(placement: Placement, centre: Array, normal: Array) -> Placement:
+    """The placement moved along the plane until its frame's origin lies under `centre` [m]."""
+    offset = centre - placement.origin
+    origin = placement.origin + offset - (offset @ normal) * normal
+    return Placement(**{**vars(placement), "origin": origin})
+
+
+def _place(placements: Mapping[str, Placement], meshes: Mapping[str, Mesh]) -> tuple[dict, dict]:
+    placed = {name: placement.place(meshes[name].points) for name, placement in placements.items()}
+    return {name: X for name, (X, _) in placed.items()}, {name: V for name, (_, V) in placed.items()}
+
+
+def _check_bodies(scene: Scene, target: Surface | RigidPlane, chain: Chain) -> None:
+    names = [link.body for link in chain.links]
+    for name in names:
+        body = scene.body(name)
+        for field in ("velocity", "angular_velocity"):
+            if any(getattr(body, field)):
+                remedy = "a link moves as RigidPhase.theta_dot says; leave this at 0"
+                raise bad_value(f"Body {name}.{field}", getattr(body, field), remedy)
+    if isinstance(target, Surface) and target.body in names:
+        raise bad_value("RigidPhase.target.body", target.body, "the target must not be a link of the chain")
+
+
+def _approach(centre: Array, velocity: Array, radius: float, plane: TargetPlane) -> dict:
+    """Velocity of the tip's centre against the plane's normal n and along (n_y, -n_x, 0), and the point of contact."""
+    n = plane.normal
+    along = np.array([n[1], -n[0], 0.0]) / np.hypot(n[0], n[1])
+    return {"v_n": float(-velocity @ n), "v_t": float(velocity @ along), "contact_point": centre - radius * n}
+
+
+def _balance(chain: Chain, run: Swing, X: Mapping, V: Mapping, nodal_masses: Mapping[str, Array]) -> dict:
+    """Momenta of the rigid links and of their nodes, and how far they differ."""
+    names = [link.body for link in chain.links]
+    m = np.concatenate([nodal_masses[name] for name in names])
+    r = np.concatenate([X[name] for name in names])[:, :2] - np.asarray(chain.origin)
+    v = np.concatenate([V[name] for name in names])[:, :2]
+    rigid = Momenta(
+        momentum=chain.momentum(run.theta, run.theta_dot),
+        angular_momentum=chain.angular_momentum(run.theta, run.theta_dot),
+        kinetic_energy=chain.kinetic_energy(run.theta, run.theta_dot),
+    )
+    nodes = Momenta(
+        momentum=m @ v,
+        angular_momentum=float(m @ (r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0])),
+        kinetic_energy=float(0.5 * m @ (v**2).sum(axis=1)),
+    )
+    speed, tiny = np.linalg.norm(v, axis=1), np.finfo(np.float64).tiny
+    return {
+        "rigid": rigid,
+        "nodes": nodes,
+        "momentum_mismatch": float(np.linalg.norm(nodes.momentum - rigid.momentum) / max(m @ speed, tiny)),
+        "angular_momentum_mismatch": abs(nodes.angular_momentum - rigid.angular_momentum)
+        / max(float(m @ (np.linalg.norm(r, axis=1) * speed)), tiny),
+        "energy_mismatch": abs(nodes.kinetic_energy - rigid.kinetic_energy) / max(nodes.kinetic_energy, tiny),
+    }

@@ -1,0 +1,1 @@
+"""Owns whole runs: phases in turn, records, guards, batches, sweeps."""

@@ -1,0 +1,75 @@
+"""Owns what is said of a scene's meshes before it runs: slivers, parts that only touch, slaves that are too coarse."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.geometry import Box, Mesh, Plate, Rod, Sphere
+from warp_mca.geometry.quality import doubled_nodes
+from warp_mca.model.surfaces import face_geometry
+from warp_mca.scene import RigidPlane
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.scene import Contact, Scene
+
+LOGGER = "warp_mca"  # name of the logger that warnings go to while a run goes on
+SHORTENED = 10.0  # an element that makes the time step so many times shorter is worth a look
+COARSER = 1.5  # slave's faces so many times as wide as the master's: where it is 2, a third of the force is missing
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Log warnings, each once."""
+    for sentence in dict.fromkeys(sentences):
+        logging.getLogger(LOGGER).warning("%s", sentence)
+
+
+def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> list[str]:
+    """What is worth a look in the meshes of a scene, one sentence each.
+
+    Args:
+        scene: the scene.
+        meshes: of its bodies, by name.
+        model: assembled of them.
+    """
+    found: list[str] = []
+    stable = model.stable
+    if stable.shortened > SHORTENED:
+        name, element = model.owner(stable.element)
+        mesh = meshes[name]
+        x, y, z = mesh.points[mesh.cell(element)].mean(axis=0)
+        found.append(
+            f"element {element} of body {name}, at ({x:.4g}, {y:.4g}, {z:.4g}) m in the body's frame, makes the "
+            f"time step {stable.shortened:.0f} times shorter than half of the elements need; improve the mesh there"
+        )
+    for body in scene.bodies:
+        own = not isinstance(body.geometry, (Box, Plate, Rod, Sphere))
+        if own and (count := doubled_nodes(meshes[body.name])):
+            found.append(
+                f"{count} nodes of body {body.name} lie where others of it do: unless cracks are meant, merge the "
+                "parts of its mesh, which hang together at shared nodes only"
+            )
+    for contact in scene.contacts:
+        if (ratio := _coarser(contact, meshes)) > COARSER:
+            found.append(
+                f"faces of the slave {contact.slave.body} are {ratio:.2g} times as wide as those of its master, "
+                "whose nodes pass between its own: make the finer side the slave, or set two_way"
+            )
+    return found
+
+
+def _coarser(contact: Contact, meshes: Mapping[str, Mesh]) -> float:
+    """Width of the slave's faces over that of the master's [-]; 0 where nodes of both are kept out.
+
+    The lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
+    """
+    if contact.two_way or isinstance(contact.master, RigidPlane):
+        return 0.0
+    sides = ((meshes[side.body], side.nodes) for side in (contact.slave, contact.master))
+    slave, master = (face_geometry(mesh.points, mesh.surface(nodes)[0])[0] for mesh, nodes in sides)
+    return math.sqrt(min(slave.min() / master.min(), np.median(slave) / np.median(master)))

@@ -1,0 +1,78 @@
+"""Owns the arguments that runs and batches share: what they may be, and that runs of several threads wait."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.recorders.recorder import Recorder
+from warp_mca.scene import Scene
+
+Progress = Callable[[str, float], None]  # stage, share done
+RECORDER = ("name", "needs", "cadence", "start", "frame", "history", "finish")  # what a `Recorder` has
+
+P = ParamSpec("P")
+T = TypeVar("T")
+_RUNNING = threading.RLock()  # Warp captures graphs for the whole process: one run at a time
+
+
+def one_at_a_time(run: Callable[P, T]) -> Callable[P, T]:
+    """`run`, which waits until no other thread is in a function that was made by this."""
+
+    @wraps(run)
+    def wait_and_run(*args: P.args, **kwargs: P.kwargs) -> T:
+        with _RUNNING:
+            return run(*args, **kwargs)
+
+    return wait_and_run
+
+
+def check_scene(field: str, scene: object) -> None:
+    """What the user gave as `field` must be a scene.
+
+    Raises:
+        RequestError: it is none.
+    """
+    validate.kind_of(field, scene, Scene, "give a warp_mca.Scene; mca.make_scene(NAME) makes one by its name")
+
+
+def teller(progress: Progress | None) -> Progress:
+    """What is told of stages: `progress`, or nothing.
+
+    Raises:
+        RequestError: it cannot be called.
+    """
+    if progress is None:
+        return lambda stage, done: None
+    if not callable(progress):
+        raise bad_value("progress", validate.brief(progress), "give a function progress(stage, done), or leave it out")
+    return progress
+
+
+def span_of(scene: Scene, duration: float | None) -> float:
+    """The duration [s] of the impact phase: `duration`, or the scene's own if None.
+
+    Raises:
+        RequestError: it is no finite number above 0.
+    """
+    span = scene.impact.duration if duration is None else duration
+    if not (validate.is_number(span) and span > 0.0):
+        raise bad_value("duration", validate.brief(span), "give a finite time above 0 s")
+    return float(span)
+
+
+def check_recorders(recorders: Sequence[Recorder]) -> None:
+    """What the user gave as recorders must be a list of them, made and not their classes.
+
+    Raises:
+        RequestError: it is none.
+    """
+    remedy = "give a list of recorders, as mca.run(scene, recorders=[RerunStream(FILE)]), or leave it out"
+    validate.kind_of("recorders", recorders, (tuple, list), remedy)
+    for k, item in enumerate(recorders):
+        if isinstance(item, type) or not all(hasattr(item, name) for name in RECORDER):
+            raise bad_value(f"recorders[{k}]", validate.brief(item), "give a recorder, as RerunStream(FILE)")

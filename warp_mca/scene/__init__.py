@@ -1,0 +1,32 @@
+"""Owns the public vocabulary of a scene: bodies, joints, contacts, drives, phases.
+
+A scene is plain, immutable data. Every class checks its own values and raises `RequestError` with the field, the value
+and the remedy. Nothing here meshes, allocates or imports Warp.
+"""
+
+from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
+from warp_mca.scene.drives import Fixed, Prescribed
+from warp_mca.scene.joints import Revolute
+from warp_mca.scene.phases import ImpactPhase, RigidPhase, Tip
+from warp_mca.scene.probes import Line, Path, Point
+from warp_mca.scene.scene import Scene
+
+__all__ = [
+    "OVERLAP_CHOICES",
+    "Body",
+    "Contact",
+    "Fixed",
+    "ImpactPhase",
+    "Line",
+    "Path",
+    "Point",
+    "Prescribed",
+    "Revolute",
+    "RigidPhase",
+    "RigidPlane",
+    "Scene",
+    "Surface",
+    "Tip",
+    "Vec3",
+]

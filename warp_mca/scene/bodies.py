@@ -1,0 +1,69 @@
+"""Owns bodies: geometry, material, element and initial motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.elements import ELEMENTS
+from warp_mca.scene.materials import MATERIALS, Material
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+    from warp_mca.geometry.recipe import Recipe
+
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A deformable body.
+
+    Attributes:
+        name: unique in the scene.
+        geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
+        material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
+        element: formulation of its hexahedra, wedges and pyramids: "hex8" fully integrated, "hex8r" one point with
+            hourglass stiffness; "tet4" cuts them to tetrahedra. Tetrahedra are tet4 always.
+        kinematics: "corotational" takes strains as small, in the rotated frame; "finite" as logarithmic, for large
+            plastic deformation.
+        position: of the body frame's origin [m].
+        rotation: of the body frame, as a rotation vector [rad].
+        velocity: initial velocity of the body frame's origin [m/s].
+        angular_velocity: initial angular velocity about the body frame's origin [rad/s].
+    """
+
+    name: str
+    geometry: Recipe | Mesh
+    material: Material | Mapping[str, Material]
+    element: str = "hex8"
+    kinematics: Literal["corotational", "finite"] = "corotational"
+    position: Vec3 = (0.0, 0.0, 0.0)
+    rotation: Vec3 = (0.0, 0.0, 0.0)
+    velocity: Vec3 = (0.0, 0.0, 0.0)
+    angular_velocity: Vec3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Body", name=self.name)
+        if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
+            raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
+        materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
+        if not all(type(material) in MATERIALS.values() for material in materials):  # others have no kernels
+            known = " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in MATERIALS)
+            remedy = f"give {known}, no class made of them, or one for each cell set"
+            raise bad_value(f"Body {self.name}.material", self.material, remedy)
+        if self.element not in tuple(ELEMENTS):
+            raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
+        if self.kinematics not in ("corotational", "finite"):
+            raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
+        validate.vectors(
+            f"Body {self.name}",
+            position=self.position,
+            rotation=self.rotation,
+            velocity=self.velocity,
+            angular_velocity=self.angular_velocity,
+        )

@@ -1,0 +1,107 @@
+"""Owns contacts: surfaces, rigid planes and how they press on each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.scene.bodies import Vec3
+
+OVERLAP_CHOICES = ("refuse", "stress_free", "press")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Boundary faces of `body` that the node set `nodes` covers; "boundary" is the whole skin, unless it is a set."""
+
+    body: str
+    nodes: str
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Surface", body=self.body, nodes=self.nodes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidPlane:
+    """An immovable, analytic half-space; the free side is where `normal` points.
+
+    Attributes:
+        point: any point of the plane [m].
+        normal: its normal [-]; need not have unit length.
+        velocity: of the plane along itself [m/s], as of a belt.
+    """
+
+    point: Vec3 = (0.0, 0.0, 0.0)
+    normal: Vec3 = (0.0, 1.0, 0.0)
+    velocity: Vec3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.vectors("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
+        if math.hypot(*self.normal) == 0.0:
+            raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
+        if abs(sum(v * n for v, n in zip(self.velocity, self.normal, strict=True))) > 1e-12 * math.hypot(
+            *self.velocity
+        ):
+            raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """Node-to-surface penalty contact with stick-slip friction.
+
+    Attributes:
+        slave: surface whose nodes are kept out of the master.
+        master: surface of another body, or a rigid plane.
+        mu: coefficient of friction [-]; 0 runs no friction at all.
+        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes k = c E / (1 - nu^2) A^2 / V, with
+            c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1.
+        two_way: the master's nodes are also kept out of the slave's faces.
+        initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
+            with springs that count depth from there; or "press", with the springs' full force.
+        name: unique in the scene; None for the bodies' names, "slave–master" or "slave–plane", numbered where a pair
+            has several contacts. Results list forces by it.
+        normal: direction of the force on the slave that F_n_N reports [-], of any length. None takes the master's mean
+            normal at hand-off, or adds up the normal forces as they are where the master is closed. Give it where the
+            master turns before the impact, or where only a part of a curved master is touched.
+        tangent: direction that F_t_N reports [-], made perpendicular to the normal. None takes normal x z, or the
+            perpendicular nearest to +x where the normal is within 20 degrees of the z axis.
+    """
+
+    slave: Surface
+    master: Surface | RigidPlane
+    mu: float = 0.0
+    penalty: float | None = None
+    two_way: bool = False
+    initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
+    name: str | None = None
+    normal: Vec3 | None = None
+    tangent: Vec3 | None = None
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
+        validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
+        if self.penalty is not None:
+            validate.positive("Contact", penalty=self.penalty)
+        if self.initial_overlap not in OVERLAP_CHOICES:
+            raise bad_value("Contact.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")
+        if not (validate.is_number(self.mu) and self.mu >= 0.0):
+            raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
+        validate.flags("Contact", two_way=self.two_way)
+        if self.two_way and isinstance(self.master, RigidPlane):
+            raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
+        if isinstance(self.master, Surface) and self.master.body == self.slave.body:
+            raise bad_value("Contact.master.body", self.master.body, "name a body other than the slave's")
+        if self.name is not None:
+            validate.texts("Contact", name=self.name)
+        for axis in ("normal", "tangent"):
+            value = getattr(self, axis)
+            if value is not None:
+                validate.vectors("Contact", **{axis: value})
+                if not any(value):
+                    raise bad_value(f"Contact.{axis}", value, "give a direction other than zero")

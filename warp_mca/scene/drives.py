@@ -1,0 +1,61 @@
+"""Owns prescribed motion of nodes: axes that keep their initial velocity or follow a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed:
+    """Nodes of a set that keep their initial velocity along some axes: no acceleration there.
+
+    Attributes:
+        body: body that owns the set.
+        nodes: node set of its mesh.
+        axes: any of the letters x, y, z in the world frame.
+    """
+
+    body: str
+    nodes: str
+    axes: str = "xyz"
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Fixed", body=self.body, nodes=self.nodes)
+        if not isinstance(self.axes, str) or not self.axes or set(self.axes) - set("xyz"):
+            raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prescribed:
+    """Nodes of a set whose velocity along one axis follows a table, held constant beyond its ends.
+
+    Attributes:
+        body: body that owns the set.
+        nodes: node set of its mesh.
+        axis: one of the letters x, y, z in the world frame.
+        times: [s], increasing, counted from the start of the impact phase.
+        velocities: [m/s], as many as times.
+    """
+
+    body: str
+    nodes: str
+    axis: str
+    times: tuple[float, ...]
+    velocities: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Prescribed", body=self.body, nodes=self.nodes)
+        if self.axis not in ("x", "y", "z"):
+            raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
+        for name, values in (("times", self.times), ("velocities", self.velocities)):
+            if not validate.is_list(values):
+                raise bad_value(f"Prescribed.{name}", values, "give finite numbers")
+        if len(self.times) != len(self.velocities) or not len(self.times):
+            raise bad_value("Prescribed.velocities", self.velocities, "give one velocity for each time")
+        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise bad_value("Prescribed.times", self.times, "list them in increasing order")

@@ -1,0 +1,102 @@
+"""Owns the phases of a run: rigid swing and finite-element impact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.scene.bodies import Vec3
+from warp_mca.scene.contacts import RigidPlane, Surface
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tip:
+    """The sphere of a chain's last link that will touch the target first.
+
+    Attributes:
+        body: the link that carries it.
+        centre: of the sphere in that body's frame [m].
+        radius: [m].
+    """
+
+    body: str
+    centre: Vec3
+    radius: float
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Tip", body=self.body)
+        validate.vectors("Tip", centre=self.centre)
+        validate.positive("Tip", radius=self.radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidPhase:
+    """The large timescale: a planar chain of rigid links swings until its tip reaches the target.
+
+    The links and their hinges are read off the scene's revolute joints, from the ground outwards. Angles are
+    measured from the downward vertical, positive clockwise about z seen from +z (the paper's convention):
+    a link at angle theta points along (-sin theta, -cos theta, 0).
+
+    Attributes:
+        theta: initial angle of each link [rad].
+        theta_dot: initial angular velocity of each link [rad/s].
+        tip: the sphere whose touch ends the phase.
+        target: contact surface that it will touch.
+        inertia: "mesh" takes mass, centre and inertia from the finite-element mesh; "slender" takes uniform
+            slender rods from hinge to hinge (the paper's Eq. 3).
+        centre_target: the target's body is placed so that its frame origin lies under the tip at contact.
+        t_max: give up when nothing was touched by then [s].
+    """
+
+    theta: tuple[float, ...]
+    theta_dot: tuple[float, ...]
+    tip: Tip
+    target: Surface | RigidPlane
+    inertia: Literal["mesh", "slender"] = "mesh"
+    centre_target: bool = True
+    t_max: float = 5.0
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        for name, values in (("theta", self.theta), ("theta_dot", self.theta_dot)):
+            if not validate.is_list(values):
+                raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, one for each link")
+        if len(self.theta) != len(self.theta_dot) or not len(self.theta):
+            raise bad_value("RigidPhase.theta_dot", self.theta_dot, "give one angle and one rate for each link")
+        validate.kinds("RigidPhase", Tip, "give a Tip", tip=self.tip)
+        validate.kinds("RigidPhase", (Surface, RigidPlane), "give a Surface or a RigidPlane", target=self.target)
+        if self.inertia not in ("mesh", "slender"):
+            raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
+        validate.flags("RigidPhase", centre_target=self.centre_target)
+        validate.positive("RigidPhase", t_max=self.t_max)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactPhase:
+    """The small timescale: explicit finite elements.
+
+    Attributes:
+        duration: simulated time [s].
+        output_interval: time between rows of the history [s].
+        time_step_scale: share of the stable time step that is used [-], in (0, 1].
+        energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-].
+    """
+
+    duration: float
+    output_interval: float = 1e-6
+    time_step_scale: float = 0.9
+    energy_tolerance: float = 0.01
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
+        validate.positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
+        if self.output_interval > self.duration:
+            raise bad_value(
+                "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
+            )
+        if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
+            raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")

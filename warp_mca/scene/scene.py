@@ -1,0 +1,108 @@
+"""Owns `Scene`: everything that a run needs to know, checked as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import NoneType
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.contacts import Contact, Surface
+from warp_mca.scene.drives import Fixed, Prescribed
+from warp_mca.scene.joints import Revolute
+from warp_mca.scene.phases import ImpactPhase, RigidPhase
+from warp_mca.scene.probes import Path, Point
+
+_PARTS = {
+    "bodies": Body,
+    "joints": Revolute,
+    "contacts": Contact,
+    "fixed": Fixed,
+    "prescribed": Prescribed,
+    "paths": Path,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """Everything that a run needs to know.
+
+    Attributes:
+        name: of the scene.
+        bodies: at least one.
+        impact: the finite-element phase.
+        rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
+        joints, contacts, fixed, prescribed: what binds the bodies.
+        gravity: [m/s^2].
+        paths: lines along which stress is recorded.
+        tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
+        target: point whose velocity the history lists as plate_vx, plate_vy, plate_vz.
+        parameters: the values that a built-in scene was made from, for the record.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    impact: ImpactPhase
+    rigid: RigidPhase | None = None
+    joints: tuple[Revolute, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    fixed: tuple[Fixed, ...] = ()
+    prescribed: tuple[Prescribed, ...] = ()
+    paths: tuple[Path, ...] = ()
+    gravity: Vec3 = (0.0, 0.0, 0.0)
+    tip: Point | None = None
+    target: Point | None = None
+    parameters: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Scene", name=self.name)
+        for name, kind in _PARTS.items():
+            validate.members("Scene", kind, **{name: getattr(self, name)})
+        validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
+        validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
+        validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
+        validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
+        for key in self.parameters:
+            validate.kind_of("Scene.parameters", key, str, "give each value under its name, a text")
+        names = [body.name for body in self.bodies]
+        if not names:
+            raise bad_value("Scene.bodies", (), "give at least one body")
+        if len(set(names)) != len(names):
+            raise bad_value("Scene.bodies", names, "give each body a name of its own")
+        paths = [path.name for path in self.paths]
+        if len(set(paths)) != len(paths):
+            raise bad_value("Scene.paths", paths, "give each path a name of its own")
+        contacts = [contact.name for contact in self.contacts if contact.name is not None]
+        if len(set(contacts)) != len(contacts):
+            raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
+        pairs = [(item.slave, item.master) for item in self.contacts]
+        for slave, master in pairs:
+            if pairs.count((slave, master)) > 1:
+                what = f"{slave.nodes} of {slave.body}"
+                raise bad_value("Scene.contacts", what, "it meets the same master twice; list each pair once")
+        validate.vectors("Scene", gravity=self.gravity)
+        for field_name, body in self._named_bodies():
+            if body not in names:
+                raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+
+    def _named_bodies(self) -> list[tuple[str, str]]:
+        named = [("Fixed.body", item.body) for item in self.fixed]
+        named += [("Prescribed.body", item.body) for item in self.prescribed]
+        named += [(f"Revolute {item.name}.body", item.body) for item in self.joints]
+        named += [(f"Revolute {item.name}.other", item.other) for item in self.joints if item.other is not None]
+        named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
+        named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
+        named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]
+        named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
+        if self.rigid:
+            named.append(("RigidPhase.tip.body", self.rigid.tip.body))
+            if isinstance(self.rigid.target, Surface):
+                named.append(("RigidPhase.target.body", self.rigid.target.body))
+        return named
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return next(body for body in self.bodies if body.name == name)

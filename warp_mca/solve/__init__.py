@@ -1,0 +1,1 @@
+"""Owns the small timescale: time step, stages, threads."""

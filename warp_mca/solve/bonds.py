@@ -1,0 +1,66 @@
+"""Owns the device side of what binds nodes: axes at rest, hinges, driven axes; and which nodes may be touched."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+
+from warp_mca.kernels.nodes.constraint import Bonds
+from warp_mca.kernels.nodes.node import BOUND, TOUCHABLE
+from warp_mca.model.layout import Layout
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+
+
+class BondStage:
+    """What `kernels.nodes.node` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
+
+    Attributes:
+        count: tied pairs and driven nodes.
+        bonds: pairs, driven nodes and their tables.
+        role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
+        at_rest: the same of a model without hinges and driven axes.
+        impulse: that each joint's pair gave to its first node [N s], shape (pair_count,), vec3d.
+        work, work_after: done on each driven node's axes up to t(n), and half a step later [J], shape (driven_count,),
+            vec3d.
+        clock: steps that each driven node has taken, shape (driven_count,), int32.
+        driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
+    """
+
+    def __init__(self, model: Model, layout: Layout) -> None:
+        """Allocate on the current device."""
+        nodes, place = np.unique(model.prescribed_node, return_inverse=True)
+        pairs = len(model.joint_first)
+        self.count = pairs + len(nodes)
+        role = model.fixed_axes.astype(np.uint8)
+        for item in model.passes:
+            role[item.slave] |= TOUCHABLE
+            role[item.master] |= TOUCHABLE
+        if not self.count and not role.any():
+            role = role[:0]
+        self.at_rest = wp.array(role, dtype=wp.uint8)
+        for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes):
+            role[bound] |= BOUND
+        self.role = wp.array(role, dtype=wp.uint8)
+        begin, end = (np.full((len(nodes), 3), -1, dtype=np.int32) for _ in range(2))
+        begin[place, model.prescribed_axis] = model.table_offset[model.prescribed_table]
+        end[place, model.prescribed_axis] = model.table_offset[model.prescribed_table + 1]
+        self.bonds = Bonds()
+        self.bonds.first = wp.array(model.joint_first, dtype=wp.int32)
+        self.bonds.second = wp.array(model.joint_second, dtype=wp.int32)
+        self.bonds.node = wp.array(nodes, dtype=wp.int32)
+        self.bonds.begin, self.bonds.end = wp.array(begin, dtype=wp.vec3i), wp.array(end, dtype=wp.vec3i)
+        self.bonds.times = wp.array(model.table_time, dtype=wp.float64)
+        self.bonds.values = wp.array(model.table_value, dtype=wp.float64)
+        self.impulse = wp.zeros(pairs, dtype=wp.vec3d)
+        self.work = wp.zeros(len(nodes), dtype=wp.vec3d)
+        self.work_after = wp.zeros(len(nodes), dtype=wp.vec3d)
+        self.clock = wp.zeros(len(nodes), dtype=wp.int32)
+        self.driven_first = wp.array(np.searchsorted(nodes, layout.nodes), dtype=wp.int32)
+
+    def counts(self) -> list[wp.array]:
+        """What the kernel of bound nodes adds to."""
+        return [self.impulse, self.work, self.work_after, self.clock]
