@@ -12,7 +12,6 @@ from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.model import Model
 from warp_mca.results.paths import Probes
-from warp_mca.runs.account import Prepared
 
 Index = NDArray[np.int32]
 
@@ -138,8 +137,12 @@ def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:
     }
 
 
-def join_probes(ready: Sequence[Prepared]) -> Probes:
-    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes."""
-    nodes = offsets([item.model.node_count for item in ready])
-    corner = [item.probes.corner + start for item, start in zip(ready, nodes, strict=False)]
-    return Probes({}, np.concatenate(corner), np.concatenate([item.probes.weight for item in ready]))
+def join_probes(parts: Sequence[tuple[Probes, int]]) -> Probes:
+    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes.
+
+    Args:
+        parts: probes and node count of each scene.
+    """
+    nodes = offsets([count for _, count in parts])
+    corner = [probes.corner + start for (probes, _), start in zip(parts, nodes, strict=False)]
+    return Probes({}, np.concatenate(corner), np.concatenate([probes.weight for probes, _ in parts]))
