@@ -34,6 +34,8 @@ class ElementStage:
         index: of the block in the model; its state is `State.elements[index]`.
         conn, material: as in `Block`.
         points: integration points that keep a plastic strain.
+        rows: of the history.
+        vectors: that follow the plastic strains in the history, and turn with the element.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
         rounds: patches that a block of threads computes in turn.
@@ -47,7 +49,8 @@ class ElementStage:
         Args:
             block: the elements.
             precision: as in `warp_mca.run`.
-            kernels: module that makes force_kernel, energy_kernel and stress_kernel.
+            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says in VECTORS how many
+                vectors follow the plastic strains in the history, if any do.
             points: integration points that keep a plastic strain.
             rows: of the history, where an element keeps more.
         """
@@ -58,6 +61,7 @@ class ElementStage:
         self.slot_node: Index = block.conn.ravel()
         self.slot = 0
         self.points, self.rows = points, rows or points * HISTORY_SIZE
+        self.vectors: int = getattr(kernels, "VECTORS", 0)
         self.real = scalars(precision).real
         kind = (precision, block.law, block.finite)
         self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
@@ -80,6 +84,23 @@ class ElementStage:
             history=wp.zeros((self.rows, kept), dtype=self.real),
             extreme=wp.zeros((2, self.count), dtype=self.real),
         )
+
+    def rotated(self, history: NDArray, rotation: NDArray[np.float64]) -> NDArray:
+        """A history whose elements are turned, with their reference positions.
+
+        Args:
+            history: as in `ElementState`, shape (row_count, element_count).
+            rotation: of each element [-], shape (element_count, 3, 3), float64.
+        """
+        found = np.array(history, dtype=np.float64)
+        for first in range(0, self.points * HISTORY_SIZE, HISTORY_SIZE):
+            xx, yy, xy, yz, xz = found[first : first + 5]
+            strain = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, -xx - yy], axis=-1).reshape(-1, 3, 3)
+            turned = rotation @ strain @ rotation.transpose(0, 2, 1)
+            found[first : first + 5] = turned[:, [0, 1, 0, 1, 0], [0, 1, 1, 2, 2]].T
+        for first in range(self.points * HISTORY_SIZE, self.points * HISTORY_SIZE + 3 * self.vectors, 3):
+            found[first : first + 3] = np.einsum("eij,je->ie", rotation, found[first : first + 3])
+        return found.astype(history.dtype)
 
     def _history(self, own: ElementState, part: slice) -> list[Any]:
         """Yield flags and history of a range of elements."""
