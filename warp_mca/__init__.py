@@ -18,12 +18,15 @@ from warp_mca.scene import (
     Path,
     Point,
     Prescribed,
+    Prismatic,
     Revolute,
     RigidPhase,
     RigidPlane,
     Scene,
+    Spherical,
     Surface,
     Tip,
+    Weld,
 )
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
@@ -63,6 +66,9 @@ __all__ = [
     "Surface",
     "RigidPlane",
     "Revolute",
+    "Weld",
+    "Spherical",
+    "Prismatic",
     "Fixed",
     "Prescribed",
     "Point",

@@ -143,7 +143,9 @@ class Solver:
         rounds = min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
         early = not touched and not bound and rounds >= EARLY_ROUNDS
         self.integrate_kernel = node.integrate_kernel(self.precision, touched, fixed, bound, each, early)
-        self.bound_kernel = constraint.bound_kernel(self.precision, touched, each) if bound else None
+        self.bound_kernel = (
+            constraint.bound_kernel(self.precision, touched, each, self.bonds.partial) if bound else None
+        )
         self.sum_elements_kernel = ledger.sum_elements_kernel(self.precision)
 
     def _forces(self, split: Split = whole, beside: Callable[[], None] | None = None) -> None:
