@@ -86,7 +86,5 @@ def test_ties_that_project_on_nothing_are_refused(registered: None):
 
 
 def test_what_is_not_registered_is_refused():
-    with pytest.raises(
-        mca.RequestError, match=r"Scene.joints\[0\] = 'Planar': give a Revolute or a Weld or .*, no class made of"
-    ):
+    with pytest.raises(mca.RequestError, match=r"^Scene.joints\[0\] = .Planar.: give a Revolute or a Weld or "):
         pair()

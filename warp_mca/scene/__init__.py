@@ -5,6 +5,7 @@ and the remedy. Nothing here meshes, allocates or imports Warp.
 """
 
 from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
@@ -20,6 +21,7 @@ __all__ = [
     "ImpactPhase",
     "Line",
     "Path",
+    "Penalty",
     "Point",
     "Prescribed",
     "Prismatic",

@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.contact import contact, search, sides, spring
+from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.model.layout import offsets
 from warp_mca.model.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.solve.extremes import NormalForce
@@ -61,16 +62,19 @@ class ContactStage:
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = _numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
+        self.law = items[0].law
+        rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
+        self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
         self.spring = self._new_springs()
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free)
+            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.law)
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free)
+            contact.surface_kernel(friction, self.each, self.stress_free, self.law)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free)
+            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free, self.law)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
@@ -107,6 +111,8 @@ class ContactStage:
             "stiffness",
         ):
             setattr(found, name, wp.zeros(count, dtype=wp.float64))
+        found.normal_energy = wp.zeros(0 if self.law == LINEAR else count, dtype=wp.float64)
+        found.parameters = self.parameters
         found.rest = wp.zeros(count if self.stress_free else 0, dtype=wp.float64)
         found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
         found.face = wp.full(count, -1, dtype=wp.int32)
