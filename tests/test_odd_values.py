@@ -16,6 +16,7 @@ import warp_mca as mca
 from warp_mca import geometry, scene
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.scene import materials
+from warp_mca.scene.joints import Joint
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=4e8, E_t=1e9, beta=0.5)
@@ -39,7 +40,11 @@ SOUND: dict[type, Any] = {
     mca.Surface: TOP,
     mca.RigidPlane: WALL,
     mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
+    mca.Penalty: mca.Penalty(),
     mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
+    mca.Weld: mca.Weld(name="W", body="up", nodes="ymax"),
+    mca.Spherical: mca.Spherical(name="S", body="up", at=(0.0, 0.0, 0.0)),
+    mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
     mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
     mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
     mca.Tip: TIP,
@@ -129,6 +134,10 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():
             change = {"bodies": (item, up)}
+        case Joint():
+            change = {"joints": (item,)}
+        case mca.Penalty():
+            change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], law=item),)}
         case mca.Surface() | mca.RigidPlane():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], master=item),)}
         case mca.Line():
@@ -138,7 +147,6 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Point: "tip",
                 mca.Path: "paths",
                 mca.Contact: "contacts",
-                mca.Revolute: "joints",
                 mca.Fixed: "fixed",
                 mca.Prescribed: "prescribed",
             }[type(item)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.constraints import Hinge, check_bindings, constraints, join_bodies
+from warp_mca.model.constraints import JointPairs, check_bindings, constraints, join_bodies
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.layout import Layout
 from warp_mca.model.stable_step import StableStep
@@ -45,6 +45,8 @@ class Model:
         table_offset: start of each table, shape (table_count + 1,), int32.
         table_time, table_value: [s] and [m/s], float64.
         joint_first, joint_second: tied nodes, shape (pair_count,), int32; GROUND has no second node.
+        joint_tied: orthogonal projector on the directions in which pairs move as one [-], shape (pair_count, 3, 3),
+            float64.
         hinges: the joints that own the pairs.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
@@ -72,7 +74,8 @@ class Model:
     table_value: Array
     joint_first: Index
     joint_second: Index
-    hinges: tuple[Hinge, ...]
+    joint_tied: Array
+    hinges: tuple[JointPairs, ...]
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -207,11 +210,11 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
     parts = Assembly(scene, meshes, X)
-    first, second, hinges = join_bodies(parts)
+    pairs, joints = join_bodies(parts)
     blocks, order = parts.blocks()
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
-    check_bindings(held, first, second)
+    check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
     stable = parts.stable(added)
     return Model(
@@ -221,9 +224,8 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         blocks=blocks,
         law=parts.law(),
         **held,
-        joint_first=first,
-        joint_second=second,
-        hinges=hinges,
+        **pairs,
+        hinges=joints,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

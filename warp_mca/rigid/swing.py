@@ -236,15 +236,13 @@ def _ground_hinge(scene: Scene, name: str, hinge: Vec2) -> Vec2:
 
 def _spans(scene: Scene) -> list[tuple[str, Vec2, Vec2 | None]]:
     """Body, inbound hinge in its frame and outbound hinge from there [m] of each link, from the ground outwards."""
-    for joint in scene.joints:
-        if joint.axis[0] != 0.0 or joint.axis[1] != 0.0 or joint.axis[2] == 0.0:
-            raise bad_value(f"Revolute {joint.name}.axis", joint.axis, "a planar chain hinges about z; give (0, 0, 1)")
-    grounded = [joint for joint in scene.joints if joint.other is None]
+    hinges = _hinges(scene)
+    grounded = [joint for joint in hinges if joint.other is None]
     if len(grounded) != 1:
         remedy = "a chain hangs from exactly one ground hinge (a Revolute with other=None)"
         raise bad_value("Scene.joints on the ground", [joint.name for joint in grounded], remedy)
     body, hinge = grounded[0].body, grounded[0].at
-    left = [joint for joint in scene.joints if joint.other is not None]
+    left = [joint for joint in hinges if joint.other is not None]
     spans, visited = [], {body}
     while True:
         touching = [joint for joint in left if body in (joint.body, joint.other)]
@@ -264,6 +262,23 @@ def _spans(scene: Scene) -> list[tuple[str, Vec2, Vec2 | None]]:
         remedy = f"these joints do not hang on the ground hinge {grounded[0].name}; connect or remove them"
         raise bad_value("Scene.joints", [joint.name for joint in left], remedy)
     return [*spans, (body, hinge[:2], None)]
+
+
+def _hinges(scene: Scene) -> list[Revolute]:
+    """The scene's joints, all hinges about z.
+
+    Raises:
+        RequestError: one of them is not.
+    """
+    hinges = []
+    for joint in scene.joints:
+        if not isinstance(joint, Revolute):
+            remedy = "the links of a rigid phase hang on Revolute joints; leave other kinds out, or the rigid phase"
+            raise bad_value("Scene.joints", joint.title, remedy)
+        if joint.axis[0] != 0.0 or joint.axis[1] != 0.0 or joint.axis[2] == 0.0:
+            raise bad_value(f"Revolute {joint.name}.axis", joint.axis, "a planar chain hinges about z; give (0, 0, 1)")
+        hinges.append(joint)
+    return hinges
 
 
 def _cross(joint: Revolute, body: str) -> tuple[Vec3, str, Vec3]:

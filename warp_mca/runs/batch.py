@@ -146,7 +146,7 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
             remedy = f"scenes[0] has {len(first.contacts)}; batch scenes with as many contacts"
             raise bad_value(f"number of scenes[{k}].contacts", len(scene.contacts), remedy)
         for i, (contact, wanted) in enumerate(zip(scene.contacts, first.contacts, strict=True)):
-            for name, kind in (("master", _kind), ("two_way", bool)):
+            for name, kind in (("master", _kind), ("two_way", bool), ("law", _law)):
                 value, other = (kind(getattr(item, name)) for item in (contact, wanted))
                 if value != other:
                     remedy = f"that of scenes[0] is {other}; batch scenes with contacts of the same kinds"
@@ -156,6 +156,10 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
 
 def _kind(master: object) -> str:
     return "RigidPlane" if isinstance(master, RigidPlane) else "Surface"
+
+
+def _law(law: object) -> str:
+    return type(law).__name__
 
 
 @contextmanager

@@ -52,7 +52,7 @@ def take_history(solver: Solver, state: State, rotations: Mapping[str, Array]) -
             BlockHistory(
                 kind=stage.block.kind,
                 element=element[order],
-                yielded=own.yielded.numpy()[order],
+                yielded=np.asarray(own.yielded.numpy()[order], dtype=np.int32),
                 history=stage.rotated(own.history.numpy()[:, order], turned),
             )
         )

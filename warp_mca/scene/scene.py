@@ -11,13 +11,12 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
-from warp_mca.scene.joints import Revolute
+from warp_mca.scene.joints import JOINTS, Joint
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
 
 _PARTS = {
     "bodies": Body,
-    "joints": Revolute,
     "contacts": Contact,
     "fixed": Fixed,
     "prescribed": Prescribed,
@@ -46,7 +45,7 @@ class Scene:
     bodies: tuple[Body, ...]
     impact: ImpactPhase
     rigid: RigidPhase | None = None
-    joints: tuple[Revolute, ...] = ()
+    joints: tuple[Joint, ...] = ()
     contacts: tuple[Contact, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     prescribed: tuple[Prescribed, ...] = ()
@@ -61,6 +60,11 @@ class Scene:
         validate.texts("Scene", name=self.name)
         for name, kind in _PARTS.items():
             validate.members("Scene", kind, **{name: getattr(self, name)})
+        validate.kind_of("Scene.joints", self.joints, (tuple, list), "give a tuple of joints")
+        for k, joint in enumerate(self.joints):
+            if type(joint) not in JOINTS.values():  # others are not registered
+                remedy = f"give a {' or a '.join(JOINTS)}, no class made of them"
+                raise bad_value(f"Scene.joints[{k}]", validate.brief(joint), remedy)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
@@ -78,6 +82,9 @@ class Scene:
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
         if len(set(contacts)) != len(contacts):
             raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
+        joints = [joint.name for joint in self.joints]
+        if len(set(joints)) != len(joints):
+            raise bad_value("Scene.joints", joints, "give each joint a name of its own")
         pairs = [(item.slave, item.master) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:
@@ -91,8 +98,8 @@ class Scene:
     def _named_bodies(self) -> list[tuple[str, str]]:
         named = [("Fixed.body", item.body) for item in self.fixed]
         named += [("Prescribed.body", item.body) for item in self.prescribed]
-        named += [(f"Revolute {item.name}.body", item.body) for item in self.joints]
-        named += [(f"Revolute {item.name}.other", item.other) for item in self.joints if item.other is not None]
+        named += [(f"{item.title}.body", item.body) for item in self.joints]
+        named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
         named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
         named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]

@@ -1,4 +1,4 @@
-"""Owns the device side of what binds nodes: axes at rest, hinges, driven axes; and which nodes may be touched."""
+"""Owns the device side of what binds nodes: axes at rest, joints, driven axes; and which nodes may be touched."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ class BondStage:
 
     Attributes:
         count: tied pairs and driven nodes.
+        partial: whether some pairs are tied in some directions only.
         bonds: pairs, driven nodes and their tables.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
-        at_rest: the same of a model without hinges and driven axes.
+        at_rest: the same of a model without joints and driven axes.
         pairs, driven: their numbers.
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
@@ -66,6 +67,8 @@ class BondStage:
         self.bonds = Bonds()
         self.bonds.first = wp.array(model.joint_first, dtype=wp.int32)
         self.bonds.second = wp.array(model.joint_second, dtype=wp.int32)
+        self.partial = bool((model.joint_tied != np.eye(3)).any())
+        self.bonds.tied = wp.array(model.joint_tied if self.partial else model.joint_tied[:0], dtype=wp.mat33d)
         self.bonds.node = wp.array(nodes, dtype=wp.int32)
         self.bonds.begin, self.bonds.end = wp.array(begin, dtype=wp.vec3i), wp.array(end, dtype=wp.vec3i)
         self.bonds.times = wp.array(model.table_time, dtype=wp.float64)

@@ -12,6 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.contact import contact, search, sides, spring
+from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.model.layout import offsets
 from warp_mca.model.surfaces import LIST_LENGTH, ContactPass
@@ -88,15 +89,18 @@ class ContactStage:
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = _numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
+        self.law = items[0].law
+        rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
+        self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free)
+            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.law)
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free)
+            contact.surface_kernel(friction, self.each, self.stress_free, self.law)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free)
+            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free, self.law)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
@@ -138,6 +142,8 @@ class ContactStage:
             setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
         for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth", "lost", "stiffness"):
             setattr(found, name, wp.zeros(count, dtype=wp.float64))
+        found.normal_energy = wp.zeros(0 if self.law == LINEAR else count, dtype=wp.float64)
+        found.parameters = self.parameters
         found.rest = wp.zeros(count if self.stress_free else 0, dtype=wp.float64)
         found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
         found.face = wp.full(count, -1, dtype=wp.int32)

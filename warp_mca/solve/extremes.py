@@ -44,6 +44,7 @@ class NormalForce:
 
 def _scale(passes: Sequence[ContactPass]) -> float:
     """What sums count for a newton [1/N]: guards stop a run before forces come near the largest whole number."""
-    reach = [item.sides * float(item.stiffness.sum()) * max(item.longest, item.deepest) for item in passes]
+    stiffness = [item.stiffening * item.sides * float(item.stiffness.sum()) for item in passes]
+    reach = [k * max(item.longest, item.deepest) for k, item in zip(stiffness, passes, strict=True)]
     _, exponent = math.frexp(sum(reach))
     return 2.0 ** min(max(_BITS - exponent, -_LARGEST), _LARGEST)

@@ -40,7 +40,7 @@ class NodeStage:
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         bound, early = bonds.count > 0, rounds >= EARLY_ROUNDS
         self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
-        self.bound_kernel = constraint.bound_kernel(precision, self.touched, each) if bound else None
+        self.bound_kernel = constraint.bound_kernel(precision, self.touched, each, bonds.partial) if bound else None
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

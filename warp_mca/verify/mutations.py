@@ -46,9 +46,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "contact_soft": Mutation(
         "contact springs are ten times too soft",
-        "kernels/contact/spring.py",
-        "Fn = -k * gap",
-        "Fn = -wp.float64(0.1) * k * gap",
+        "kernels/contact/penalty.py",
+        "return k * depth",
+        "return wp.float64(0.1) * k * depth",
     ),
     "reaction_halved": Mutation(
         "what touches gives back half the force that it takes",
