@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,8 +52,8 @@ class Model:
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
         gravity: of each scene [m/s^2], shape (scene_count, 3), float64.
-        points: nodes whose velocity is recorded (tip, target; those of each scene in turn), shape (2 scene_count,),
-            int32; GROUND where there is none.
+        points: nodes whose velocity is recorded (tip, target, others; those of each scene in turn), shape
+            (point_count,), int32; GROUND where there is none.
         node_start, element_start: first node and element of each body in the concatenated meshes, by name.
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
@@ -203,13 +203,22 @@ def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # `stable_step` refuses what is not finite
-def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array], V: Mapping[str, Array]) -> Model:
+def build_model(
+    scene: Scene,
+    meshes: Mapping[str, Mesh],
+    X: Mapping[str, Array],
+    V: Mapping[str, Array],
+    watched: Sequence[tuple[str, int]] = (),
+) -> Model:
     """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
+
+    `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh.
 
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
     parts = Assembly(scene, meshes, X)
+    others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints = join_bodies(parts)
     blocks, order = parts.blocks()
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
@@ -229,7 +238,7 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),
-        points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target)], dtype=np.int32),
+        points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target), *others], dtype=np.int32),
         node_start=parts.node_start,
         element_start=parts.element_start,
         element_of=order,

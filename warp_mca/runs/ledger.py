@@ -252,7 +252,7 @@ class Ledger:
         pressed, stuck = springs[:, :, NORMAL_IMPULSE].sum(axis=1), springs[:, :, STICK_IMPULSE].sum(axis=1)
         stick: Array = np.zeros(len(table))
         np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
-        velocity = np.array(self.kept.velocities[first:]).reshape(-1, 2, 3)
+        velocity = np.array(self.kept.velocities[first:]).reshape(-1, len(self.model.points), 3)
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
             velocity[:, 1] = self.model.passes[0].plane.velocity

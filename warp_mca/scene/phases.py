@@ -83,12 +83,15 @@ class ImpactPhase:
         output_interval: time between rows of the history [s].
         time_step_scale: share of the stable time step that is used [-], in (0, 1].
         energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-].
+        open_time: how long all contacts must be open for an impact to end, in a run of many phases [s]; None takes the
+            longest period of bending of a link, see docs/theory.md.
     """
 
     duration: float
     output_interval: float = 1e-6
     time_step_scale: float = 0.9
     energy_tolerance: float = 0.01
+    open_time: float | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -98,5 +101,7 @@ class ImpactPhase:
             raise bad_value(
                 "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
             )
+        if self.open_time is not None:
+            validate.positive("ImpactPhase", open_time=self.open_time)
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")

@@ -33,6 +33,8 @@ class Scene:
         bodies: at least one.
         impact: the finite-element phase.
         rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
+        t_end: the run goes through as many swings and impacts as occur until then, counted from the release [s]; None
+            for one impact.
         joints, contacts, fixed, prescribed: what binds the bodies.
         gravity: [m/s^2].
         paths: lines along which stress is recorded.
@@ -45,6 +47,7 @@ class Scene:
     bodies: tuple[Body, ...]
     impact: ImpactPhase
     rigid: RigidPhase | None = None
+    t_end: float | None = None
     joints: tuple[Joint, ...] = ()
     contacts: tuple[Contact, ...] = ()
     fixed: tuple[Fixed, ...] = ()
@@ -67,6 +70,7 @@ class Scene:
                 raise bad_value(f"Scene.joints[{k}]", validate.brief(joint), remedy)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
+        self._check_t_end()
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
         for key in self.parameters:
@@ -94,6 +98,21 @@ class Scene:
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+
+    def _check_t_end(self) -> None:
+        """Refuse an end that no cycle of swings and impacts can reach.
+
+        Raises:
+            RequestError: it is no time above 0, or the scene does not swing or has driven nodes.
+        """
+        if self.t_end is None:
+            return
+        validate.positive("Scene", t_end=self.t_end)
+        if self.rigid is None:
+            raise bad_value("Scene.t_end", self.t_end, "swings and impacts in turn need a RigidPhase; give one")
+        if self.prescribed:
+            remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
+            raise bad_value("Scene.t_end", self.t_end, remedy)
 
     def _named_bodies(self) -> list[tuple[str, str]]:
         named = [("Fixed.body", item.body) for item in self.fixed]
