@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import GuardError, McaError, RequestError
 from warp_mca.scene import (
+    BaseMotion,
     Body,
     Contact,
     Fixed,
     ImpactPhase,
+    JointTorque,
     Line,
     Path,
     Point,
@@ -22,6 +24,7 @@ from warp_mca.scene import (
     RigidPhase,
     RigidPlane,
     Scene,
+    Slide,
     Surface,
     Tip,
 )
@@ -70,6 +73,9 @@ __all__ = [
     "Line",
     "Tip",
     "RigidPhase",
+    "BaseMotion",
+    "Slide",
+    "JointTorque",
     "ImpactPhase",
     "Box",
     "Rod",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warp_mca.rigid.chain import Array, Chain, link_axes, mesh_link, perpendicular
-from warp_mca.rigid.handoff import link_placements
+from warp_mca.rigid.placement import link_placements
 
 MAX_ITERATIONS = 50  # of the fit of the angles; elastic shapes need three or four
 

@@ -172,7 +172,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hand_off_spins_backwards": Mutation(
         "nodes take the link's angular velocity with the wrong sign at hand-off",
-        "warp_mca/rigid/handoff.py",
+        "warp_mca/rigid/placement.py",
         "np.cross(self.angular_velocity, r)",
         "np.cross(r, self.angular_velocity)",
     ),
