@@ -63,11 +63,6 @@ class Link:
     hinge_out: Vec2 = (0.0, 0.0)
     hinge_in: Vec2 = (0.0, 0.0)
 
-    @property
-    def about_hinge(self) -> float:
-        """Inertia about the inbound hinge [kg m^2]."""
-        return self.inertia + self.mass * (self.centre[0] ** 2 + self.centre[1] ** 2)
-
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mass) and self.mass > 0.0):
             raise bad_value(f"mass of link {self.body}", self.mass, "give a finite number of kg above 0")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,15 +12,14 @@ from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import bad_value
 from warp_mca.rigid.chain import Array, Chain
-from warp_mca.rigid.loads import Loads, joint_rates, link_torques
+from warp_mca.rigid.flow import flow, own_pace, round_off
+from warp_mca.rigid.loads import Loads
 from warp_mca.rigid.touch import Gap, Watch
 
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolution
 
-MOST_TURN = 1e4  # of a chain at its own pace [rad]: some minutes of computing
 MAX_TURN_PER_STEP = 0.05  # of the chain's own time scale, so that the gap has at most one minimum in a step
-MOST_DECAYS = 1e6  # of joint rates by friction at rest, in a swing: some minutes of computing
 SAMPLE_COUNT = 257  # of the trajectory kept for plotting
 
 
@@ -78,9 +77,9 @@ def swing(
         RequestError: the tip overlaps the target at the start, or does not reach it by t_max.
     """
     y = _state(chain, theta0, theta_dot0)
-    _pace(chain, y, t_max if t_end is None else t_end, "RigidPhase.t_max" if t_end is None else "t_end")
+    own_pace(chain, y, t_max if t_end is None else t_end, "RigidPhase.t_max" if t_end is None else "t_end")
     start = gap(0.0, y[: chain.coordinate_count])
-    if start < -_round_off(chain):
+    if start < -round_off(chain):
         remedy = f"the tip overlaps the target at the start by {-start:.6g} m; move the target away or change"
         raise bad_value("gap to RigidPhase.target at t = 0 [m]", float(start), f"{remedy} RigidPhase.theta")
     run = swing_until(chain, theta0, theta_dot0, (gap,), t_end=t_max if t_end is None else t_end)
@@ -126,8 +125,8 @@ def swing_until(
             the integration breaks off.
     """
     y = _state(chain, theta, theta_dot)
-    pace = _pace(chain, y, t_end - t_start, "time of a swing [s]")
-    watches = [Watch(gap, chain.coordinate_count, t_start, y, _round_off(chain)) for gap in gaps]
+    pace = own_pace(chain, y, t_end - t_start, "time of a swing [s]")
+    watches = [Watch(gap, chain.coordinate_count, t_start, y, round_off(chain)) for gap in gaps]
     if chain.loads is not None:
         y = np.concatenate([y, np.zeros(3)])
     times, pieces = [t_start], []
@@ -148,83 +147,10 @@ def _state(chain: Chain, theta: ArrayLike, theta_dot: ArrayLike) -> Array:
     return y
 
 
-def _round_off(chain: Chain) -> float:
-    """Gaps up to this are closed, or overlap by no more than rounding [m]."""
-    return 1e-13 * _reach(chain)
-
-
-def _reach(chain: Chain) -> float:
-    return sum(math.hypot(*link.hinge_out, *link.centre, math.sqrt(link.inertia / link.mass)) for link in chain.links)
-
-
-def _pace(chain: Chain, y: Array, span: float, field: str) -> float:
-    """Angular velocity [rad/s] that the chain reaches by itself, for the longest step.
-
-    Raises:
-        RequestError: the links would turn too often in `span` [s].
-    """
-    with np.errstate(over="ignore"):
-        rates = chain.angles(y[chain.coordinate_count :])
-        square = math.hypot(*chain.gravity) / _reach(chain) + (rates**2).max()
-        if chain.loads is not None:
-            lightest = min(link.about_hinge for link in chain.links)
-            square += chain.loads.greatest_torque / lightest
-            _check_stiffness(chain.loads, lightest, span)
-            if chain.loads.base_velocity is not None:
-                slopes = [chain.loads.base_velocity.slope(t) for t in chain.loads.corners]
-                square += float(np.linalg.norm(slopes, axis=1).max()) / _reach(chain)
-        pace = math.sqrt(square)
-    if not pace * span < MOST_TURN:
-        remedy = f"links that turn at {pace:.3g} rad/s would turn by more than {MOST_TURN:g} rad; give a shorter time"
-        raise bad_value(field, span, remedy)
-    return pace
-
-
-def _check_stiffness(loads: Loads, inertia: float, span: float) -> None:
-    """Refuse friction that needs too many steps in `span` [s] on links of that inertia [kg m^2].
-
-    Raises:
-        RequestError: so it does.
-    """
-    rate = float((loads.friction / loads.friction_rate + loads.damping).max()) / inertia
-    if not rate * span < MOST_DECAYS:
-        remedy = (
-            f"friction at rest would decay {rate * span:.3g} times in {span:g} s; give a larger rate or less friction"
-        )
-        raise bad_value("RigidPhase.friction_rate", loads.friction_rate, remedy)
-
-
 def _stops(loads: Loads | None, t_start: float, t_end: float) -> list[float]:
     """Where the integration halts: corners of the tables, and the end [s]."""
     corners = [] if loads is None else [float(t) for t in loads.corners if t_start < t < t_end]
     return [*corners, t_end] if t_end > t_start else []
-
-
-def _flow(chain: Chain, middle: float):
-    """y' = f(t, y) between two corners of the tables, around the time `middle` [s].
-
-    y holds coordinates and rates, and where there are loads the work of torques, the heat of friction and the work of
-    the base [J]. In the frame of a base that accelerates at a, gravity is g - a.
-    """
-    count, loads = chain.coordinate_count, chain.loads
-    if loads is None:
-        return lambda _t, y: np.concatenate([y[count:], chain.acceleration(y[:count], y[count:])])
-    base, local = loads.base_velocity, replace(chain, origin_velocity=(0.0, 0.0))
-    if base is not None:
-        a = base.slope(middle)
-        local = replace(local, gravity=(float(chain.gravity[0] - a[0]), float(chain.gravity[1] - a[1])))
-
-    def flow(t: float, y: Array) -> Array:
-        q, v = y[:count], y[count : 2 * count]
-        rates = joint_rates(chain.angles(v))
-        drive, friction = loads.drive_torques(t), loads.friction_torques(rates)
-        force = np.zeros(count)
-        chain.angles(force)[:] = link_torques(drive + friction)
-        a = local.acceleration(q, v, force)
-        base_power = 0.0 if base is None else local.base_force(q, v, a) @ base.at(t)
-        return np.concatenate([v, a, [drive @ rates, -friction @ rates, base_power]])
-
-    return flow
 
 
 def _advance(
@@ -243,7 +169,7 @@ def _advance(
     times, pieces = trace
     start = times[-1]
     longest = min(until - start, MAX_TURN_PER_STEP / pace) if pace > 0.0 else until - start
-    solver = DOP853(_flow(chain, 0.5 * (start + until)), start, y, until, max_step=longest, rtol=1e-12, atol=1e-14)
+    solver = DOP853(flow(chain, 0.5 * (start + until)), start, y, until, max_step=longest, rtol=1e-12, atol=1e-14)
     while solver.status == "running":
         message = solver.step()
         if solver.status == "failed":

@@ -179,8 +179,8 @@ MUTATIONS: dict[str, Mutation] = {
     "vibration_energy_doubled": Mutation(
         "hand-back doubles the kinetic energy that does not fit",
         "warp_mca/rigid/handback.py",
-        "vibration_energy=float(0.5 * left)",
-        "vibration_energy=float(left)",
+        "vibration_energy=float(0.5 * energy)",
+        "vibration_energy=float(energy)",
     ),
     "far_links_weightless": Mutation(
         "a link of the rigid chain does not carry the weight of the links beyond it",
