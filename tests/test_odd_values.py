@@ -50,6 +50,9 @@ SOUND: dict[type, Any] = {
     mca.Tip: TIP,
     mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),
     mca.ImpactPhase: mca.ImpactPhase(duration=1e-7, output_interval=1e-7),
+    mca.BaseMotion: mca.BaseMotion(times=(0.0, 1.0), vx=(0.0, 1.0), vy=(0.5, 0.0)),
+    mca.Slide: mca.Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.1, velocity=0.1),
+    mca.JointTorque: mca.JointTorque(joint="O", times=(0.0, 1.0), torques=(0.0, 1.0)),
 }
 SOUND[mca.Body] = mca.Body(name="low", geometry=SOUND[mca.Box], material=STEEL)
 SOUND[mca.Scene] = mca.Scene(
@@ -128,6 +131,10 @@ def scene_with(item: Any) -> mca.Scene:
         case mca.RigidPhase() | mca.Tip():
             phase = item if isinstance(item, mca.RigidPhase) else dataclasses.replace(SOUND[mca.RigidPhase], tip=item)
             change = {"rigid": phase, "joints": (SOUND[mca.Revolute],), "gravity": (0.0, -9.81, 0.0)}
+        case mca.BaseMotion() | mca.Slide() | mca.JointTorque():
+            name = {mca.BaseMotion: "base_motion", mca.Slide: "slide", mca.JointTorque: "torques"}[type(item)]
+            loads = {name: (item,) if name == "torques" else item}
+            return scene_with(dataclasses.replace(SOUND[mca.RigidPhase], **loads))
         case mca.Elastic():
             change = {"bodies": (dataclasses.replace(low, material=item), up)}
         case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.MeshFile() | mca.Mesh():

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import GuardError, McaError, RequestError
 from warp_mca.scene import (
+    BaseMotion,
     Body,
     Contact,
     Fixed,
     ImpactPhase,
+    JointTorque,
     Line,
     Path,
     Penalty,
@@ -24,6 +26,7 @@ from warp_mca.scene import (
     RigidPhase,
     RigidPlane,
     Scene,
+    Slide,
     Spherical,
     Surface,
     Tip,
@@ -78,6 +81,9 @@ __all__ = [
     "Line",
     "Tip",
     "RigidPhase",
+    "BaseMotion",
+    "Slide",
+    "JointTorque",
     "ImpactPhase",
     "Box",
     "Rod",

@@ -9,16 +9,18 @@ from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
-from warp_mca.scene.phases import ImpactPhase, RigidPhase, Tip
+from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
 
 __all__ = [
     "OVERLAP_CHOICES",
+    "BaseMotion",
     "Body",
     "Contact",
     "Fixed",
     "ImpactPhase",
+    "JointTorque",
     "Line",
     "Path",
     "Penalty",
@@ -30,6 +32,7 @@ __all__ = [
     "RigidPlane",
     "Scene",
     "Spherical",
+    "Slide",
     "Surface",
     "Tip",
     "Vec3",
