@@ -118,6 +118,9 @@ def build(
     joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "ends",
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
+    t_end: Annotated[
+        float | None, Param("end of a run through all impacts, from the release", unit="s", low=0.0, exclusive=True)
+    ] = None,
     duration: Annotated[float, Param("simulated time after contact", unit="s", low=0.0, exclusive=True)] = 0.6e-3,
     output_interval: Annotated[
         float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)
@@ -204,6 +207,7 @@ def build(
             inertia=rigid_inertia,  # pyright: ignore[reportArgumentType]
         ),
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval, time_step_scale=time_step_scale),
+        t_end=t_end,
         tip=mca.Point(body="AB", at=tip_centre),
         target=mca.Point(body="plate", at=(0.0, 0.0, 0.0)),
     )

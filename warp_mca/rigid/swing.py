@@ -43,6 +43,7 @@ class Swing:
         torque_work: put in by the joints' prescribed torques [J].
         friction_heat: of the joints [J].
         base_work: put in by the base's prescribed motion [J].
+        work_t: these three at the sampled times [J], shape (sample_count, 3), float64.
     """
 
     ended_by: Literal["touch", "t_end"]
@@ -55,6 +56,7 @@ class Swing:
     theta_t: Array
     theta_dot_t: Array
     closest: tuple[float, float]
+    work_t: Array
     torque_work: float = 0.0
     friction_heat: float = 0.0
     base_work: float = 0.0
@@ -221,6 +223,7 @@ def _record(
         theta_t=samples[:, :count],
         theta_dot_t=samples[:, count : 2 * count],
         closest=closest,
+        work_t=samples[:, 2 * count :] if chain.loads is not None else np.zeros((len(t), 3)),
         torque_work=float(work[0]),
         friction_heat=float(work[1]),
         base_work=float(work[2]),

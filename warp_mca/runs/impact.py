@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
@@ -17,6 +18,7 @@ from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.solve.output import Output
 from warp_mca.solve.solver import Solver
+from warp_mca.solve.state import State
 from warp_mca.solve.steps import Part
 from warp_mca.solve.transfer import Transfer
 from warp_mca.solve.workspace import ROWS
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
     from warp_mca.recorders.frames import Recording
     from warp_mca.recorders.recorder import SurfaceMesh
     from warp_mca.runs.prepare import Prepared
+
+
+Array = NDArray[np.float64]
 
 
 class Impact:
@@ -52,6 +57,7 @@ class Impact:
         threads: int,
         skins: Mapping[str, SurfaceMesh] | None = None,
         needs: frozenset[str] = frozenset(),
+        shape: Callable[[Solver, State], None] | None = None,
     ) -> None:
         """Allocate, compile and settle what overlaps.
 
@@ -61,6 +67,8 @@ class Impact:
             device, precision, threads: as in `warp_mca.run`; threads are not None.
             skins: surfaces of bodies that recorders show, by body.
             needs: of recorders.
+            shape: gives the new state what earlier impacts left, and springs that press what then overlaps; None for
+                bodies without displacement or stress.
 
         Raises:
             RequestError: steps cannot be chosen, or bodies overlap that must not.
@@ -74,8 +82,11 @@ class Impact:
             self.solver.output = Output(self.solver, skins or {}, probes, needs)
         self.solver.compile()
         self.state = self.solver.new_state()
+        if shape:
+            shape(self.solver, self.state)
         self.solver.begin(self.state)
-        settle_initial_overlap(self.ready, self.solver, self.state)
+        if not shape:
+            settle_initial_overlap(self.ready, self.solver, self.state)
         self.solver.start(self.state)
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
@@ -121,6 +132,14 @@ class Impact:
         """
         with suppress(GuardError):  # that of the last scene
             _Loop(self, told, ended).run(until)
+
+    def at_last_record(self) -> tuple[Array, Array]:
+        """Displacements [m] and velocities [m/s] of the nodes at the last record, each shape (node_count, 3), float64.
+
+        A record is followed by a step, which is taken back.
+        """
+        v = self.state.v.numpy()
+        return self.state.u.numpy() - self.steps.dt * v, 0.5 * (self.solver.work.v_before.numpy() + v)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Hand records to each scene that no guard has stopped.

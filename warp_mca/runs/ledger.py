@@ -129,13 +129,13 @@ class Ledger:
         sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
         return sums
 
-    def _springs(self, sums: Array) -> Array:
+    def springs(self, sums: Array) -> Array:
         """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
         return sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
 
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
-        springs = self._springs(sums)
+        springs = self.springs(sums)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., PLANE_WORK].sum(axis=-1)
         return {
             "kinetic": sums[..., KINETIC],
@@ -163,7 +163,7 @@ class Ledger:
         scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.kept.energy_scale))
         self.kept.energy_scale = float(scale.max(initial=self.kept.energy_scale))
         self.kept.touched = self.kept.touched or bool(
-            (self._springs(sums)[..., NORMAL_IMPULSE] > 0.0).any() or (energy["contact"] > 0.0).any()
+            (self.springs(sums)[..., NORMAL_IMPULSE] > 0.0).any() or (energy["contact"] > 0.0).any()
         )
         self.kept.worked = float(np.abs(work).max(initial=self.kept.worked))
         imbalance, moved = np.abs(stored - work - initial), np.abs(energy["kinetic"] - self.kept.initial_kinetic)
@@ -220,7 +220,7 @@ class Ledger:
     def _note_peaks(self, sums: Array) -> None:
         """Keep what records say of contact at its greatest."""
         self.kept.contact_energy = float(self._energies(sums)["contact"].max(initial=self.kept.contact_energy))
-        springs = self._springs(sums)
+        springs = self.springs(sums)
         for k, found in enumerate(
             springs[springs[:, :, PRESSURE].argmax(axis=0), range(springs.shape[1])] if len(sums) else ()
         ):
@@ -235,13 +235,17 @@ class Ledger:
         initial = self.initial_energy
         return {"initial": initial, **last, "error": error - last["external_work"] - initial}
 
+    def energies(self) -> dict[str, Array]:
+        """The ledger at each row of the history, see `energy` [J], each shape (row_count,), float64."""
+        return self._energies(np.array(self.kept.sums).reshape(-1, self._width))
+
     def history(self, first: int = 0) -> dict[str, Array]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64.
 
         Forces are means over the interval before.
         """
         table = np.array(self.kept.sums[first:]).reshape(-1, self._width)
-        energy, springs = self._energies(table), self._springs(table)
+        energy, springs = self._energies(table), self.springs(table)
         share = self.steps.dt / self.steps.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
@@ -281,7 +285,7 @@ class Ledger:
     def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
         """Each contact by itself, with these `names`."""
         springs, share = (
-            self._springs(np.array(self.kept.sums).reshape(-1, self._width)),
+            self.springs(np.array(self.kept.sums).reshape(-1, self._width)),
             self.steps.dt / self.steps.interval,
         )
         found: list[ContactHistory] = []
@@ -306,7 +310,7 @@ class Ledger:
         normal impulse by the trapezoidal rule, is the mean of v over nodes and time that is weighted with F_n.
         """
         rows = np.array(self.kept.sums[max(first - 1, 0) :]).reshape(-1, self._width)
-        springs = self._springs(rows)[:, passes].sum(axis=1)
+        springs = self.springs(rows)[:, passes].sum(axis=1)
         gain, rise = np.diff(springs[:, NORMAL_ENERGY]), np.diff(springs[:, PRESSURE])
         impulse = self.steps.dt * (springs[1:, NORMAL_IMPULSE] - 0.5 * rise)
         speed: Array = np.full(len(rows), np.nan)

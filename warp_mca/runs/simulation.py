@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from warp_mca.base.errors import GuardError, RequestError
+from warp_mca.base.errors import GuardError, RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.precision import check_range
 from warp_mca.recorders.recorder import Recorder, RunInfo
@@ -17,39 +17,13 @@ from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
 from warp_mca.runs.meshing import mesh
 from warp_mca.runs.prepare import Clock, Prepared, prepare
+from warp_mca.runs.settings import Settings, settings_of
 from warp_mca.scene import Scene
 
 if TYPE_CHECKING:
     from warp_mca.runs.impact import Impact
 
-__all__ = ["Settings", "mesh", "run", "settings_of", "simulate"]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How scenes are run.
-
-    Attributes:
-        device: "cpu" or a CUDA device.
-        precision: "mixed" or "float64".
-        threads: of a run on the CPU.
-    """
-
-    device: str
-    precision: str
-    threads: int
-
-
-def settings_of(device: str, precision: str, threads: int | None) -> Settings:
-    """Settings as the user gave them; all cores if `threads` is None.
-
-    Raises:
-        RequestError: there is no such device, or no such number of threads.
-    """
-    from warp_mca.solve.solver import check_device
-    from warp_mca.solve.threads import thread_count
-
-    return Settings(check_device(device), precision, thread_count(threads))
+__all__ = ["mesh", "run", "simulate"]
 
 
 @one_at_a_time
@@ -99,6 +73,8 @@ def run(
     check_files(recorders, None if out is None else check_output(out, force=force))
 
     def result() -> Result:
+        if scene.t_end is not None:
+            return _cycle(scene, meshes, span, tell, settings, recorders)
         (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
         if found.stopped is not None:
             raise GuardError(found.stopped)
@@ -108,6 +84,31 @@ def run(
         return result()
     with hold(out, force=force) as folder:
         return write(result(), folder, force=force)
+
+
+def _cycle(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    recorders: Sequence[Recorder],
+) -> Result:
+    """Swings and impacts in turn until `Scene.t_end`; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: an impact lost its footing.
+    """
+    from warp_mca.runs.cycle import Cycle
+    from warp_mca.runs.cycle_result import cycle_result
+
+    if recorders:
+        remedy = "recorders show a single impact; leave t_end out, or the recorders"
+        raise bad_value("Scene.t_end", scene.t_end, remedy)
+    cycle = Cycle(scene, meshes, span, settings, Clock(), tell)
+    cycle.run()
+    return cycle_result(cycle)
 
 
 def simulate(

@@ -1,0 +1,134 @@
+"""Owns the shape that bodies keep between two impacts: the equilibrium of their elements with the plastic strain.
+
+The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground or on held axes stay where
+they are. Forces are those of the elements in float64, whatever the precision of the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.model.assembly import GROUND
+from warp_mca.model.model import Model
+from warp_mca.rigid.equilibrium import equilibrium
+from warp_mca.solve.solver import Solver
+from warp_mca.solve.state import State
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """Bodies in equilibrium.
+
+    Attributes:
+        u: displacements [m], shape (node_count, 3), float64.
+        state: of the elements then, in float64.
+        elastic, plastic, hourglass: energies then [J].
+        lost: elastic and hourglass energy that vibrated, and left [J].
+    """
+
+    u: Array
+    state: State
+    elastic: float
+    plastic: float
+    hourglass: float
+    lost: float
+
+
+class Relaxation:
+    """Relaxes states of one model of one scene."""
+
+    def __init__(self, model: Model, *, device: str, threads: int, dt: float) -> None:
+        """Allocate a solver in float64; its time step `dt` [s] plays no part."""
+        self.model = model
+        self.solver = Solver(model, device=device, precision="float64", dt=dt, threads=threads)
+        self.solver.compile()
+        self.base, self.trial = self.solver.new_state(), self.solver.new_state()
+        second = model.joint_second
+        self.tied = np.flatnonzero(second != GROUND)
+        self.held = np.stack([(model.fixed_axes >> axis & 1).astype(bool) for axis in range(3)], axis=1)
+        self.held[model.prescribed_node, model.prescribed_axis] = True
+        self.held[model.joint_first[second == GROUND]] = True
+        self.held[second[self.tied]] = True  # they follow the first node of their pair
+        self.masses = model.mass.copy()
+        np.add.at(self.masses, model.joint_first[self.tied], model.mass[second[self.tied]])
+        self.masses[second[self.tied]] = 0.0
+
+    def settle(self, u: Array, state: State) -> Shape:
+        """The equilibrium that lies nearest.
+
+        Args:
+            u: displacements to begin with [m], shape (node_count, 3), float64.
+            state: of the same model, whose elements have the history to keep.
+
+        Raises:
+            GuardError: it was not found.
+        """
+        for own, given in zip(self.base.elements, state.elements, strict=True):
+            own.yielded.assign(given.yielded.numpy())
+            own.history.assign(given.history.numpy())
+        u = self._joined(u)
+        self._evaluate(u)
+        before = self._energies()
+        found = equilibrium(
+            self._forces,
+            u,
+            self.model.X,
+            self.masses,
+            elastic_energy=before[0] + before[2],
+            held=self.held,
+            name="the bodies",
+        )
+        u = self._joined(found.u)
+        self._evaluate(u)
+        elastic, plastic, hourglass = self._energies()
+        lost = before[0] + before[2] - elastic - hourglass
+        return Shape(u=u, state=self.trial, elastic=elastic, plastic=plastic, hourglass=hourglass, lost=lost)
+
+    def _joined(self, u: Array) -> Array:
+        """Displacements with tied nodes in one place, in the middle by mass, and nodes on the ground at theirs."""
+        model, found = self.model, u.copy()
+        first, second = model.joint_first[self.tied], model.joint_second[self.tied]
+        share = (model.mass[first] / (model.mass[first] + model.mass[second]))[:, None]
+        follows = np.abs(u[first] - u[second]).max(initial=0.0) > 0.0
+        found[first] = share * u[first] + (1.0 - share) * u[second] if follows else u[first]
+        found[second] = found[first]
+        found[model.joint_first[model.joint_second == GROUND]] = 0.0
+        return found
+
+    def _evaluate(self, u: Array) -> None:
+        """Let the trial state have displacements and what its elements make of them, from the history at the start."""
+        self.trial.u.assign(u)
+        for own, kept in zip(self.trial.elements, self.base.elements, strict=True):
+            wp.copy(own.yielded, kept.yielded)
+            wp.copy(own.history, kept.history)
+        with wp.ScopedDevice(self.solver.device):
+            for stage in self.solver.elements:
+                stage.launch(self.solver.work, self.trial)
+
+    def _forces(self, u: Array) -> Array:
+        """Forces of the elements on the nodes [N], those on second nodes of tied pairs given to the first."""
+        full = u.copy()
+        first, second = self.model.joint_first[self.tied], self.model.joint_second[self.tied]
+        full[second] = full[first]
+        self._evaluate(full)
+        with wp.ScopedDevice(self.solver.device):
+            self.trial.v.zero_()
+            self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.bonds.at_rest)
+        force = self.model.mass[:, None] * (self.trial.v.numpy() - self.model.gravity[0])
+        force[first] += force[second]
+        force[second] = 0.0
+        return force
+
+    def _energies(self) -> tuple[float, float, float]:
+        """Elastic, plastic and hourglass energy of the trial state [J], after `_evaluate`."""
+        with wp.ScopedDevice(self.solver.device):
+            for stage in self.solver.elements:
+                stage.energies(self.solver.work, self.trial)
+            elastic, plastic, hourglass = self.solver.work.energy.numpy()[[0, 1, 4]].sum(axis=1)
+        return float(elastic), float(plastic), float(hourglass)
