@@ -22,11 +22,13 @@ class Element(Protocol):
 
     Attributes:
         name: as `Body.element` and the command line have it.
-        corners: nodes of each element.
+        cell: name of the cell type that it computes, out of `geometry.cell_types.STORED_TYPES`.
+        patches: whether its stage may compute compact patches of elements, so that the model orders them that way.
     """
 
     name: str
-    corners: int
+    cell: str
+    patches: bool
 
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """Lumped masses [kg], shape (element_count, corners), that keep the mass and the centre of mass exactly."""

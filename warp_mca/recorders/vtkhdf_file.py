@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     _Datasets = dict[str, h5py.Dataset]
 
 FRAMES = Cadence(frames=100)
-VTK_TYPES = {"tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14}
 FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
 
 
@@ -198,7 +197,7 @@ def _write_mesh(root: h5py.Group, model: Model) -> None:
     root["Points"] = model.X
     root["Connectivity"] = np.concatenate([nodes.ravel() for _, nodes in runs])
     root["Offsets"] = np.append(0, np.cumsum(sizes))
-    root["Types"] = np.concatenate([np.full(len(nodes), VTK_TYPES[kind], dtype=np.uint8) for kind, nodes in runs])
+    root["Types"] = np.concatenate([np.full(len(nodes), cell.vtk, dtype=np.uint8) for cell, nodes in runs])
     root["CellData/body"] = body
     root["CellData/body"].attrs["names"] = list(model.element_start)
     root["CellData/material"] = material
