@@ -28,7 +28,7 @@ from warp_mca.recorders.recorder import (
     Volume,
     file_path,
 )
-from warp_mca.results.result import ALL_FILES
+from warp_mca.results.storage import ALL_FILES
 from warp_mca.solve.transfer import Transfer
 
 if TYPE_CHECKING:

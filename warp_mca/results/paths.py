@@ -16,14 +16,15 @@ from warp_mca.geometry.boxes import Boxes, cell_boxes
 from warp_mca.geometry.cell_types import MOST_CORNERS
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
+from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Line, Path, Scene
-
-MOST_PROBES = 100_000  # of a line
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 Array = NDArray[np.float64]
+
+MOST_PROBES = 100_000  # of a line
 
 
 @dataclass(frozen=True)
@@ -137,17 +138,14 @@ def path_histories(probes: Probes, rings: Sequence[NDArray[np.float32]]) -> tupl
 
 def save_paths(file: FilePath, time: Array, paths: Sequence[PathHistory]) -> None:
     """Write time_s, and for each path NAME/position_m, NAME/stress_Pa and NAME/von_mises_Pa, as an npz archive."""
-    arrays: dict[str, NDArray] = {"time_s": time}
-    for path in paths:
-        arrays[f"{path.name}/position_m"] = path.position
-        arrays[f"{path.name}/stress_Pa"] = path.stress
-        arrays[f"{path.name}/von_mises_Pa"] = path.von_mises
-    with file.open("wb") as stream:
-        np.savez(stream, **arrays)  # pyright: ignore[reportArgumentType]
+    columns = {
+        path.name: {"position_m": path.position, "stress_Pa": path.stress, "von_mises_Pa": path.von_mises}
+        for path in paths
+    }
+    save_histories(file, time, columns)
 
 
 def load_paths(file: str | os.PathLike[str]) -> tuple[PathHistory, ...]:
     """The paths that `save_paths` wrote."""
-    with np.load(file) as arrays:
-        names = [key.removesuffix("/position_m") for key in arrays if key.endswith("/position_m")]
-        return tuple(PathHistory(n, arrays[f"{n}/position_m"], arrays[f"{n}/stress_Pa"]) for n in names)
+    found = load_histories(file, "position_m", "stress_Pa")
+    return tuple(PathHistory(name, *columns) for name, columns in found.items())

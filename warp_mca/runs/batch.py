@@ -20,7 +20,8 @@ from warp_mca.model.join import join_models, join_probes
 from warp_mca.model.layout import offsets
 from warp_mca.model.precision import check_range
 from warp_mca.results.paths import Found
-from warp_mca.results.result import ALL_FILES, Result, check_output, folder_path, save
+from warp_mca.results.result import Result
+from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
 from warp_mca.runs.account import Account, Prepared
 from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_of, teller

@@ -21,7 +21,8 @@ from warp_mca.model.model import Model, build_model, nodal_masses
 from warp_mca.model.precision import check_range
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results.paths import Found, locate
-from warp_mca.results.result import Result, check_output, hold, write
+from warp_mca.results.result import Result
+from warp_mca.results.storage import check_output, hold, write
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.runs.account import Account, Prepared
 from warp_mca.runs.advice import mesh_warnings, warn
