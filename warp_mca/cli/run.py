@@ -65,18 +65,20 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
         first = files["rrd"].pop(0) if files["rrd"] else None
         found.append(FILES["rrd"].make(first, viewer=True, cadence=cadence))
     for option, kind in FILES.items():
-        more = {} if option == "final" else {"cadence": cadence}
+        more = {"cadence": cadence} if kind.frames else {}
         found += [kind.make(file, **more) for file in files[option]]
     return found + [SnapshotFile(out / f"snapshot-{1e6 * t:g}us.png", time=t) for t in args.snapshots]
 
 
 @contextmanager
 def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
-    """Note on what stops a run that its recordings, if there are some, are worth a look."""
+    """Add to an interrupt of a run that its recordings hold the frames until then."""
+    from warp_mca.recorders import FILES
+
     try:
         yield
     except KeyboardInterrupt as stop:
-        if any((args.rrd, args.usd, args.vtkhdf)):
+        if any(getattr(args, option) for option, kind in FILES.items() if kind.frames):
             stop.add_note("recordings hold the frames until then")
         raise
 

@@ -69,19 +69,19 @@ def _near_boundary(cells: Mapping[str, Index], node_count: int) -> NDArray[np.bo
 
 
 def _triangles_last(faces: Index) -> Index:
-    """Faces turned so that a corner that appears twice comes last; with more than two alike, corners 1 and 2 are."""
-    turned = faces.copy()
+    """Faces with their corners rotated so that a repeated one comes last; corners 1 and 2 of collapsed faces agree."""
+    rotated = faces.copy()
     for k in range(3):
         twice = faces[:, k] == faces[:, k + 1]
-        turned[twice] = np.roll(faces, 2 - k, axis=1)[twice]
+        rotated[twice] = np.roll(faces, 2 - k, axis=1)[twice]
     ends = (faces[:, 0] == faces[:, 3]) & (faces[:, 0] != faces[:, 1])
-    turned[ends] = np.roll(faces, -1, axis=1)[ends]
-    collapsed = _kinds(faces) < 3
-    turned[collapsed] = faces[collapsed][:, :1]
-    return turned
+    rotated[ends] = np.roll(faces, -1, axis=1)[ends]
+    collapsed = _corner_counts(faces) < 3
+    rotated[collapsed] = faces[collapsed][:, :1]
+    return rotated
 
 
-def _kinds(faces: Index) -> NDArray[np.intp]:
+def _corner_counts(faces: Index) -> NDArray[np.intp]:
     """Number of different corners of each face."""
     ordered = np.sort(faces, axis=1)
     return 1 + (np.diff(ordered, axis=1) != 0).sum(axis=1)

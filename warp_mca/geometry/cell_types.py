@@ -126,3 +126,8 @@ def is_triangle(faces: Index) -> NDArray[np.bool_]:
         faces: corners of each face, shape (face_count, 4).
     """
     return faces[:, 2] == faces[:, 3]
+
+
+def triangulated(faces: Index) -> Index:
+    """Triangles and halves of quadrilaterals, shape (triangle_count, 3), int32; the second halves come last."""
+    return np.concatenate([faces[:, [0, 1, 2]], faces[~is_triangle(faces)][:, [0, 2, 3]]]).astype(np.int32)

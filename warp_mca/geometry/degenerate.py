@@ -25,11 +25,11 @@ def stored(points: NDArray[np.float64], cells: Cells, name: str) -> Cells:
     """
     cell = CELL_TYPES[name]
     corners = list(cell.stored_corners)
-    turned = cells.copy()
+    upright = cells.copy()
     if cell is not HEXAHEDRON:
         negative = INTEGRALS[cell.stored_as].volumes(points[cells[:, corners]]) < 0.0
-        turned[negative] = cells[negative][:, list(cell.mirrored)]
-    return turned[:, corners].astype(np.int32)
+        upright[negative] = cells[negative][:, list(cell.mirrored)]
+    return upright[:, corners].astype(np.int32)
 
 
 def cell_names(nodes: NDArray[np.integer]) -> NDArray[np.str_]:

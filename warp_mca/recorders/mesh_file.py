@@ -35,11 +35,11 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 class FinalState:
     """Writes the last frame: displaced points, hexahedra, the fields at nodes, body and material of each element.
 
-    The file appears once the run has ended as it should, and then whole; what was there before stays until then.
+    The file appears, complete, when the run has ended without an error; an older file stays until then.
     """
 
     def __init__(self, file: str | os.PathLike[str]) -> None:
-        """Write to `file`, in the format that its suffix stands for; one element is written and read for a trial.
+        """Write to `file`, in the format of its suffix; one element is written and read back as a trial.
 
         Raises:
             RequestError: `file` cannot be written, or its format holds no 8-node hexahedra.
@@ -57,7 +57,7 @@ class FinalState:
         self._fields: dict[str, NDArray] | None = None
 
     def start(self, info: RunInfo) -> None:
-        """Make missing folders, and say which fields the format has no place for.
+        """Make missing folders, and warn about fields that the format cannot hold.
 
         Raises:
             RequestError: the folder cannot be made.
@@ -76,7 +76,7 @@ class FinalState:
         self._fields = {name: np.array(field) for name, field in vars(frame.volume).items()}
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Holds nothing that such a file could take."""
+        """Is not written to this file."""
 
     def finish(self, ok: bool) -> None:
         """Write the file; after a run that failed there is no final state, and none is written.
@@ -183,7 +183,7 @@ def _try(path: Path) -> tuple[list[str], list[str]]:
 
 
 def _save(path: Path, mesh: meshio.Mesh) -> None:
-    """Write beside `path` first and then rename, so that the file there is whole at any time.
+    """Write beside `path` first and then rename, so that the file there is complete at any time.
 
     Raises:
         McaError: meshio or the disk fails.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import check_folder, given_path
 from warp_mca.base.validate import brief, is_list, is_number
-from warp_mca.geometry.cell_types import is_triangle
+from warp_mca.geometry.cell_types import is_triangle, triangulated
 from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
@@ -88,8 +88,7 @@ class SurfaceMesh:
     @cached_property
     def triangles(self) -> Index:
         """The faces, quadrilaterals cut in two, shape (triangle_count, 3), int32."""
-        four = ~is_triangle(self.quads)
-        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[four][:, [0, 2, 3]]]).astype(np.int32)
+        return triangulated(self.quads)
 
     @property
     def corner_counts(self) -> Index:

@@ -50,7 +50,7 @@ class UsdFile:
             limit: stress at the upper end of the colours [Pa], see `ColourScale`.
 
         Raises:
-            RequestError: `file` cannot be written, or the limit is none.
+            RequestError: `file` cannot be written, or the limit is not a number above 0.
         """
         check_limit(limit)
         self.path = check_file("usd", file, ".usdc", ".usd", ".usda")
@@ -70,10 +70,10 @@ class UsdFile:
         self.saved_count = self.unsaved_count = 0  # frames that the file holds, and lacks
 
     def check(self, info: RunInfo) -> None:
-        """Load USD; refuse a disk that is full.
+        """Load USD, and check the disk.
 
         Raises:
-            RequestError: so it is.
+            RequestError: the disk is full.
         """
         with _signals_held():
             from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401
@@ -135,7 +135,7 @@ class UsdFile:
                 self._save()
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Has no place in this file."""
+        """Is not written to this file."""
 
     def finish(self, ok: bool) -> None:
         """Save what is left; a file without a frame is removed.
@@ -157,7 +157,7 @@ class UsdFile:
     def _save(self) -> None:
         from pxr import Tf, Vt
 
-        self.unsaved_count = 0  # what cannot be saved now is not tried again
+        self.unsaved_count = 0  # frames that cannot be saved now are not tried again
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
             raise OSError(FULL)
         self.stage.SetStartTimeCode(0.0)
@@ -210,7 +210,7 @@ def _is_utf8(name: str) -> bool:
 
 @contextmanager
 def _signals_held() -> Iterator[None]:
-    """Let signals that stop a run act only afterwards: what they raise cuts a frame in two, and breaks pxr's import."""
+    """Delay signals that stop a run: in between, they would leave half a frame or a broken import of pxr."""
     held: list[int] = []
     main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if main_thread else ()

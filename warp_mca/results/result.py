@@ -78,7 +78,7 @@ class Result:
 
 @dataclass(frozen=True, kw_only=True)
 class RunFacts:
-    """What the simulation alone knows and the summary reports. What a scene lacks is None.
+    """Figures of a run that the summary reports and the history does not hold; None where a scene lacks them.
 
     Attributes:
         scene: its name.

@@ -153,10 +153,10 @@ def _of_other_runs(path: Path, digests: Mapping[str, str] | None) -> list[str]:
 
 
 def folder_path(field: str, directory: object) -> Path:
-    """The folder that the user named `field`.
+    """The folder given for the option `field`.
 
     Raises:
-        RequestError: it is no path.
+        RequestError: it is not a path.
     """
     return given_path(field, directory, "name a folder, or . for this one")
 
