@@ -11,8 +11,9 @@ from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import hand_back
-from warp_mca.rigid.handoff import HandOff, hand_off, link_placements
-from warp_mca.rigid.swing import chain_from_scene
+from warp_mca.rigid.handoff import HandOff, hand_off
+from warp_mca.rigid.placement import link_placements
+from warp_mca.rigid.scene_chain import chain_from_scene
 from warp_mca.rigid.target import target_plane
 from warp_mca.scene import Body, ImpactPhase, Revolute, RigidPhase, RigidPlane, Scene, Surface, Tip
 from warp_mca.scene.materials import Elastic

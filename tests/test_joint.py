@@ -225,8 +225,8 @@ def drive(nodes, axis="x"):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"fixed": (mca.Fixed(body="a", nodes="xmax"),)}, "hinge is also fixed"),
-        ({"prescribed": (drive("xmax"),)}, "hinge is also fixed or driven"),
+        ({"fixed": (mca.Fixed(body="a", nodes="xmax"),)}, "joint is also fixed"),
+        ({"prescribed": (drive("xmax"),)}, "joint is also fixed or driven"),
         ({"prescribed": (drive("xmin"), drive("ymin"))}, "bound twice"),
         ({"prescribed": (drive("xmin"),), "fixed": (mca.Fixed(body="a", nodes="xmin", axes="xy"),)}, "bound twice"),
         (

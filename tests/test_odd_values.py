@@ -16,6 +16,7 @@ import warp_mca as mca
 from warp_mca import geometry, scene
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.scene import materials
+from warp_mca.scene.joints import Joint
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=4e8, E_t=1e9, beta=0.5)
@@ -39,12 +40,19 @@ SOUND: dict[type, Any] = {
     mca.Surface: TOP,
     mca.RigidPlane: WALL,
     mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
+    mca.Penalty: mca.Penalty(),
     mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
+    mca.Weld: mca.Weld(name="W", body="up", nodes="ymax"),
+    mca.Spherical: mca.Spherical(name="S", body="up", at=(0.0, 0.0, 0.0)),
+    mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
     mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
     mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
     mca.Tip: TIP,
     mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),
     mca.ImpactPhase: mca.ImpactPhase(duration=1e-7, output_interval=1e-7),
+    mca.BaseMotion: mca.BaseMotion(times=(0.0, 1.0), vx=(0.0, 1.0), vy=(0.5, 0.0)),
+    mca.Slide: mca.Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.1, velocity=0.1),
+    mca.JointTorque: mca.JointTorque(joint="O", times=(0.0, 1.0), torques=(0.0, 1.0)),
 }
 SOUND[mca.Body] = mca.Body(name="low", geometry=SOUND[mca.Box], material=STEEL)
 SOUND[mca.Scene] = mca.Scene(
@@ -123,12 +131,20 @@ def scene_with(item: Any) -> mca.Scene:
         case mca.RigidPhase() | mca.Tip():
             phase = item if isinstance(item, mca.RigidPhase) else dataclasses.replace(SOUND[mca.RigidPhase], tip=item)
             change = {"rigid": phase, "joints": (SOUND[mca.Revolute],), "gravity": (0.0, -9.81, 0.0)}
+        case mca.BaseMotion() | mca.Slide() | mca.JointTorque():
+            name = {mca.BaseMotion: "base_motion", mca.Slide: "slide", mca.JointTorque: "torques"}[type(item)]
+            loads = {name: (item,) if name == "torques" else item}
+            return scene_with(dataclasses.replace(SOUND[mca.RigidPhase], **loads))
         case mca.Elastic():
             change = {"bodies": (dataclasses.replace(low, material=item), up)}
         case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.MeshFile() | mca.Mesh():
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():
             change = {"bodies": (item, up)}
+        case Joint():
+            change = {"joints": (item,)}
+        case mca.Penalty():
+            change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], law=item),)}
         case mca.Surface() | mca.RigidPlane():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], master=item),)}
         case mca.Line():
@@ -138,7 +154,6 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Point: "tip",
                 mca.Path: "paths",
                 mca.Contact: "contacts",
-                mca.Revolute: "joints",
                 mca.Fixed: "fixed",
                 mca.Prescribed: "prescribed",
             }[type(item)]

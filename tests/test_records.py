@@ -5,8 +5,17 @@ import pytest
 import warp as wp
 
 from warp_mca.kernels.records import ledger
+from warp_mca.kernels.records.columns import (
+    DRIVE_WORK,
+    ELASTIC,
+    GRAVITY_WORK,
+    HOURGLASS,
+    JACOBIAN,
+    KINETIC,
+    PLASTIC,
+    STRAIN,
+)
 from warp_mca.kernels.records.ledger import RUN, SUM_WIDTH
-from warp_mca.runs.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
 
 COLUMNS = 8
 

@@ -73,7 +73,13 @@ def everything() -> mca.Scene:
         ),
         impact=mca.ImpactPhase(duration=1e-3),
         rigid=mca.RigidPhase(
-            theta=(0.1,), theta_dot=(0.2,), tip=mca.Tip(body="a", centre=(0.0, 0.0, 0.0), radius=0.1), target=top
+            theta=(0.1,),
+            theta_dot=(0.2,),
+            tip=mca.Tip(body="a", centre=(0.0, 0.0, 0.0), radius=0.1),
+            target=top,
+            base_motion=mca.BaseMotion(times=(0.0, 1.0), vx=(0.0, 2.0), vy=(0.1, 0.0)),
+            slide=mca.Slide(carriage_mass=0.2),
+            torques=(mca.JointTorque(joint="O", times=(0.0,), torques=(0.3,)),),
         ),
         joints=(mca.Revolute(name="O", body="a", at=(0.0, 0.0, 0.0)),),
         contacts=(

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, TURNED, moved_too_far
 from warp_mca.kernels.contact.spring import (
@@ -135,9 +136,9 @@ def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float6
 
 
 @cache
-def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
+def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, Any]:
     """The functions that press a node on the face found, if it `touches` that, and that let one go which found none."""
-    press = spring_function(friction)
+    press = spring_function(friction, law)
     open_contact = open_function(friction)
     gap_from_rest = rest_function(stress_free)
 
@@ -204,7 +205,7 @@ def settle_functions(friction: bool, stress_free: bool) -> tuple[Any, Any]:
 
 
 @cache
-def surface_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
+def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR) -> Any:
     """Kernel: each slave node finds the face it penetrates among its candidates and is pushed back along its normal.
 
     Slaves are those from `first` on. With `each`, scenes of a batch have values of their own, and slaves know their
@@ -215,9 +216,9 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any
     The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls
     where the node slides on to a softer face, and what the spring then loses is booked; it does not rise until the
     spring opens.
-    `stress_free`: springs of bodies that overlap at the start begin without force.
+    `stress_free`: springs of bodies that overlap at the start begin without force. `law`: module of the contact law.
     """
-    settle, let_go = settle_functions(friction, stress_free)
+    settle, let_go = settle_functions(friction, stress_free, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
@@ -357,9 +358,9 @@ react_kernel(False, 1)  # belongs to this module, so it is made before that is l
 
 
 @cache
-def plane_kernel(friction: bool, each: bool, stress_free: bool = False) -> Any:
+def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR) -> Any:
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
-    press = spring_function(friction)
+    press = spring_function(friction, law)
     open_contact = open_function(friction)
     gap_from_rest = rest_function(stress_free)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)

@@ -1,4 +1,4 @@
-"""Owns the contact laws at a point: penalty force along the normal, Coulomb stick-slip along the surface."""
+"""Owns the contact law along the surface: Coulomb stick-slip."""
 
 import warp as wp
 

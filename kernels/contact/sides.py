@@ -17,6 +17,7 @@ from warp_mca.kernels.contact.contact import (
     reachable,
     settle_functions,
 )
+from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.projection import weights_at
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
@@ -82,14 +83,14 @@ def opposition(
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = False) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = False, law: str = LINEAR) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master of so many sides.
 
     Springs and lists are those of slave 0 with each side, then of slave 1, and so on. A node that no side presses is
     taken by the one behind which it was least before the step, of equals by that which it ran into fastest. It may be
     as deep there as it was in the side that let it go, for it may have slid over an edge.
     """
-    settle, let_go = settle_functions(friction, stress_free)
+    settle, let_go = settle_functions(friction, stress_free, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.friction import release, stick_slip
+from warp_mca.kernels.contact.laws import LINEAR, law_functions
 from warp_mca.kernels.records.ledger import run_of
 
 wp.set_module_options({"enable_backward": False})
@@ -26,6 +27,8 @@ class Spring:
     in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
     stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
     became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free.
+    normal_energy: the part of `energy` that the normal spring holds [J], only of laws that are not linear. parameters:
+    of the contact law, shape (slave_count, parameter_count).
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -43,6 +46,8 @@ class Spring:
     stiffness: wp.array(dtype=wp.float64)
     lost: wp.array(dtype=wp.float64)
     rest: wp.array(dtype=wp.float64)
+    normal_energy: wp.array(dtype=wp.float64)
+    parameters: wp.array2d(dtype=wp.float64)
 
 
 @cache
@@ -64,21 +69,35 @@ def rest_function(stress_free: bool) -> Any:
 
 
 @cache
-def spring_function(friction: bool) -> Any:
-    """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential."""
+def spring_function(friction: bool, law: str) -> Any:
+    """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential.
+
+    `law` names the module of the contact law. The energy of a linear spring, and what it loses, are written as
+    quotients of its force, in place of the law's energy W.
+    """
+    functions, linear = law_functions(law), law == LINEAR
+    law_force, law_energy = functions.force, functions.energy
 
     @wp.func
-    def soften(s: int, gap: wp.float64, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring):
+    def soften(
+        s: int, gap: wp.float64, normal: wp.vec3d, du: wp.vec3d, k_old: wp.float64, k: wp.float64, spring: Spring
+    ):
         """Book what a pressed spring loses as its stiffness falls; the share that is left."""
-        # Along the normal, the work of the mean force of two steps less the change of k g^2 / 2 is
-        # (k_old - k) g_old g / 2. Along the surface the spring keeps its length f / k.
+        # Along the normal, a step does the work of the mean of its two forces. With k_old to its end this balances the
+        # energy W(g, k_old). With k it is less by (F(g, k_old) - F(g, k)) (g - g_old) / 2, and W(g, k) is left; of a
+        # linear spring, (k_old - k) g_old g / 2 is lost. Along the surface the spring keeps its length f / k.
         share = k / k_old
         pressed = spring.force[s]
         lost = wp.float64(0.0)
         if wp.static(friction):
             pressed -= spring.tangential[s]
             lost = (wp.float64(1.0) - share) * release(spring.tangential[s], du, k_old)
-        lost -= wp.float64(0.5) * (wp.float64(1.0) - share) * wp.length(pressed) * gap
+        if wp.static(linear):
+            lost -= wp.float64(0.5) * (wp.float64(1.0) - share) * wp.length(pressed) * gap
+        else:
+            fall = law_force(-gap, k_old, spring.parameters, s) - law_force(-gap, k, spring.parameters, s)
+            lost += law_energy(-gap, k_old, spring.parameters, s) - law_energy(-gap, k, spring.parameters, s)
+            lost += wp.float64(0.5) * fall * wp.dot(du, normal)
         spring.lost[s] = spring.lost[s] + lost
         return share
 
@@ -98,18 +117,20 @@ def spring_function(friction: bool) -> Any:
         impulse = spring.impulse[s]
         normal_impulse = spring.normal_impulse[s]
         depth = spring.depth[s]
-        Fn = -k * gap
+        Fn = law_force(-gap, k, spring.parameters, s)
         force = Fn * normal
-        squares = Fn * Fn
+        squares = wp.float64(0.0)
+        if wp.static(linear):
+            squares = Fn * Fn
         if wp.static(not friction):
             if k < k_old:
-                soften(s, gap, du, k_old, k, spring)
+                soften(s, gap, normal, du, k_old, k, spring)
         if wp.static(friction):
             friction_work = spring.friction[s]
             stick_impulse = spring.stick_impulse[s]
             f_old = spring.tangential[s]
             if k < k_old:
-                f_old = soften(s, gap, du, k_old, k, spring) * f_old
+                f_old = soften(s, gap, normal, du, k_old, k, spring) * f_old
             Ft, work, stick = stick_slip(f_old, du, normal, mu * Fn, k)
             force += Ft
             squares += wp.dot(Ft, Ft)
@@ -117,7 +138,12 @@ def spring_function(friction: bool) -> Any:
             spring.friction[s] = friction_work + work
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
                 spring.stick_impulse[s] = stick_impulse + Fn
-        spring.energy[s] = wp.float64(0.5) * squares / k
+        if wp.static(linear):
+            spring.energy[s] = wp.float64(0.5) * squares / k
+        else:
+            stored = law_energy(-gap, k, spring.parameters, s)
+            spring.normal_energy[s] = stored
+            spring.energy[s] = stored + wp.float64(0.5) * squares / k
         spring.force[s] = force
         spring.impulse[s] = impulse + force
         spring.normal_impulse[s] = normal_impulse + Fn
@@ -180,7 +206,10 @@ def sum_springs(
             square = wp.dot(Fn, Fn)
             pressed += Fn
             pressure += wp.sqrt(square)
-            pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
+            if spring.normal_energy.shape[0] > 0:
+                pressed_energy += spring.normal_energy[s]
+            else:
+                pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
             squares += square
         friction += spring.friction[s]
         drive += spring.drive[s]

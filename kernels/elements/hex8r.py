@@ -23,8 +23,9 @@ from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_f
 wp.set_module_options({"enable_backward": False})
 
 # Rows of the history beside those of the plastic strain: plastic hourglass amplitudes, and the energy they took [J].
+VECTORS = 4  # of amplitudes
 _AMPLITUDES = HISTORY_SIZE
-_DISSIPATED = _AMPLITUDES + 12
+_DISSIPATED = _AMPLITUDES + 3 * VECTORS
 HISTORY_ROWS = _DISSIPATED + 1
 
 

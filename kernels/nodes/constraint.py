@@ -1,4 +1,4 @@
-"""Owns how bound nodes are advanced: pairs in a revolute joint, and nodes with prescribed velocities."""
+"""Owns how bound nodes are advanced: pairs that a joint ties, and nodes with prescribed velocities."""
 
 from functools import cache
 from typing import Any
@@ -20,6 +20,8 @@ class Bonds:
 
     Attributes:
         first, second: nodes of each tied pair, second -1 where that is the ground, shape (pair_count,), int32.
+        tied: orthogonal projector on the directions in which each pair moves as one [-], shape (pair_count,), mat33d;
+            empty where all pairs are tied in all directions.
         node: driven nodes, shape (driven_count,), int32.
         begin, end: entries of the table of each driven node's axes, -1 where an axis is free, shape (driven_count,),
             vec3i.
@@ -28,6 +30,7 @@ class Bonds:
 
     first: wp.array(dtype=wp.int32)
     second: wp.array(dtype=wp.int32)
+    tied: wp.array(dtype=wp.mat33d)
     node: wp.array(dtype=wp.int32)
     begin: wp.array(dtype=wp.vec3i)
     end: wp.array(dtype=wp.vec3i)
@@ -93,10 +96,11 @@ def drive(
 
 
 @cache
-def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
+def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
 
-    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground.
+    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
+    `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
@@ -153,11 +157,21 @@ def bound_kernel(precision: str, contact: bool, each: bool = False) -> Any:
                 if wp.static(contact):
                     total += take_contact(j, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
-                u = weighted_mean(mass[i], u_free, mass[j], u_out[j] + dt * v_j)
+                u_j = u_out[j] + dt * v_j
+                u = weighted_mean(mass[i], u_free, mass[j], u_j)
                 v = weighted_mean(mass[i], free, mass[j], v_j)
-                u_out[j] = u
-                v_out[j] = v
-                keep_speed(j, v, speed_square_out)
+                if wp.static(partial):
+                    u_j += bonds.tied[k] * (u - u_j)
+                    v_j += bonds.tied[k] * (v - v_j)
+                else:
+                    u_j = u
+                    v_j = v
+                u_out[j] = u_j
+                v_out[j] = v_j
+                keep_speed(j, v_j, speed_square_out)
+            if wp.static(partial):
+                u = u_free + bonds.tied[k] * (u - u_free)
+                v = free + bonds.tied[k] * (v - free)
             impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
         else:
             v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)

@@ -11,7 +11,16 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.runs.ledger import DRIVE_WORK, ELASTIC, GRAVITY_WORK, HOURGLASS, JACOBIAN, KINETIC, PLASTIC, STRAIN
+from warp_mca.kernels.records.columns import (
+    DRIVE_WORK,
+    ELASTIC,
+    GRAVITY_WORK,
+    HOURGLASS,
+    JACOBIAN,
+    KINETIC,
+    PLASTIC,
+    STRAIN,
+)
 
 wp.set_module_options({"enable_backward": False})
 

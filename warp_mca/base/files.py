@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import brief
@@ -50,3 +52,27 @@ def check_folder(field: str, path: Path) -> None:
     except OSError as error:
         what = f"{existing} cannot be written to ({error.strerror or error}); name another"
         raise bad_value(field, str(path), what) from error
+
+
+def write_atomically(target: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Let `write` fill a file, whole or not at all; an older one is replaced.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    descriptor, name = tempfile.mkstemp(prefix=f".{target.name}-", dir=target.parent)
+    temporary = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            write(file)
+        temporary.chmod(0o666 & ~_umask())  # mkstemp lets only the owner read
+        temporary.replace(target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -8,12 +8,15 @@ import numpy as np
 import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
+from warp_mca.elements.state import ElementState
 from warp_mca.kernels.elements import patch
 from warp_mca.model.patches import PATCH, SLOTS, Array, grid_points, make_patches
 from warp_mca.solve.threads import Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Block
+    from warp_mca.solve.state import State
+    from warp_mca.solve.workspace import Workspace
 
 
 class PatchStage(ElementStage):
@@ -54,12 +57,17 @@ class PatchStage(ElementStage):
         self.point = wp.array(point, dtype=patch.POINT[precision])
         self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
-        if points > 1:  # lanes read the points of one element together
-            self.history = wp.zeros(self.history.shape[::-1], dtype=self.history.dtype).transpose()
         self.scheduled = block.plastic and points > 1
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
+
+    def new_state(self) -> ElementState:
+        """As for elements one by one, but lanes read the points of one element together."""
+        found = super().new_state()
+        if self.points > 1:
+            found.history = wp.zeros(found.history.shape[::-1], dtype=self.real).transpose()
+        return found
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -82,10 +90,11 @@ class PatchStage(ElementStage):
             ):
                 wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
+    def launch(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
-        inputs = [X, self.point, self.patches, law, u, self.slot, self.blocks]
-        outputs = [self.yielded, self.history, self.extreme, *([self.flowing] if self.points > 1 else []), force]
+        own = state.elements[self.index]
+        inputs = [work.X, self.point, self.patches, work.law, state.u, self.slot, self.blocks]
+        outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
         wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.elements.state import ElementState
 from warp_mca.kernels.hardware.lanes import side_by_side
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import HISTORY_SIZE
@@ -17,6 +18,8 @@ from warp_mca.solve.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Block
+    from warp_mca.solve.state import State
+    from warp_mca.solve.workspace import Workspace
 
 Index = NDArray[np.int32]
 
@@ -24,16 +27,15 @@ BLOCK_DIM = PATCH  # threads of a block, for all kernels of elements
 
 
 class ElementStage:
-    """Device side of one block of elements; an elastic block allocates no history.
+    """Device side of one block of elements.
 
     Attributes:
         block: the host side.
+        index: of the block in the model; its state is `State.elements[index]`.
         conn, material: as in `Block`.
-        yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
-        history: plastic strain and equivalent plastic strain of each point, in the order of
-            `kernels.elements.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
-        extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step so far [-], from
-            0 on, shape (2, element_count), in the scalars of the precision.
+        points: integration points that keep a plastic strain.
+        rows: of the history.
+        vectors: that follow the plastic strains in the history, and turn with the element.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
         rounds: patches that a block of threads computes in turn.
@@ -47,22 +49,20 @@ class ElementStage:
         Args:
             block: the elements.
             precision: as in `warp_mca.run`.
-            kernels: module that makes force_kernel, energy_kernel and stress_kernel.
+            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says in VECTORS how many
+                vectors follow the plastic strains in the history, if any do.
             points: integration points that keep a plastic strain.
             rows: of the history, where an element keeps more.
         """
-        self.block, self.corners = block, block.conn.shape[0]
+        self.block, self.corners, self.index = block, block.conn.shape[0], 0
         self.conn = wp.array(block.conn, dtype=wp.int32)
         self.material = wp.array(block.material, dtype=wp.int32)
         self.count = block.conn.shape[1]
         self.slot_node: Index = block.conn.ravel()
         self.slot = 0
-        kept = self.count if block.plastic else 0
-        real = scalars(precision).real
-        self.yielded = wp.zeros(kept, dtype=wp.int32)
-        self.points = points
-        self.history = wp.zeros((rows or points * HISTORY_SIZE, kept), dtype=real)
-        self.extreme = wp.zeros((2, self.count), dtype=real)
+        self.points, self.rows = points, rows or points * HISTORY_SIZE
+        self.vectors: int = getattr(kernels, "VECTORS", 0)
+        self.real = scalars(precision).real
         kind = (precision, block.law, block.finite)
         self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
         self.energy_kernel = side_by_side(kernels.energy_kernel(*kind), large=block.finite)
@@ -76,9 +76,35 @@ class ElementStage:
         """What kernels of this formulation take beside what all take, of a range of elements."""
         return []
 
-    def _history(self, part: slice) -> list[Any]:
+    def new_state(self) -> ElementState:
+        """State of elements that have never flowed, on the current device; an elastic block keeps no history."""
+        kept = self.count if self.block.plastic else 0
+        return ElementState(
+            yielded=wp.zeros(kept, dtype=wp.int32),
+            history=wp.zeros((self.rows, kept), dtype=self.real),
+            extreme=wp.zeros((2, self.count), dtype=self.real),
+        )
+
+    def rotated(self, history: NDArray, rotation: NDArray[np.float64]) -> NDArray:
+        """A history whose elements are turned, with their reference positions.
+
+        Args:
+            history: as in `ElementState`, shape (row_count, element_count).
+            rotation: of each element [-], shape (element_count, 3, 3), float64.
+        """
+        found = np.array(history, dtype=np.float64)
+        for first in range(0, self.points * HISTORY_SIZE, HISTORY_SIZE):
+            xx, yy, xy, yz, xz = found[first : first + 5]
+            strain = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, -xx - yy], axis=-1).reshape(-1, 3, 3)
+            turned = rotation @ strain @ rotation.transpose(0, 2, 1)
+            found[first : first + 5] = turned[:, [0, 1, 0, 1, 0], [0, 1, 1, 2, 2]].T
+        for first in range(self.points * HISTORY_SIZE, self.points * HISTORY_SIZE + 3 * self.vectors, 3):
+            found[first : first + 3] = np.einsum("eij,je->ie", rotation, found[first : first + 3])
+        return found.astype(history.dtype)
+
+    def _history(self, own: ElementState, part: slice) -> list[Any]:
         """Yield flags and history of a range of elements."""
-        return [self.yielded[part], self.history[:, part]] if self.block.plastic else [self.yielded, self.history]
+        return [own.yielded[part], own.history[:, part]] if self.block.plastic else [own.yielded, own.history]
 
     def make_room(self, blocks: int) -> None:
         """Called where contact is computed beside the elements: leave room on the device for its blocks of threads."""
@@ -86,48 +112,46 @@ class ElementStage:
     def schedule(self) -> None:
         """Launched now and then, between steps: choose in which order the next ones compute elements."""
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
+    def launch(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
+        own = state.elements[self.index]
 
         def launch(part: slice) -> None:
-            inputs = [X, self.conn[:, part], self.material[part], law, u, self.slot + part.start, self.count]
-            outputs = [*self._history(part), self.extreme[:, part], force]
-            inputs += self.more(part)
+            inputs = [work.X, self.conn[:, part], self.material[part], work.law, state.u]
+            inputs += [self.slot + part.start, self.count, *self.more(part)]
+            outputs = [*self._history(own, part), own.extreme[:, part], work.force]
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
         split(self.count, launch, ELEMENTS)
 
-    def energies(self, X: wp.array, law: wp.array, u: wp.array, energy: wp.array, split: Split = whole) -> None:
+    def energies(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].
 
-        To be called after `forces` of the same step.
+        To be called after `launch` of the same step.
         """
+        own = state.elements[self.index]
 
         def launch(part: slice) -> None:
-            inputs = [X, self.conn[:, part], self.material[part], law, *self._history(part), self.extreme[:, part], u]
-            inputs += [self.block.first + part.start, *self.more(part)]
-            wp.launch(self.energy_kernel, part.stop - part.start, inputs=inputs, outputs=[energy], block_dim=BLOCK_DIM)
+            inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
+            inputs += [own.extreme[:, part], state.u, self.block.first + part.start, *self.more(part)]
+            count = part.stop - part.start
+            wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
 
         split(self.count, launch, ELEMENTS)
 
-    def stresses(
-        self, X: wp.array, law: wp.array, u: wp.array, element: wp.array, first: int, stress: wp.array
-    ) -> None:
+    def stresses(self, work: Workspace, state: State, element: wp.array, first: int, stress: wp.array) -> None:
         """Stress [Pa] and plastic strain [-] at the corners of some elements, from slot `first` on."""
-        inputs = [X, self.conn, self.material, law, self.yielded, self.history, u, element, first]
+        own = state.elements[self.index]
+        inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, state.u, element, first]
         inputs += self.more(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
 
-    def reset(self) -> None:
-        """Forget all plastic flow."""
-        self.yielded.zero_()
-        self.history.zero_()
-
-    def max_plastic_strain(self, part: slice) -> float:
+    def max_plastic_strain(self, state: State, part: slice) -> float:
         """Greatest equivalent plastic strain of any point of a range of elements [-]."""
         if not self.block.plastic or part.start == part.stop:
             return 0.0
-        last = self.history[HISTORY_SIZE - 1 : self.points * HISTORY_SIZE : HISTORY_SIZE, part]
+        history = state.elements[self.index].history
+        last = history[HISTORY_SIZE - 1 : self.points * HISTORY_SIZE : HISTORY_SIZE, part]
         return float(last.numpy().max())
 
 

@@ -16,6 +16,8 @@ from warp_mca.solve.threads import ELEMENTS, NODES, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Block
+    from warp_mca.solve.state import State
+    from warp_mca.solve.workspace import Workspace
 
 
 class Tet4Stage(ElementStage):
@@ -47,11 +49,11 @@ class Tet4Stage(ElementStage):
         """Pressure nodes of each element of a range, and the dilatation of all."""
         return [self.group[:, part], self.dilation]
 
-    def forces(self, X: wp.array, law: wp.array, u: wp.array, force: wp.array, split: Split = whole) -> None:
+    def launch(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], after the dilatation at the pressure nodes."""
 
         def grow(part: slice) -> None:
-            count, inputs = part.stop - part.start, [X, self.conn[:, part], u]
+            count, inputs = part.stop - part.start, [work.X, self.conn[:, part], state.u]
             wp.launch(self.dilation_kernel, count, inputs=inputs, outputs=[self.growth[part]], block_dim=BLOCK_DIM)
 
         def average(part: slice) -> None:
@@ -61,4 +63,4 @@ class Tet4Stage(ElementStage):
 
         split(self.count, grow, ELEMENTS)
         split(len(self.dilation), average, NODES)
-        super().forces(X, law, u, force, split)
+        super().launch(work, state, split)

@@ -1,4 +1,4 @@
-"""Owns what binds nodes: fixed and driven axes, and hinges as pairs of tied nodes."""
+"""Owns what binds nodes: fixed and driven axes, and joints as pairs of tied nodes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.mesh import Mesh
+from warp_mca.base.rotation import turn
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
+from warp_mca.scene.joints import Joint, Side
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hinge:
-    """A revolute joint: pairs [start, end) of `Model.joint_first` and `joint_second`."""
+class JointPairs:
+    """A joint's pairs: [start, end) of `Model.joint_first` and `joint_second`."""
 
     name: str
     start: int
@@ -72,71 +73,72 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
     }
 
 
-def _axis_nodes(mesh: Mesh, at: Array, axis: Array, both_ends: bool) -> tuple[Index, Array]:
-    """Nodes on a hinge axis, sorted along it, and their coordinates along it [m]."""
-    axis = axis / np.linalg.norm(axis)
-    offset = mesh.points - at
-    along = offset @ axis
-    away = np.linalg.norm(offset - along[:, None] * axis, axis=1)
-    nodes = np.flatnonzero(away <= 1e-6 * np.ptp(mesh.points, axis=0).max())
-    nodes = nodes[np.argsort(along[nodes])]
-    if both_ends:
-        nodes = nodes[[0, -1]] if len(nodes) > 1 else nodes
-    return nodes.astype(np.int32), along[nodes]
+def _side(parts: Assembly, body: str) -> Side:
+    mesh, start = parts.meshes[body], parts.node_start[body]
+    return Side(body, mesh, parts.X[start : start + len(mesh.points)], turn(parts.scene.body(body).rotation))
 
 
-def join_bodies(parts: Assembly) -> tuple[Index, Index, tuple[Hinge, ...]]:
-    """Pairs of tied nodes.
+def _tied_pairs(parts: Assembly, joint: Joint) -> tuple[Index, Index, Array]:
+    """Nodes of a joint's pairs in the model's numbering, and the projector on the directions that it ties."""
+    side = _side(parts, joint.body)
+    ties = joint.ties(side, None if joint.other is None else _side(parts, joint.other))
+    a = ties.first + parts.node_start[joint.body]
+    b = np.full(len(a), GROUND, dtype=np.int32)
+    if joint.other is not None:
+        assert ties.second is not None
+        b = ties.second + parts.node_start[joint.other]
+        alike = len(a) == len(b)
+        apart = float(np.linalg.norm(parts.X[a] - parts.X[b], axis=1).max()) if alike else np.inf
+        if apart > side.tolerance:
+            what = f"{len(a)} nodes of {joint.body} and {len(b)} of {joint.other}, up to {apart:.3g} m apart"
+            remedy = f"they do not coincide ({what}); mesh both alike at the joint"
+            raise bad_value(f"{joint.title}.{joint.place}", getattr(joint, joint.place), remedy)
+        parts.X[b] = parts.X[a]
+    tied = np.eye(3) if ties.tied is None else ties.tied
+    if not (np.allclose(tied, tied.T) and np.allclose(tied @ tied, tied)):
+        remedy = "its ties must give an orthogonal projector, as n n^T or I - a a^T of unit vectors"
+        raise bad_value(f"{joint.title}.ties", tied.tolist(), remedy)
+    return a, b, tied
+
+
+def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, ...]]:
+    """Pairs of tied nodes as in `Model`, and the joints that own them.
 
     Raises:
-        RequestError: fewer than two nodes of a body lie on the axis, or the pairs do not coincide.
+        RequestError: a joint finds no nodes, its pairs do not coincide, or a node is tied twice.
     """
-    first, second, hinges = [], [], []
+    first, second, tied, joints = [], [], [], []
     for joint in parts.scene.joints:
-        ends = joint.nodes == "ends"
-        axis = np.asarray(joint.axis)
-        a, along = _axis_nodes(parts.meshes[joint.body], np.asarray(joint.at), axis, ends)
-        if len(a) < 2:
-            raise bad_value(
-                f"Revolute {joint.name}.at",
-                joint.at,
-                f"{len(a)} nodes of {joint.body} lie on this axis; two are needed",
-            )
-        a = a + parts.node_start[joint.body]
-        b = np.full(len(a), GROUND, dtype=np.int32)
-        if joint.other is not None:
-            b, _ = _axis_nodes(parts.meshes[joint.other], np.asarray(joint.other_at), axis, ends)
-            b = b + parts.node_start[joint.other]
-            alike = len(a) == len(b)
-            apart = float(np.linalg.norm(parts.X[a] - parts.X[b], axis=1).max()) if alike else np.inf
-            if apart > 1e-6 * np.ptp(along):
-                what = f"{len(a)} nodes of {joint.body} and {len(b)} of {joint.other}, up to {apart:.3g} m apart"
-                raise bad_value(
-                    f"Revolute {joint.name}.nodes",
-                    joint.nodes,
-                    f"they do not coincide ({what}); mesh both alike at the axis",
-                )
-            parts.X[b] = parts.X[a]
+        a, b, projector = _tied_pairs(parts, joint)
         start = sum(len(item) for item in first)
-        hinges.append(Hinge(name=joint.name, start=start, end=start + len(a)))
+        joints.append(JointPairs(name=joint.name, start=start, end=start + len(a)))
         first.append(a)
         second.append(b)
-    if not first:
-        return np.zeros(0, np.int32), np.zeros(0, np.int32), ()
-    pairs = np.concatenate(first), np.concatenate(second)
-    tied = np.concatenate([pairs[0], pairs[1][pairs[1] != GROUND]])
-    if len(np.unique(tied)) < len(tied):
-        raise RequestError("Scene.joints: a node is tied twice; give each joint, of two bodies, an axis of its own")
-    return pairs[0].astype(np.int32), pairs[1].astype(np.int32), tuple(hinges)
+        tied.append(np.broadcast_to(projector, (len(a), 3, 3)))
+    pairs = {
+        "joint_first": np.concatenate([np.zeros(0, np.int32), *first]).astype(np.int32),
+        "joint_second": np.concatenate([np.zeros(0, np.int32), *second]).astype(np.int32),
+        "joint_tied": np.concatenate([np.zeros((0, 3, 3)), *tied]),
+    }
+    nodes = _nodes_of(pairs)
+    if len(np.unique(nodes)) < len(nodes):
+        raise RequestError("Scene.joints: a node is tied twice; give each joint, of two bodies, nodes of its own")
+    return pairs, tuple(joints)
 
 
-def check_bindings(held: dict[str, NDArray], first: Index, second: Index) -> None:
-    """Refuse nodes on hinges that are fixed or driven too: each stage would undo what the other set.
+def _nodes_of(pairs: dict[str, NDArray]) -> Index:
+    """All nodes of the pairs, without the ground."""
+    both = np.concatenate([pairs["joint_first"], pairs["joint_second"]])
+    return both[both != GROUND]
+
+
+def check_bindings(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> None:
+    """Refuse nodes of joints that are fixed or driven too: each stage would undo what the other set.
 
     Raises:
         RequestError: there is such a node.
     """
     bound = held["fixed_axes"] != 0
     bound[held["prescribed_node"]] = True
-    if bound[first].any() or bound[second[second != GROUND]].any():
-        raise RequestError("Scene.joints: a node on a hinge is also fixed or driven; bind other nodes of that body")
+    if bound[_nodes_of(pairs)].any():
+        raise RequestError("Scene.joints: a node of a joint is also fixed or driven; bind other nodes of that body")

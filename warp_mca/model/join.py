@@ -12,7 +12,6 @@ from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.model import Model
 from warp_mca.results.paths import Probes
-from warp_mca.runs.account import Prepared
 
 Index = NDArray[np.int32]
 
@@ -49,6 +48,7 @@ def join_models(models: Sequence[Model]) -> Model:
         **_tables(models),
         joint_first=shifted("joint_first", nodes),
         joint_second=shifted("joint_second", nodes),
+        joint_tied=np.concatenate([model.joint_tied for model in models]),
         hinges=tuple(
             replace(hinge, start=hinge.start + int(start), end=hinge.end + int(start))
             for model, start in zip(models, pairs, strict=False)
@@ -138,8 +138,12 @@ def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:
     }
 
 
-def join_probes(ready: Sequence[Prepared]) -> Probes:
-    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes."""
-    nodes = offsets([item.model.node_count for item in ready])
-    corner = [item.probes.corner + start for item, start in zip(ready, nodes, strict=False)]
-    return Probes({}, np.concatenate(corner), np.concatenate([item.probes.weight for item in ready]))
+def join_probes(parts: Sequence[tuple[Probes, int]]) -> Probes:
+    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes.
+
+    Args:
+        parts: probes and node count of each scene.
+    """
+    nodes = offsets([count for _, count in parts])
+    corner = [probes.corner + start for (probes, _), start in zip(parts, nodes, strict=False)]
+    return Probes({}, np.concatenate(corner), np.concatenate([probes.weight for probes, _ in parts]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.constraints import Hinge, check_bindings, constraints, join_bodies
+from warp_mca.model.constraints import JointPairs, check_bindings, constraints, join_bodies
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.layout import Layout
 from warp_mca.model.stable_step import StableStep
@@ -45,13 +45,15 @@ class Model:
         table_offset: start of each table, shape (table_count + 1,), int32.
         table_time, table_value: [s] and [m/s], float64.
         joint_first, joint_second: tied nodes, shape (pair_count,), int32; GROUND has no second node.
+        joint_tied: orthogonal projector on the directions in which pairs move as one [-], shape (pair_count, 3, 3),
+            float64.
         hinges: the joints that own the pairs.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
         gravity: of each scene [m/s^2], shape (scene_count, 3), float64.
-        points: nodes whose velocity is recorded (tip, target; those of each scene in turn), shape (2 scene_count,),
-            int32; GROUND where there is none.
+        points: nodes whose velocity is recorded (tip, target, others; those of each scene in turn), shape
+            (point_count,), int32; GROUND where there is none.
         node_start, element_start: first node and element of each body in the concatenated meshes, by name.
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
@@ -72,7 +74,8 @@ class Model:
     table_value: Array
     joint_first: Index
     joint_second: Index
-    hinges: tuple[Hinge, ...]
+    joint_tied: Array
+    hinges: tuple[JointPairs, ...]
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -200,18 +203,27 @@ def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # `stable_step` refuses what is not finite
-def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array], V: Mapping[str, Array]) -> Model:
+def build_model(
+    scene: Scene,
+    meshes: Mapping[str, Mesh],
+    X: Mapping[str, Array],
+    V: Mapping[str, Array],
+    watched: Sequence[tuple[str, int]] = (),
+) -> Model:
     """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
+
+    `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh.
 
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
     parts = Assembly(scene, meshes, X)
-    first, second, hinges = join_bodies(parts)
+    others = [parts.node_start[body] + node for body, node in watched]
+    pairs, joints = join_bodies(parts)
     blocks, order = parts.blocks()
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
-    check_bindings(held, first, second)
+    check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
     stable = parts.stable(added)
     return Model(
@@ -221,13 +233,12 @@ def build_model(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]
         blocks=blocks,
         law=parts.law(),
         **held,
-        joint_first=first,
-        joint_second=second,
-        hinges=hinges,
+        **pairs,
+        hinges=joints,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),
-        points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target)], dtype=np.int32),
+        points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target), *others], dtype=np.int32),
         node_start=parts.node_start,
         element_start=parts.element_start,
         element_of=order,

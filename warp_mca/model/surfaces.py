@@ -60,6 +60,8 @@ class ContactPass:
         slave: node indices, shape (slave_count,), int32.
         stiffness: greatest penalty stiffness of each, that of its own faces [N/m], shape (slave_count,), float64.
         mu: coefficient of friction [-].
+        law, parameters: module of the contact law, and what its functions read.
+        stiffening: greatest slope of the law down to the penetration that stops the run, over the stiffness [-].
         slave_face, slave_offset, face_of_slave: the slave's faces, and those around each slave node, compressed rows,
             int32.
         sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact.
@@ -83,6 +85,9 @@ class ContactPass:
     mu: float
     sign: float
     contact: int
+    law: str
+    parameters: tuple[float, ...]
+    stiffening: float
     plane: RigidPlane | None = None
     face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     face_stiffness: Array = field(default_factory=lambda: np.zeros(0))
@@ -186,6 +191,7 @@ def _surface_pass(
 ) -> ContactPass:
     nodes, masters = slave.nodes, master.nodes
     margin = SEARCH_MARGIN * float(np.sqrt(master.area.min()))
+    longest = float(np.sqrt(master.area.max()))
     side = find_sides(master.node, master.normal)
     offset, around = _faces_around(masters, master.node)
     slave_offset, around_slave = _faces_around(nodes, slave.node)
@@ -194,6 +200,9 @@ def _surface_pass(
         stiffness=factor * _node_mean(nodes, slave, own),
         face_stiffness=factor * other,
         mu=contact.mu,
+        law=contact.law.law,
+        parameters=contact.law.parameters,
+        stiffening=contact.law.stiffening(0.5 * longest),
         slave_face=slave.node,
         slave_offset=slave_offset,
         face_of_slave=around_slave,
@@ -206,7 +215,7 @@ def _surface_pass(
         face_offset=offset,
         face_of_node=around,
         margin=margin,
-        longest=float(np.sqrt(master.area.max())),
+        longest=longest,
         room=_room(slave, master, margin),
         initial_overlap=contact.initial_overlap,
     )
@@ -234,6 +243,9 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
                 stiffness=factor * _node_mean(nodes, slave, own),
                 slave_face=slave.node,
                 mu=contact.mu,
+                law=contact.law.law,
+                parameters=contact.law.parameters,
+                stiffening=contact.law.stiffening(deepest),
                 sign=1.0,
                 contact=index,
                 plane=contact.master,
@@ -253,13 +265,14 @@ def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, m
     A slave's row sums to k (1 + sum N) / m = 2 k / m, or k / m against a plane, and to more where sides of the master
     press it at once; a master node's to as much, times the number of slave nodes that share its area. k is the greatest
     stiffness that the spring can have: that of the stiffest master face for a slave node, that of the stiffest face
-    around it for a master node.
+    around it for a master node; both times what the contact law adds as it stiffens.
     """
     if master is None:
-        return item.slave, item.stiffness / mass[item.slave]
-    slave_k = item.at_once * np.minimum(item.stiffness, item.face_stiffness.max())
+        return item.slave, item.stiffening * item.stiffness / mass[item.slave]
+    at_once = item.stiffening * item.at_once
+    slave_k = at_once * np.minimum(item.stiffness, item.face_stiffness.max())
     around = np.maximum.reduceat(item.face_stiffness[item.face_of_node], item.face_offset[:-1])
-    master_k = item.at_once * np.minimum(around, item.stiffness.max())
+    master_k = at_once * np.minimum(around, item.stiffness.max())
     slave_area = 4.0 * np.median(_node_mean(item.slave, slave, slave.area / 4.0))
     shared = np.maximum(1.0, 4.0 * _node_mean(item.master, master, master.area / 4.0) / slave_area)
     nodes = np.concatenate([item.slave, item.master])

@@ -1,4 +1,4 @@
-"""Owns the way back: nodal motion after the last separation becomes the motion of rigid links again."""
+"""Owns the way back: nodal motion after the last separation becomes the motion of rigid links and bodies again."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warp_mca.rigid.chain import Array, Chain, link_axes, mesh_link, perpendicular
-from warp_mca.rigid.handoff import link_placements
+from warp_mca.rigid.body_motion import BodyMotion, body_motion
+from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, mesh_link, perpendicular
+from warp_mca.rigid.placement import Placement, link_placements
 
 MAX_ITERATIONS = 50  # of the fit of the angles; elastic shapes need three or four
 
@@ -17,70 +19,186 @@ MAX_ITERATIONS = 50  # of the fit of the angles; elastic shapes need three or fo
 class HandBack:
     """Rigid motion that fits the nodes best, and what it leaves out.
 
+    Kinetic energy, vibration energy and drive work add up to the kinetic energy of the nodes and the carriage.
+
     Attributes:
-        theta: angles of the links [rad], shape (link_count,), float64.
-        theta_dot: angular velocities of the links [rad/s], shape (link_count,), float64.
+        chain: the chain that was handed in, its links with mass, centre and inertia of the nodes in their `points`.
+        theta: its coordinates (`Swing`), shape (coordinate_count,), float64.
+        theta_dot: their rates, shape (coordinate_count,), float64.
+        placements: rigid pose and motion of every body by name.
         kinetic_energy: of the rigid motion [J].
-        vibration_energy: kinetic energy of the motion that is left over [J]; both add up to that of the nodes.
+        vibration_energy: kinetic energy of the motion that is left over [J].
+        drive_work: what the rigid motion has less because driven nodes and a driven base keep their velocity [J]; 0
+            where they are at rest.
         shape_misfit: largest distance of a node from the rigid shape [m].
+        displacements: of each node from the rigid shape, in its body's frame [m], by body name, each shape
+            (node_count, 3), float64.
+        momenta: generalised momenta J^T m V of the rigid motion and of the nodes, first those of the chain [kg m^2/s],
+            then those of the other bodies' free motions [kg m/s], shape (2, count), float64.
     """
 
+    chain: Chain | None
     theta: Array
     theta_dot: Array
+    placements: dict[str, Placement]
     kinetic_energy: float
     vibration_energy: float
+    drive_work: float
     shape_misfit: float
+    displacements: dict[str, Array]
+    momenta: Array
 
 
 def hand_back(
-    chain: Chain,
+    chain: Chain | None,
     points: Mapping[str, Array],
     nodal_masses: Mapping[str, Array],
     positions: Mapping[str, Array],
     velocities: Mapping[str, Array],
     *,
     near: Array | None = None,
+    held: Mapping[str, NDArray[np.bool_]] | None = None,
+    t: float = 0.0,
+    carriage: Vec2 = (0.0, 0.0),
 ) -> HandBack:
-    """Project nodal positions and velocities on the rigid motions of a chain, in the mass norm.
+    """Project nodal positions and velocities on the rigid motions of a chain and of other bodies, in the mass norm.
 
-    With J = d(rigid positions)/d(theta), the angles solve J^T m (X - X_rigid(theta)) = 0 (Gauss-Newton from each
-    link's own best rotation) and the rates solve (J^T m J) theta_dot = J^T m V; hinges stay closed and the ground hinge
-    stays where it is. J^T m J is the chain's mass matrix with the nodes' own mass, centre and inertia.
+    With J = d(rigid positions)/d(theta), the coordinates solve J^T m (X - X_rigid(theta)) = 0 (Gauss-Newton from each
+    link's own best rotation) and the rates solve (J^T m J) theta_dot = J^T m (V - v_base); hinges stay closed and the
+    base stays on its way. J^T m J is the chain's mass matrix with the nodes' own mass, centre and inertia. Bodies that
+    are no links are fitted one by one (`body_motion`).
 
     Args:
-        chain: gives the order of the links, their hinges and the ground hinge; its masses are not used.
-        points: node positions in the body's frame by body name [m], each shape (node_count, 3), float64.
+        chain: gives the order of the links, their hinges, the base and its slide; its links' masses are not used. None
+            if no body is a link.
+        points: shape of each body in its frame by name, deformed or not [m], each shape (node_count, 3), float64.
         nodal_masses: lumped masses by body name [kg], each shape (node_count,), float64.
         positions: world positions by body name [m], each shape (node_count, 3), float64.
         velocities: world velocities by body name [m/s], each shape (node_count, 3), float64.
         near: angles that the result is to lie within half a turn of [rad], shape (link_count,); 0 by default.
+        held: axes of nodes that are fixed or driven, by name of bodies that are no links (`held_axes`).
+        t: time from release, for a base that moves [s].
+        carriage: way [m] and velocity [m/s] of the carriage along the slide.
     """
+    held = {} if held is None else held
+    names = [] if chain is None else [link.body for link in chain.links]
+    bodies = {
+        name: body_motion(points[name], nodal_masses[name], positions[name], velocities[name], held.get(name))
+        for name in points
+        if name not in names
+    }
+    nodes = (points, nodal_masses, positions, velocities)
+    fitted = None if chain is None else _fit_chain(chain, *nodes, near, t, carriage)
+    parts: list[_ChainMotion | BodyMotion] = [*([] if fitted is None else [fitted]), *bodies.values()]
+    placements = {name: body.placement for name, body in bodies.items()} | (fitted.placements if fitted else {})
+    displacements = {name: placements[name].to_body(positions[name]) - points[name] for name in points}
+    return HandBack(
+        chain=fitted.chain if fitted else None,
+        theta=fitted.theta if fitted else np.zeros(0),
+        theta_dot=fitted.theta_dot if fitted else np.zeros(0),
+        placements=placements,
+        kinetic_energy=sum(part.kinetic_energy for part in parts),
+        vibration_energy=sum(part.vibration_energy for part in parts),
+        drive_work=sum(part.drive_work for part in parts),
+        shape_misfit=float(max(np.linalg.norm(u, axis=1).max() for u in displacements.values())),
+        displacements=displacements,
+        momenta=np.concatenate([part.momenta for part in parts], axis=1),
+    )
+
+
+def deformed_chain(chain: Chain, reference: Mapping[str, Array], points: Mapping[str, Array]) -> Chain:
+    """The chain with each hinge where the nodes on it have moved in their body's frame.
+
+    Args:
+        chain: whose hinges lie where they do in the reference shape.
+        reference: shape of each link in its body's frame without deformation [m], each shape (node_count, 3), float64.
+        points: the same, deformed.
+    """
+    links = []
+    for link in chain.links:
+        shift = {
+            end: _moved(reference[link.body], points[link.body], np.add(link.hinge_in, arm))
+            for end, arm in (("in", (0.0, 0.0)), ("out", link.hinge_out))
+        }
+        hinge_in, hinge_out = link.hinge_in + shift["in"], link.hinge_out + shift["out"] - shift["in"]
+        links.append(replace(link, hinge_in=_pair(hinge_in), hinge_out=_pair(hinge_out)))
+    return replace(chain, links=tuple(links))
+
+
+def _pair(vector: Array) -> Vec2:
+    return (float(vector[0]), float(vector[1]))
+
+
+def _moved(reference: Array, points: Array, hinge: Array) -> Array:
+    """Mean displacement of the nodes on a hinge axis [m], shape (2,), float64; 0 if there are none."""
+    away = np.linalg.norm(reference[:, :2] - hinge, axis=1)
+    on_axis = away <= 1e-6 * np.ptp(reference, axis=0).max()
+    return (points - reference)[on_axis, :2].mean(axis=0) if on_axis.any() else np.zeros(2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ChainMotion:
+    """The chain's part of a `HandBack`."""
+
+    chain: Chain
+    theta: Array
+    theta_dot: Array
+    placements: dict[str, Placement]
+    kinetic_energy: float
+    vibration_energy: float
+    drive_work: float
+    momenta: Array
+
+
+def _fit_chain(
+    chain: Chain,
+    points: Mapping[str, Array],
+    nodal_masses: Mapping[str, Array],
+    positions: Mapping[str, Array],
+    velocities: Mapping[str, Array],
+    near: Array | None,
+    t: float,
+    carriage: Vec2,
+) -> _ChainMotion:
+    """Coordinates and rates of the chain, as `hand_back` describes."""
     links = [
         mesh_link(k.body, points[k.body], nodal_masses[k.body], hinge_out=k.hinge_out, hinge_in=k.hinge_in)
         for k in chain.links
     ]
     chain = replace(chain, links=tuple(links))
-    names = [link.body for link in links]
+    placed, names = chain.moved_to(t), [link.body for link in links]
     theta = np.array([_own_angle(points[name], nodal_masses[name], positions[name]) for name in names])
     near = np.zeros(len(names)) if near is None else np.asarray(near, dtype=np.float64)
     theta = near + np.remainder(theta - near + np.pi, 2.0 * np.pi) - np.pi
-    rest = np.zeros(len(names))
+    theta = theta if chain.slide is None else np.append(carriage[0], theta)
+    rest, moving = np.zeros(len(theta)), np.array([*placed.origin_velocity, 0.0])
     for _ in range(MAX_ITERATIONS):
-        shape, _ = _rigid_nodes(chain, theta, rest, points)
+        shape, _ = _rigid_nodes(placed, theta, rest, points)
         off = {name: positions[name] - shape[name] for name in names}
-        change = _project(chain, theta, points, nodal_masses, off)
+        change = _project(placed, theta, points, nodal_masses, off, carriage[0] - theta[0])[0]
         theta = theta + change
         if np.abs(change).max() <= 4.0 * np.finfo(np.float64).eps:
             break
-    theta_dot = _project(chain, theta, points, nodal_masses, velocities)
-    shape, motion = _rigid_nodes(chain, theta, theta_dot, points)
-    left = sum(nodal_masses[name] @ ((velocities[name] - motion[name]) ** 2).sum(axis=1) for name in names)
-    return HandBack(
+    relative = {name: velocities[name] - moving for name in names}
+    theta_dot, momenta = _project(placed, theta, points, nodal_masses, relative, carriage[1])
+    _, motion = _rigid_nodes(placed, theta, theta_dot, points)
+    rigid = {name: motion[name] - moving for name in names}
+    left = {name: velocities[name] - motion[name] for name in names}
+    energy = sum(nodal_masses[name] @ (left[name] ** 2).sum(axis=1) for name in names)
+    forced = sum(nodal_masses[name] @ left[name] for name in names) @ moving
+    if chain.slide is not None:
+        slip = carriage[1] - theta_dot[0]
+        energy += chain.carriage_mass * slip**2
+        forced += chain.carriage_mass * slip * (moving[:2] @ np.asarray(chain.slide))
+    return _ChainMotion(
+        chain=chain,
         theta=theta,
         theta_dot=theta_dot,
-        kinetic_energy=chain.kinetic_energy(theta, theta_dot),
-        vibration_energy=float(0.5 * left),
-        shape_misfit=float(max(np.linalg.norm(positions[name] - shape[name], axis=1).max() for name in names)),
+        placements=link_placements(placed, theta, theta_dot),
+        kinetic_energy=placed.kinetic_energy(theta, theta_dot),
+        vibration_energy=float(0.5 * energy),
+        drive_work=float(forced),
+        momenta=np.stack([_project(placed, theta, points, nodal_masses, rigid, theta_dot[0])[1], momenta]),
     )
 
 
@@ -103,15 +221,17 @@ def _project(
     points: Mapping[str, Array],
     nodal_masses: Mapping[str, Array],
     field: Mapping[str, Array],
-) -> Array:
-    """(J^T m J)^-1 J^T m w for a nodal field w, shape (link_count,), float64.
+    carriage: float,
+) -> tuple[Array, Array]:
+    """(J^T m J)^-1 J^T m w and J^T m w, shape (coordinate_count,), float64, for w of the nodes and of the carriage.
 
     Row j of J turns the nodes of link j about their inbound hinge, d X / d theta_j = -z x R_j u, and moves all nodes
-    beyond with the outbound hinge, -z x R_j h_j.
+    beyond with the outbound hinge, -z x R_j h_j; that of s moves all nodes and the carriage along the slide.
     """
-    d, f = link_axes(theta)
-    right, beyond = np.zeros(len(theta)), np.zeros(2)
-    for j in reversed(range(len(theta))):
+    angles = chain.angles(theta)
+    d, f = link_axes(angles)
+    right, beyond = np.zeros(len(angles)), np.zeros(2)
+    for j in reversed(range(len(angles))):
         link = chain.links[j]
         u = points[link.body][:, :2] - np.asarray(link.hinge_in)
         weighted = nodal_masses[link.body][:, None] * field[link.body][:, :2]
@@ -119,4 +239,6 @@ def _project(
         hinge = link.hinge_out[0] * d[j] + link.hinge_out[1] * f[j]
         right[j] = -(perpendicular(arms) * weighted).sum() - perpendicular(hinge) @ beyond
         beyond = beyond + weighted.sum(axis=0)
-    return np.asarray(np.linalg.solve(chain.mass_matrix(theta), right), dtype=np.float64)
+    if chain.slide is not None:
+        right = np.append(beyond @ np.asarray(chain.slide) + chain.carriage_mass * carriage, right)
+    return np.asarray(np.linalg.solve(chain.mass_matrix(theta), right), dtype=np.float64), right

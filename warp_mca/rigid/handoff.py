@@ -10,45 +10,12 @@ import numpy as np
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import turn
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.rigid.chain import Array, Chain, link_axes
-from warp_mca.rigid.swing import Swing, chain_from_scene, swing
+from warp_mca.rigid.chain import Array, Chain
+from warp_mca.rigid.placement import Placement, link_placements
+from warp_mca.rigid.scene_chain import chain_from_scene, release
+from warp_mca.rigid.swing import Swing, swing
 from warp_mca.rigid.target import TargetPlane, target_plane, tip_gap
 from warp_mca.scene import Body, RigidPlane, Scene, Surface
-
-
-@dataclass(frozen=True, kw_only=True)
-class Placement:
-    """A body's rigid pose and motion in the world at the start of the impact phase.
-
-    Attributes:
-        pivot: a point in the body's frame [m], shape (3,), float64.
-        origin: where the pivot lies in the world [m], shape (3,), float64.
-        rotation: from the body's frame to the world [-], shape (3, 3), float64.
-        velocity: of the pivot [m/s], shape (3,), float64.
-        angular_velocity: [rad/s], shape (3,), float64.
-    """
-
-    pivot: Array
-    origin: Array
-    rotation: Array
-    velocity: Array
-    angular_velocity: Array
-
-    def place(self, points: Array) -> tuple[Array, Array]:
-        """World positions X = origin + R (x - pivot) [m] and velocities V = velocity + omega x R (x - pivot) [m/s].
-
-        The products are written out so that every point sees the same operations in the same order as the chain's
-        hinges do: coincident nodes of two links on their hinge coincide afterwards too, and z of a link is copied.
-
-        Args:
-            points: in the body's frame [m], shape (count, 3), float64.
-
-        Returns:
-            X and V, each shape (count, 3), float64.
-        """
-        u = points - self.pivot
-        r = np.stack([u[:, 0] * row[0] + u[:, 1] * row[1] + u[:, 2] * row[2] for row in self.rotation], axis=1)
-        return self.origin + r, self.velocity + np.cross(self.angular_velocity, r)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,12 +41,13 @@ class HandOff:
         positions: world positions X of the nodes by body name [m], each shape (node_count, 3), float64.
         velocities: world velocities V of the nodes by body name [m/s], each shape (node_count, 3), float64.
         placements: rigid pose and motion of each body by name.
-        t_contact: time of the first touch [s]; 0 without a rigid phase.
-        theta: angles of the links [rad], shape (link_count,), float64; empty without a rigid phase.
-        theta_dot: angular velocities of the links [rad/s], shape (link_count,), float64; empty likewise.
+        t_contact: time of the first touch [s]; 0 without a rigid phase; None if nothing was touched by t_end.
+        theta: coordinates of the chain (`Swing`), shape (coordinate_count,), float64; empty without a rigid phase.
+        theta_dot: their rates, shape (coordinate_count,), float64; empty likewise.
         v_n: speed of the centre of the tip's sphere towards the target (downwards on a floor) [m/s]; None without.
         v_t: speed of that centre along the target in the xy plane (along +x on a floor) [m/s]; None without.
-        contact_point: where the sphere touches the plane [m], shape (3,), float64; None without.
+        contact_point: where the sphere touches the plane [m], shape (3,), float64; None without a touch, as v_n and
+            v_t.
         energy_drift: largest error of the rigid phase's energy over its largest kinetic energy [-].
         rigid: momenta of the chain's rigid links at contact; None without a rigid phase.
         nodes: the same summed over the nodes of the links with their lumped masses; None without.
@@ -87,14 +55,14 @@ class HandOff:
         angular_momentum_mismatch: |difference| of the angular momenta over sum(m |r| |V|) [-].
         energy_mismatch: |difference| of the kinetic energies over that of the nodes [-]. All three are round-off with
             inertia="mesh" and a few per cent with "slender".
-        chain: the rigid links; None without a rigid phase.
-        swing: the trajectory up to contact; None without.
+        chain: the rigid links, with base and loads as at the release; None without a rigid phase.
+        swing: the trajectory up to contact or t_end; None without.
     """
 
     positions: dict[str, Array]
     velocities: dict[str, Array]
     placements: dict[str, Placement]
-    t_contact: float = 0.0
+    t_contact: float | None = 0.0
     theta: Array
     theta_dot: Array
     v_n: float | None = None
@@ -110,7 +78,9 @@ class HandOff:
     swing: Swing | None = None
 
 
-def hand_off(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> HandOff:
+def hand_off(
+    scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array], *, t_end: float | None = None
+) -> HandOff:
     """Place every body for the impact phase.
 
     Links take the exact rigid motion of the chain at contact. Other bodies move on with their own velocity and angular
@@ -121,6 +91,7 @@ def hand_off(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str
         scene: with or without a rigid phase.
         meshes: by body name, in the bodies' frames.
         nodal_masses: lumped masses by body name [kg], each shape (node_count,), float64.
+        t_end: where the swing ends, touch or not [s]; by default it must touch by the rigid phase's t_max.
 
     Raises:
         RequestError: the joints form no planar chain, a link moves by itself, or the tip never reaches its target.
@@ -133,11 +104,12 @@ def hand_off(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str
     chain = chain_from_scene(scene, meshes, nodal_masses)
     _check_bodies(scene, scene.rigid.target, chain)
     tip, plane = scene.rigid.tip, target_plane(scene, scene.rigid.target, meshes)
-    run = swing(chain, scene.rigid.theta, scene.rigid.theta_dot, tip_gap(chain, tip, plane), scene.rigid.t_max)
-    placements = {body.name: _own_placement(body, run.t_contact) for body in scene.bodies}
-    placements |= link_placements(chain, run.theta, run.theta_dot)
+    run = swing(chain, *release(scene.rigid), tip_gap(chain, tip, plane), scene.rigid.t_max, t_end=t_end)
+    placed, touched = chain.moved_to(run.t_end), run.ended_by == "touch"
+    placements = {body.name: _own_placement(body, run.t_end) for body in scene.bodies}
+    placements |= link_placements(placed, run.theta, run.theta_dot)
     centre, velocity = (part[0] for part in placements[tip.body].place(np.array([tip.centre])))
-    if scene.rigid.centre_target and isinstance(scene.rigid.target, Surface):
+    if touched and scene.rigid.centre_target and isinstance(scene.rigid.target, Surface):
         name = scene.rigid.target.body
         placements[name] = _move_under(placements[name], centre, plane.normal)
     positions, velocities = _place(placements, meshes)
@@ -145,12 +117,12 @@ def hand_off(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str
         positions=positions,
         velocities=velocities,
         placements=placements,
-        t_contact=run.t_contact,
+        t_contact=run.t_end if touched else None,
         theta=run.theta,
         theta_dot=run.theta_dot,
-        **_approach(centre, velocity, tip.radius, plane),
+        **(_approach(centre, velocity, tip.radius, plane) if touched else {}),
         energy_drift=run.energy_drift,
-        **_balance(chain, run, positions, velocities, nodal_masses),
+        **_balance(placed, run, positions, velocities, nodal_masses),
         chain=chain,
         swing=run,
     )
@@ -166,22 +138,6 @@ def _own_placement(body: Body, t: float) -> Placement:
         velocity=velocity,
         angular_velocity=omega,
     )
-
-
-def link_placements(chain: Chain, theta: Array, theta_dot: Array) -> dict[str, Placement]:
-    """Pose and motion of each link by body name: R = [d f z], omega = (0, 0, -theta_dot), about its inbound hinge."""
-    hinges, speeds = chain.hinges(theta, theta_dot)
-    d, f = link_axes(theta)
-    return {
-        link.body: Placement(
-            pivot=np.array([*link.hinge_in, 0.0]),
-            origin=np.array([*hinges[i], 0.0]),
-            rotation=np.array([[d[i, 0], f[i, 0], 0.0], [d[i, 1], f[i, 1], 0.0], [0.0, 0.0, 1.0]]),
-            velocity=np.array([*speeds[i], 0.0]),
-            angular_velocity=np.array([0.0, 0.0, -theta_dot[i]]),
-        )
-        for i, link in enumerate(chain.links)
-    }
 
 
 def _move_under(placement: Placement, centre: Array, normal: Array) -> Placement:

@@ -3,47 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
-from warp_mca.model.contact_checks import resolution_warnings
-from warp_mca.model.model import Model, body_materials
+from warp_mca.model.model import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
-from warp_mca.results.paths import Probes, path_histories
+from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
+from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.ledger import Ledger
 
 if TYPE_CHECKING:
-    from warp_mca.geometry.mesh import Mesh
-    from warp_mca.rigid.handoff import HandOff
-    from warp_mca.runs.simulation import Steps
-    from warp_mca.scene import Scene
+    from warp_mca.runs.prepare import Prepared
     from warp_mca.solve.solver import Solver
+    from warp_mca.solve.state import State
+    from warp_mca.solve.steps import Steps
 
 COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """A scene at the start of its impact phase.
-
-    Attributes:
-        scene: as it was asked for.
-        meshes: of its bodies, by name.
-        start: the hand-off.
-        model: assembled.
-        probes: of its paths.
-        warnings: about its meshes, see `mesh_warnings`.
-    """
-
-    scene: Scene
-    meshes: Mapping[str, Mesh]
-    start: HandOff
-    model: Model
-    probes: Probes
-    warnings: tuple[str, ...] = ()
 
 
 class Account:
@@ -53,21 +30,23 @@ class Account:
         ledger: histories and guards.
     """
 
-    def __init__(self, ready: Prepared, steps: Steps, solver: Solver, index: int = 0, first_probe: int = 0) -> None:
-        """Begin with none.
+    def __init__(
+        self, ready: Prepared, steps: Steps, solver: Solver, state: State, index: int = 0, first_probe: int = 0
+    ) -> None:
+        """Go on from what the state has recorded.
 
         Args:
             ready: the scene.
             steps: of the run.
             solver: that runs it.
+            state: that it advances.
             index: number of the scene in the solver's layout.
             first_probe: number of the scene's first probe among the solver's.
         """
-        self.ready, self.steps, self.layout, self.index = ready, steps, solver.layout, index
+        self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         tolerance = ready.scene.impact.energy_tolerance
-        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision)
-        self.rings: list[NDArray] = []
+        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index])
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of the solver's records, and hold them to the guards.
@@ -75,28 +54,26 @@ class Account:
         Raises:
             GuardError: a record breaks a guard; those before it count.
         """
-        first, rows = self.ledger.count, self.ledger.rows(written)
+        kept, first, rows = self.ledger.kept, self.ledger.kept.count, self.ledger.rows(written)
         try:
-            self.ledger.read(written, self.layout.records(records, self.index))
+            self.ledger.read(written, self.solver.layout.records(records, self.index))
         finally:
             if self.ready.scene.paths:
-                self.rings.append(records["path_stress"][rows[: self.ledger.count - first], self.probes])
+                kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
-    def result(
-        self, solver: Solver, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None
-    ) -> Result:
+    def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
         history = self.ledger.history()
         contacts = self.ledger.contacts(contact_names(self.ready.scene.contacts))
-        facts = self._facts(solver, wall, stopped is not None)
-        paths = path_histories(self.ready.probes, self.rings)
+        facts = self._facts(wall, stopped is not None)
+        paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)
-        warnings = (*self._warnings(solver), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
+        warnings = (*self._warnings(), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
         return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
 
-    def _facts(self, solver: Solver, wall: Mapping[str, float], cut_short: bool) -> RunFacts:
+    def _facts(self, wall: Mapping[str, float], cut_short: bool) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
-        count = self.steps.per_interval * max(ledger.count - 1, 0) if cut_short else self.steps.count
+        count = self.steps.per_interval * max(ledger.kept.count - 1, 0) if cut_short else self.steps.count
         more: dict[str, object] = {
             "energy_drift_rigid": start.energy_drift,
             "handoff_mismatch": {
@@ -104,16 +81,16 @@ class Account:
                 "angular_momentum": start.angular_momentum_mismatch,
                 "kinetic_energy": start.energy_mismatch,
             },
-            "max_penetration": solver.max_penetration(self.index),
-            "max_strain": ledger.max_strain,
-            "extremes": self._extremes(solver),
+            "max_penetration": self.solver.max_penetration(self.state, self.index),
+            "max_strain": ledger.kept.max_strain,
+            "extremes": self._extremes(),
             "energy_error_exchanged": ledger.exchange_error,
             "stable_dt": model.stable.dt,
-            "joint_impulse": solver.joint_impulses(self.index),
-            "threads": solver.threads,
+            "joint_impulse": self.solver.joint_impulses(self.state, self.index),
+            "threads": self.solver.threads,
         }
-        if self.layout.count > 1:
-            more["batch"] = {"scene": self.index, "scenes": self.layout.count}
+        if self.solver.layout.count > 1:
+            more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         if scene.paths:
             body = scene.body(scene.paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
@@ -125,12 +102,12 @@ class Account:
             n_steps=count,
             simulated_time=self.steps.dt * count,
             wall=wall,
-            device=solver.device_name(),
-            precision=solver.precision,
+            device=self.solver.device_name(),
+            precision=self.solver.precision,
             element=" ".join(sorted({block.element for block in model.blocks})),
-            energy_error=ledger.energy_error,
+            energy_error=ledger.kept.energy_error,
             energy=ledger.energy(),
-            max_plastic_strain=solver.max_plastic_strain(self.index),
+            max_plastic_strain=self.solver.max_plastic_strain(self.state, self.index),
             parameters=scene.parameters,
             t_contact=start.t_contact if scene.rigid else None,
             v_n=start.v_n,
@@ -140,39 +117,41 @@ class Account:
             more=more,
         )
 
-    def _extremes(self, solver: Solver) -> dict[str, float]:
+    def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
         return {
-            "F_n_max": solver.max_normal_force(self.index),
-            "max_strain": self.ledger.max_strain,
-            "min_jacobian": self.ledger.min_jacobian,
-            "max_speed": solver.max_speed(self.index),
-            "energy_error": self.ledger.energy_error,
+            "F_n_max": self.solver.max_normal_force(self.state, self.index),
+            "max_strain": self.ledger.kept.max_strain,
+            "min_jacobian": self.ledger.kept.min_jacobian,
+            "max_speed": self.solver.max_speed(self.state, self.index),
+            "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _warnings(self, solver: Solver) -> list[str]:
+    def _warnings(self) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found: list[str] = []
         small = [body.name for body in scene.bodies if body.kinematics == "corotational"]
-        if small and ledger.max_strain > COROTATIONAL_STRAIN:
+        if small and ledger.kept.max_strain > COROTATIONAL_STRAIN:
             where = "" if len(small) == len(scene.bodies) else f", if that was in {' or '.join(small)}"
             found.append(
-                f"strain reached {ledger.max_strain:.2f}; the co-rotational element takes strains as small, expect "
-                f"stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose kinematics='finite'{where}"
+                f"strain reached {ledger.kept.max_strain:.2f}; the co-rotational element takes strains as small, "
+                f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose "
+                f"kinematics='finite'{where}"
             )
         tolerance = scene.impact.energy_tolerance
-        if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.energy_error:
+        if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
-                f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.exchanged:.3g} J that the bodies "
-                f"exchanged, though only {ledger.energy_error:.2g} of all they have: {ledger.remedy}, if that is above "
-                f"what energy_tolerance = {tolerance:g} should allow"
+                f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.kept.exchanged:.3g} J that the bodies "
+                f"exchanged, though only {ledger.kept.energy_error:.2g} of all they have: {ledger.remedy}, if that is "
+                f"above what energy_tolerance = {tolerance:g} should allow"
             )
-        if ledger.turned:
+        if ledger.kept.turned:
             found.append(
                 "nodes that a master pressed went over to a face of it around a sharp edge, where single nodes do not "
                 "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
             )
-        found += resolution_warnings(scene.contacts, self.ready.model, ledger, solver, self.index)
+        depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
+        found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths)
         found += self.ready.warnings
         if scene.rigid and scene.rigid.inertia == "slender":
             found.append(

@@ -5,27 +5,18 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from warp_mca.base import validate
-from warp_mca.base.errors import GuardError, McaError, RequestError, bad_value
+from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.folder import held
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.join import join_models, join_probes
-from warp_mca.model.layout import offsets
-from warp_mca.model.precision import check_range
-from warp_mca.results.paths import Found
 from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
-from warp_mca.runs.account import Account, Prepared
-from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_of, teller
-from warp_mca.runs.simulation import Clock, advance, divide_alike, prepare
+from warp_mca.runs.simulation import settings_of, simulate
 from warp_mca.scene import RigidPlane, Scene
 
 Meshes = Mapping[str, Mesh]
@@ -67,57 +58,29 @@ def run_batch(
     Raises:
         RequestError: the request cannot be carried out; nothing was written.
     """
-    from warp_mca.solve.solver import check_device
-    from warp_mca.solve.threads import thread_count
-
     if isinstance(scenes, str) or not isinstance(scenes, Iterable):
         raise bad_value("scenes", validate.brief(scenes), "give a list of scenes; mca.run runs a single one")
     scenes = list(scenes)
     tell = teller(progress)
     span = check_alike(scenes, duration)
-    check_device(device)
-    settings: dict[str, Any] = {"device": device, "precision": precision, "threads": thread_count(threads)}
+    settings = settings_of(device, precision, threads)
+    _check_meshes(meshes, len(scenes))
     with hold_scenes(out, len(scenes), force) as folders:
-        return save_scenes(_simulate(scenes, meshes, span, tell, **settings), folders, force)
+        return save_scenes(simulate(scenes, meshes, span, tell, settings), folders, force)
 
 
-def _simulate(
-    scenes: Sequence[Scene],
-    meshes: Sequence[Meshes] | None,
-    span: float,
-    tell: Progress,
-    *,
-    device: str,
-    precision: str,
-    threads: int,
-) -> list[Result]:
-    """The runs themselves, of `span` [s]; arguments are those of `run_batch`, checked."""
-    from warp_mca.runs.initial_overlap import settle_initial_overlap
-    from warp_mca.solve.output import Output
-    from warp_mca.solve.solver import Solver
+def _check_meshes(meshes: object, count: int) -> None:
+    """Refuse meshes that are not a list with those of each of so many scenes.
 
-    clock = Clock()
-    ready = _prepare(scenes, meshes, precision, clock, tell)
-    warn(sentence for item in ready for sentence in item.warnings)
-    steps = divide_alike([(item.scene, item.model) for item in ready], span)
-    model, probes = join_models([item.model for item in ready]), join_probes(ready)
-    clock.lap("mesh")
-    tell("compile", 0.0)
-    solver = Solver(model, device=device, precision=precision, dt=steps.dt, threads=threads)
-    if len(probes.corner):
-        solver.output = Output(solver, {}, probes, frozenset())
-    solver.compile()
-    settle_initial_overlap(ready, solver)
-    clock.lap("compile")
-    first = offsets([len(item.probes.corner) for item in ready])
-    accounts = [Account(item, steps, solver, k, int(first[k])) for k, item in enumerate(ready)]
-    stopped: list[str | None] = [None] * len(scenes)
-    solver.start()
-    with suppress(GuardError):  # that of the last scene
-        advance(solver, steps, _reader(accounts, stopped, steps.intervals + 1, tell))
-    clock.lap("fe")
-    tell("impact", 1.0)
-    return [account.result(solver, clock.wall, stopped=stopped[k]) for k, account in enumerate(accounts)]
+    Raises:
+        RequestError: so it is.
+    """
+    if meshes is None:
+        return
+    validate.kind_of("meshes", meshes, (tuple, list), "give a list with the meshes by body of each scene")
+    assert isinstance(meshes, Sequence)
+    if len(meshes) != count:
+        raise bad_value("number of meshes", len(meshes), f"give the meshes of each of the {count} scenes")
 
 
 def save_scenes(results: Sequence[Result], folders: Sequence[Path | None], force: bool) -> list[Result]:
@@ -161,25 +124,6 @@ def _remove(folders: Iterable[Path]) -> None:
             folder.rmdir()
 
 
-def _reader(
-    accounts: Sequence[Account], stopped: list[str | None], rows: int, tell: Progress
-) -> Callable[[int, Mapping[str, NDArray]], None]:
-    """What hands records to each account that no guard has stopped, and notes in `stopped` why one does."""
-
-    def read(written: int, records: Mapping[str, NDArray]) -> None:
-        for k, account in enumerate(accounts):
-            if stopped[k] is None:
-                try:
-                    account.read(written, records)
-                except GuardError as error:
-                    stopped[k] = str(error)
-                    if None not in stopped:
-                        raise
-        tell("impact", max(account.ledger.count for account in accounts) / rows)
-
-    return read
-
-
 def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float:
     """The duration [s] of scenes that one batch can run.
 
@@ -203,7 +147,7 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
             remedy = f"scenes[0] has {len(first.contacts)}; batch scenes with as many contacts"
             raise bad_value(f"number of scenes[{k}].contacts", len(scene.contacts), remedy)
         for i, (contact, wanted) in enumerate(zip(scene.contacts, first.contacts, strict=True)):
-            for name, kind in (("master", _kind), ("two_way", bool)):
+            for name, kind in (("master", _kind), ("two_way", bool), ("law", _law)):
                 value, other = (kind(getattr(item, name)) for item in (contact, wanted))
                 if value != other:
                     remedy = f"that of scenes[0] is {other}; batch scenes with contacts of the same kinds"
@@ -213,6 +157,10 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
 
 def _kind(master: object) -> str:
     return "RigidPlane" if isinstance(master, RigidPlane) else "Surface"
+
+
+def _law(law: object) -> str:
+    return type(law).__name__
 
 
 @contextmanager
@@ -229,29 +177,3 @@ def hold_scenes(out: str | os.PathLike[str] | None, count: int, force: bool) -> 
     folders: list[Path | None] = [check_output(path / f"{k:0{digits}d}", force=force) for k in range(count)]
     with held(path):
         yield folders
-
-
-def _prepare(
-    scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, precision: str, clock: Clock, tell: Progress
-) -> list[Prepared]:
-    """Every scene at the start of its impact phase."""
-    if meshes is not None:
-        validate.kind_of("meshes", meshes, (tuple, list), "give a list with the meshes by body of each scene")
-    if meshes is not None and len(meshes) != len(scenes):
-        raise bad_value("number of meshes", len(meshes), f"give the meshes of each of the {len(scenes)} scenes")
-    made: dict[object, Mesh] = {}
-    places: Found = {}
-    ready = []
-    for k, scene in enumerate(scenes):
-        try:
-            own = None if meshes is None else meshes[k]
-            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made))
-            check_range(ready[-1].model, precision)
-        except RequestError as error:
-            raise RequestError(f"scenes[{k}]: {error}") from error
-    return ready
-
-
-def _share(tell: Progress, done: float) -> Progress:
-    """Tells of every stage that this share of the scenes is done with it."""
-    return lambda stage, _: tell(stage, done)

@@ -17,10 +17,11 @@ from warp_mca.results.contact_history import contact_names
 from warp_mca.scene import OVERLAP_CHOICES, RigidPlane
 
 if TYPE_CHECKING:
-    from warp_mca.runs.account import Prepared
+    from warp_mca.runs.prepare import Prepared
     from warp_mca.scene import Contact
     from warp_mca.solve.contact_stage import ContactStage
     from warp_mca.solve.solver import Solver
+    from warp_mca.solve.state import State
 
 Array = NDArray[np.float64]
 
@@ -45,15 +46,15 @@ class Overlap:
     energy: float
 
 
-def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver) -> None:
+def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: State) -> None:
     """Refuse scenes whose bodies overlap, or start their springs free of force, as each contact says.
 
-    Call it after `Solver.compile`, before the first step.
+    Call it after `Solver.begin`, before the first step.
 
     Raises:
         RequestError: bodies of a contact with `initial_overlap="refuse"` overlap by more than rounding.
     """
-    for stage, (depth, energy) in zip(solver.contacts, solver.initial_depths(), strict=True):
+    for stage, (depth, energy) in zip(solver.contacts, solver.initial_depths(state), strict=True):
         slaves = np.concatenate([np.repeat(item.slave, stage.sides) for item in stage.items])
         for scene, item in enumerate(stage.items):
             mine = slice(int(stage.springs[scene]), int(stage.springs[scene + 1]))
@@ -65,7 +66,7 @@ def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver) -> None:
             if item.initial_overlap != "stress_free":
                 depth[mine] = 0.0
         if stage.stress_free:
-            stage.rest_at(depth)
+            stage.rest_at(state, depth)
 
 
 def _edge(stage: ContactStage, scene: int) -> float:

@@ -9,7 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
+from warp_mca.kernels.records.columns import (
+    DRIVE_WORK,
+    ELASTIC,
+    FRICTION,
+    GRAVITY_WORK,
+    HOURGLASS,
+    IMPULSE,
+    JACOBIAN,
+    KINETIC,
+    LOST,
+    NORMAL_ENERGY,
+    NORMAL_FORCE,
+    NORMAL_IMPULSE,
+    PASS,
+    PASS_COLUMNS,
+    PLANE_WORK,
+    PLASTIC,
+    PRESSURE,
+    SPRING_ENERGY,
+    SQUARES,
+    STICK_IMPULSE,
+    STRAIN,
+)
 from warp_mca.results.contact_history import ContactHistory
+from warp_mca.solve.records import SceneRecords
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -17,9 +41,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Columns of a record, then PASS_COLUMNS for each contact pass (`kernels.contact.spring.sum_springs`).
-KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK, PASS = range(9)
-PASS_COLUMNS = 15
 LEAST = 1e-7  # of all energy, that counts as exchanged at least
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 
@@ -33,37 +54,18 @@ _FLAGS = (
 
 
 class Ledger:
-    """Collects the records of one scene: rows of its history, and those that check the run between them.
+    """Turns the records of one scene into rows of its history, and holds them to the guards.
 
     Attributes:
-        count: rows so far.
-        records: check records so far, rows included.
-        energy_error: largest imbalance so far, as a share of initial energy and external work [-].
-        exchanged: largest energy so far that was in elements, contact springs and friction, or that motion had gained
-            or lost [J].
-        max_strain: greatest deviatoric strain of any step so far [-].
-        min_jacobian: smallest ratio of volumes so far, 1 at most: of any step at the centres of elements, of records at
-            all their points [-].
-        turned: whether a pressed node went over to a face across a sharp edge.
+        kept: what it has taken in so far, a part of the run's state.
     """
 
-    def __init__(self, model: Model, steps: Steps, tolerance: float, precision: str) -> None:
-        self.model, self.steps, self.tolerance = model, steps, tolerance
-        self.precision = precision
-        self.columns: list[Array] = []
-        self.velocities: list[Array] = []
-        self.count = self.records = 0
-        self.turned = False
-        self.energy_error = 0.0
-        self.max_strain = 0.0
-        self.min_jacobian = 1.0
-        self.contact_energy = 0.0
-        self.peaks: Array = np.zeros((len(model.passes), 2))  # of each pass: greatest sum of normal forces, of squares
-        self.initial_energy: float | None = None
-        self.initial_work = 0.0  # that driven nodes do in the half step before t = 0
-        self.energy_scale = 0.0  # greatest so far: at rest the work of gravity returns to nothing
-        self.initial_kinetic = self.exchanged = self.imbalance = self.worked = 0.0
-        self.touched = False  # whether a contact spring was ever pressed
+    def __init__(self, model: Model, steps: Steps, tolerance: float, precision: str, kept: SceneRecords) -> None:
+        """Go on from what is `kept`; the energy balance may be off by the share `tolerance`."""
+        self.model, self.steps, self.tolerance, self.precision = model, steps, tolerance, precision
+        self.kept = kept
+        if not len(kept.peaks):
+            kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = _spin(model)
         self.rounding = _rounding(model, steps.dt)
 
@@ -80,10 +82,10 @@ class Ledger:
         """
         sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
         *flags, turned = records["flag"]
-        self.turned = bool(turned)
+        self.kept.turned = bool(turned)
         for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
             if raised:
-                end = self.steps.time(self.records + written)
+                end = self.steps.time(self.kept.records + written)
                 raise GuardError(f"stopped before t = {end:.4g} s: {message}")
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
@@ -92,14 +94,14 @@ class Ledger:
         end = int(np.argmax(over)) + 1 if over.any() else good
         self._note_peaks(sums[:end])
         rows = self.rows(end)
-        self.columns.extend(sums[rows])
-        self.velocities.extend(velocity[rows])
-        self.count += len(rows)
-        self.records += end
-        self.max_strain = max(self.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
-        self.min_jacobian = min(self.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
-        self.energy_error = max(self.energy_error, float(share[:end].max(initial=0.0)))
-        last, t = (self.steps.time(self.records + k) for k in (-1, 0))
+        self.kept.sums.extend(sums[rows])
+        self.kept.velocities.extend(velocity[rows])
+        self.kept.count += len(rows)
+        self.kept.records += end
+        self.kept.max_strain = max(self.kept.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
+        self.kept.min_jacobian = min(self.kept.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
+        self.kept.energy_error = max(self.kept.energy_error, float(share[:end].max(initial=0.0)))
+        last, t = (self.steps.time(self.kept.records + k) for k in (-1, 0))
         if over.any():
             raise GuardError(
                 f"energy imbalance {100.0 * share[end - 1]:.3g}% at t = {last:.4g} s exceeds "
@@ -107,7 +109,7 @@ class Ledger:
                 f"much is acceptable"
             )
         if good < written and not np.isfinite(sums[good]).all():
-            if not self.records:
+            if not self.kept.records:
                 raise GuardError(
                     "energy is not a number at t = 0, before the first step: speeds, sizes or moduli exceed the range "
                     f"of numbers; check their units{', or choose float64' if self.precision == 'mixed' else ''}"
@@ -118,7 +120,7 @@ class Ledger:
 
     def rows(self, written: int) -> NDArray[np.int_]:
         """Which of the next `written` records are rows of the history."""
-        return np.arange(-self.records % self.steps.checks, written, self.steps.checks)
+        return np.arange(-self.kept.records % self.steps.checks, written, self.steps.checks)
 
     def _sums(self, partial: Array) -> Array:
         """Columns of each record from its partial sums, shape (row_count, column_count)."""
@@ -134,18 +136,18 @@ class Ledger:
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
         springs = self._springs(sums)
-        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., 2].sum(axis=-1)
+        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., PLANE_WORK].sum(axis=-1)
         return {
             "kinetic": sums[..., KINETIC],
             "elastic": sums[..., ELASTIC],
             "plastic": sums[..., PLASTIC],
             "hourglass": sums[..., HOURGLASS],
-            "contact": springs[..., 0].sum(axis=-1),
-            "friction": springs[..., 1].sum(axis=-1),
-            "contact_loss": springs[..., 13].sum(axis=-1),
+            "contact": springs[..., SPRING_ENERGY].sum(axis=-1),
+            "friction": springs[..., FRICTION].sum(axis=-1),
+            "contact_loss": springs[..., LOST].sum(axis=-1),
             "damping": np.zeros(sums.shape[:-1]),
             "joint": np.zeros(sums.shape[:-1]),
-            "external_work": work - self.initial_work,
+            "external_work": work - self.kept.initial_work,
         }
 
     def _balance(self, sums: Array) -> Array:
@@ -153,41 +155,46 @@ class Ledger:
         energy = self._energies(sums)
         work = energy.pop("external_work")
         stored = sum(energy.values(), np.zeros(len(sums)))
-        if self.initial_energy is None and len(sums):
-            self.initial_energy, self.initial_work = float(stored[0]), float(work[0])
-            self.initial_kinetic = float(energy["kinetic"][0])
-            work = work - self.initial_work
-        initial = self.initial_energy or 0.0
-        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.energy_scale))
-        self.energy_scale = float(scale.max(initial=self.energy_scale))
-        self.touched = self.touched or bool(
-            (self._springs(sums)[..., 6] > 0.0).any() or (energy["contact"] > 0.0).any()
+        if np.isnan(self.kept.initial_energy) and len(sums):
+            self.kept.initial_energy, self.kept.initial_work = float(stored[0]), float(work[0])
+            self.kept.initial_kinetic = float(energy["kinetic"][0])
+            work = work - self.kept.initial_work
+        initial = self.initial_energy
+        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.kept.energy_scale))
+        self.kept.energy_scale = float(scale.max(initial=self.kept.energy_scale))
+        self.kept.touched = self.kept.touched or bool(
+            (self._springs(sums)[..., NORMAL_IMPULSE] > 0.0).any() or (energy["contact"] > 0.0).any()
         )
-        self.worked = float(np.abs(work).max(initial=self.worked))
-        imbalance, moved = np.abs(stored - work - initial), np.abs(energy["kinetic"] - self.initial_kinetic)
-        self.imbalance = float(imbalance.max(initial=self.imbalance))
-        self.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.exchanged))
+        self.kept.worked = float(np.abs(work).max(initial=self.kept.worked))
+        imbalance, moved = np.abs(stored - work - initial), np.abs(energy["kinetic"] - self.kept.initial_kinetic)
+        self.kept.imbalance = float(imbalance.max(initial=self.kept.imbalance))
+        self.kept.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.kept.exchanged))
         scale = np.maximum(scale, self.rounding)
         share: Array = np.zeros(len(sums))
         np.divide(imbalance, scale, out=share, where=scale > 0.0)
         return share
 
     @property
+    def initial_energy(self) -> float:
+        """Energy at the start [J]; 0 before the first record."""
+        return 0.0 if np.isnan(self.kept.initial_energy) else self.kept.initial_energy
+
+    @property
     def remedy(self) -> str:
         """What helps against an imbalance: penalty only where contact was touched, float64 only for what turns."""
         found = "lower time_step_scale"
-        if self.touched:
+        if self.kept.touched:
             found += " or a contact's penalty"
-        if self.precision == "mixed" and self.spin * self.steps.time(self.records) > TURNED:
+        if self.precision == "mixed" and self.spin * self.steps.time(self.kept.records) > TURNED:
             found += ", choose --precision float64 for bodies that turn so far"
         return found
 
     @property
     def exchanges(self) -> bool:
         """Whether bodies exchanged energy worth a word, by contact, joints or external work."""
-        all_energy = LEAST * self.energy_scale
-        met = self.touched or len(self.model.joint_first) > 0 or self.worked > all_energy
-        return met and self.exchanged > max(all_energy, self.rounding)
+        all_energy = LEAST * self.kept.energy_scale
+        met = self.kept.touched or len(self.model.joint_first) > 0 or self.kept.worked > all_energy
+        return met and self.kept.exchanged > max(all_energy, self.rounding)
 
     @property
     def exchange_error(self) -> float:
@@ -196,35 +203,36 @@ class Ledger:
         What is exchanged counts as LEAST of the initial energy and external work at least, and as the energy of
         rounding, so that the rounding of motion alone counts for little.
         """
-        scale = max(self.exchanged, LEAST * self.energy_scale, self.rounding)
-        return self.imbalance / scale if scale > 0.0 else 0.0
+        scale = max(self.kept.exchanged, LEAST * self.kept.energy_scale, self.rounding)
+        return self.kept.imbalance / scale if scale > 0.0 else 0.0
 
     @property
     def greatest_contact_share(self) -> float:
         """Greatest energy of all contact springs in a record as a share of `exchanged` [-]; 0 where hardly any was."""
-        return self.contact_energy / self.exchanged if self.exchanged > LEAST * self.energy_scale else 0.0
+        kept = self.kept
+        return kept.contact_energy / kept.exchanged if kept.exchanged > LEAST * kept.energy_scale else 0.0
 
     def nodes_at_peak(self, k: int) -> float:
         """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""
-        force, squares = self.peaks[k]
+        force, squares = self.kept.peaks[k]
         return float(force**2 / squares) if squares > 0.0 else 0.0
 
     def _note_peaks(self, sums: Array) -> None:
         """Keep what records say of contact at its greatest."""
-        self.contact_energy = float(self._energies(sums)["contact"].max(initial=self.contact_energy))
+        self.kept.contact_energy = float(self._energies(sums)["contact"].max(initial=self.kept.contact_energy))
         springs = self._springs(sums)
         for k, found in enumerate(
-            springs[springs[:, :, 11].argmax(axis=0), range(springs.shape[1])] if len(sums) else ()
+            springs[springs[:, :, PRESSURE].argmax(axis=0), range(springs.shape[1])] if len(sums) else ()
         ):
-            if found[11] > self.peaks[k, 0]:
-                self.peaks[k] = found[11], found[14]
+            if found[PRESSURE] > self.kept.peaks[k, 0]:
+                self.kept.peaks[k] = found[PRESSURE], found[SQUARES]
 
     def energy(self) -> dict[str, float]:
         """The ledger at the end [J]; not numbers where no record was taken in."""
-        sums = self.columns[-1] if self.columns else np.full(self._width, np.nan)
+        sums = self.kept.sums[-1] if self.kept.sums else np.full(self._width, np.nan)
         last = {key: float(value) for key, value in self._energies(sums).items()}
         error = sum(value for key, value in last.items() if key != "external_work")
-        initial = self.initial_energy or 0.0
+        initial = self.initial_energy
         return {"initial": initial, **last, "error": error - last["external_work"] - initial}
 
     def history(self, first: int = 0) -> dict[str, Array]:
@@ -232,26 +240,26 @@ class Ledger:
 
         Forces are means over the interval before.
         """
-        table = np.array(self.columns[first:]).reshape(-1, self._width)
+        table = np.array(self.kept.sums[first:]).reshape(-1, self._width)
         energy, springs = self._energies(table), self._springs(table)
         share = self.steps.dt / self.steps.interval
         F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
         for k, item in enumerate(self.model.passes):
-            force = share * item.sign * springs[:, k, 3:6]
+            force = share * item.sign * springs[:, k, IMPULSE]
             normal, tangent = self.model.contact_axes[item.contact]
-            F_n += force @ normal if normal.any() else share * springs[:, k, 6]  # see `Model.contact_axes`
+            F_n += force @ normal if normal.any() else share * springs[:, k, NORMAL_IMPULSE]  # see `Model.contact_axes`
             F_t += force @ tangent
-        pressed, stuck = springs[:, :, 6].sum(axis=1), springs[:, :, 7].sum(axis=1)
+        pressed, stuck = springs[:, :, NORMAL_IMPULSE].sum(axis=1), springs[:, :, STICK_IMPULSE].sum(axis=1)
         stick: Array = np.zeros(len(table))
         np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
-        velocity = np.array(self.velocities[first:]).reshape(-1, 2, 3)
+        velocity = np.array(self.kept.velocities[first:]).reshape(-1, len(self.model.points), 3)
         velocity[:, self.model.points < 0] = np.nan
         if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
             velocity[:, 1] = self.model.passes[0].plane.velocity
         stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
         balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
         return {
-            "time_s": self.steps.interval * np.arange(first, self.count, dtype=np.float64),
+            "time_s": self.steps.interval * np.arange(first, self.kept.count, dtype=np.float64),
             "F_n_N": F_n,
             "F_t_N": F_t,
             "stick_fraction": stick,
@@ -263,7 +271,7 @@ class Ledger:
             "E_plastic": energy["plastic"],
             "E_contact": energy["contact"],
             "E_friction": energy["friction"],
-            "E_total_error": balance - (self.initial_energy or 0.0),
+            "E_total_error": balance - self.initial_energy,
             "tip_vz": velocity[:, 0, 2],
             "plate_vy": velocity[:, 1, 1],
             "plate_vz": velocity[:, 1, 2],
@@ -273,7 +281,7 @@ class Ledger:
     def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
         """Each contact by itself, with these `names`."""
         springs, share = (
-            self._springs(np.array(self.columns).reshape(-1, self._width)),
+            self._springs(np.array(self.kept.sums).reshape(-1, self._width)),
             self.steps.dt / self.steps.interval,
         )
         found: list[ContactHistory] = []
@@ -283,9 +291,9 @@ class Ledger:
             found.append(
                 ContactHistory(
                     name=name,
-                    force=share * np.einsum("p,rpc->rc", sign, springs[:, own, 3:6]),
-                    pressure=share * springs[:, own, 6].sum(axis=1),
-                    normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, 8:11]),
+                    force=share * np.einsum("p,rpc->rc", sign, springs[:, own, IMPULSE]),
+                    pressure=share * springs[:, own, NORMAL_IMPULSE].sum(axis=1),
+                    normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, NORMAL_FORCE]),
                     closing_speed=self._closing_speed(0, own),
                 )
             )
@@ -297,10 +305,10 @@ class Ledger:
         Normal forces do the work dE = sum(F_n v dt) on their springs. So the gain of these in an interval, over the
         normal impulse by the trapezoidal rule, is the mean of v over nodes and time that is weighted with F_n.
         """
-        rows = np.array(self.columns[max(first - 1, 0) :]).reshape(-1, self._width)
+        rows = np.array(self.kept.sums[max(first - 1, 0) :]).reshape(-1, self._width)
         springs = self._springs(rows)[:, passes].sum(axis=1)
-        gain, rise = np.diff(springs[:, 12]), np.diff(springs[:, 11])
-        impulse = self.steps.dt * (springs[1:, 6] - 0.5 * rise)
+        gain, rise = np.diff(springs[:, NORMAL_ENERGY]), np.diff(springs[:, PRESSURE])
+        impulse = self.steps.dt * (springs[1:, NORMAL_IMPULSE] - 0.5 * rise)
         speed: Array = np.full(len(rows), np.nan)
         np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
         return speed[min(first, 1) :]

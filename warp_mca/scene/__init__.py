@@ -5,28 +5,36 @@ and the remedy. Nothing here meshes, allocates or imports Warp.
 """
 
 from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
-from warp_mca.scene.joints import Revolute
-from warp_mca.scene.phases import ImpactPhase, RigidPhase, Tip
+from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
+from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
 
 __all__ = [
     "OVERLAP_CHOICES",
+    "BaseMotion",
     "Body",
     "Contact",
     "Fixed",
     "ImpactPhase",
+    "JointTorque",
     "Line",
     "Path",
+    "Penalty",
     "Point",
     "Prescribed",
+    "Prismatic",
     "Revolute",
     "RigidPhase",
     "RigidPlane",
     "Scene",
+    "Spherical",
+    "Slide",
     "Surface",
     "Tip",
     "Vec3",
+    "Weld",
 ]

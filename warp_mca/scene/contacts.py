@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
+from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw, Penalty
 
 OVERLAP_CHOICES = ("refuse", "stress_free", "press")
 
@@ -60,6 +61,7 @@ class Contact:
         mu: coefficient of friction [-]; 0 runs no friction at all.
         penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes k = c E / (1 - nu^2) A^2 / V, with
             c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1.
+        law: force along the normal over depth and stiffness; the linear spring k g by default.
         two_way: the master's nodes are also kept out of the slave's faces.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
             with springs that count depth from there; or "press", with the springs' full force.
@@ -81,11 +83,15 @@ class Contact:
     name: str | None = None
     normal: Vec3 | None = None
     tangent: Vec3 | None = None
+    law: ContactLaw = field(default_factory=Penalty)
 
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
+        if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
+            remedy = f"give a {' or a '.join(CONTACT_LAWS)}, no class made of them"
+            raise bad_value("Contact.law", validate.brief(self.law), remedy)
         if self.penalty is not None:
             validate.positive("Contact", penalty=self.penalty)
         if self.initial_overlap not in OVERLAP_CHOICES:

@@ -1,46 +1,257 @@
-"""Owns joints: what ties nodes of two bodies, or of a body and the ground."""
+"""Owns joints: what ties nodes of two bodies, or of a body and the ground.
+
+A joint is plain, immutable data with one method, `ties`, that says which nodes move as one and in which directions. A
+new kind is a dataclass made of `Joint` with a place in the table `JOINTS`; the solver needs nothing else.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from types import NoneType
-from typing import Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
 
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+COINCIDENT = 1e-6  # of the extent of a joint's first body: nodes no further apart count as coincident
+
+
+@dataclass(frozen=True)
+class Side:
+    """What a joint knows of one of its bodies.
+
+    Attributes:
+        body: its name.
+        mesh: in the body's own frame.
+        X: positions of its nodes at the start of the impact phase [m], shape (node_count, 3), float64.
+        frame: rotation matrix from the body's frame to the scene's [-], shape (3, 3), float64.
+    """
+
+    body: str
+    mesh: Mesh
+    X: Array
+    frame: Array
+
+    @property
+    def tolerance(self) -> float:
+        """Distance within which nodes coincide [m]."""
+        return COINCIDENT * float(np.ptp(self.mesh.points, axis=0).max())
+
+    def on_axis(self, at: Vec3, axis: Vec3) -> Index:
+        """Nodes on an axis through `at` [m], in the order along it; both in the body's frame."""
+        direction = np.asarray(axis) / np.linalg.norm(axis)
+        offset = self.mesh.points - np.asarray(at)
+        along = offset @ direction
+        away = np.linalg.norm(offset - along[:, None] * direction, axis=1)
+        nodes = np.flatnonzero(away <= self.tolerance)
+        return nodes[np.argsort(along[nodes])].astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Pairs of nodes that stand at the same place and move as one, in all directions or in some.
+
+    Attributes:
+        first: nodes of the joint's body, in the numbering of its mesh, shape (pair_count,), int32.
+        second: nodes of the other body that they are tied to, likewise; None for the ground.
+        tied: orthogonal projector on the directions in which they move as one [-], shape (3, 3), float64, in the
+            scene's frame; None for all directions. The directions stay fixed in space.
+    """
+
+    first: Index
+    second: Index | None = None
+    tied: Array | None = None
+
 
 @dataclass(frozen=True, kw_only=True)
-class Revolute:
+class Joint(ABC):
+    """What all joints have.
+
+    Attributes:
+        name: unique in the scene; `joint_impulse` of the summary goes by it.
+        body: first body, to which the reported impulse is given.
+        other: second body, or None for the ground.
+        place: name of the field that says which nodes are tied, for errors.
+    """
+
+    name: str
+    body: str
+    other: str | None = None
+    place: ClassVar[str] = "nodes"
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts(type(self).__name__, name=self.name, body=self.body)
+        validate.kinds(self.title, (str, NoneType), "name a body, or None for the ground", other=self.other)
+        if self.other == self.body:
+            raise bad_value(f"{self.title}.other", self.other, "name a body other than the first, or None")
+
+    @property
+    def title(self) -> str:
+        """Kind and name, for errors."""
+        return f"{type(self).__name__} {self.name}"
+
+    @abstractmethod
+    def ties(self, first: Side, second: Side | None) -> Ties:
+        """Pairs that the joint ties; `second` is None for the ground.
+
+        Raises:
+            RequestError: the bodies have no such nodes.
+        """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Revolute(Joint):
     """A hinge ("re-joint"): pairs of coincident nodes on the hinge axis move as one.
 
     Attributes:
-        name: unique in the scene.
-        body: first body.
         at: a point of the hinge axis in the frame of `body` [m].
-        other: second body, or None for the ground.
         other_at: the same point in the frame of `other` [m].
         axis: direction of the hinge axis in the frame of both bodies [-].
         nodes: "axis" ties every node on the axis, as a pin does; "ends" the two outermost pairs, as the paper does.
     """
 
-    name: str
-    body: str
     at: Vec3
-    other: str | None = None
     other_at: Vec3 = (0.0, 0.0, 0.0)
     axis: Vec3 = (0.0, 0.0, 1.0)
     nodes: Literal["axis", "ends"] = "axis"
 
     def __post_init__(self) -> None:
-        validate.plain(self)
-        validate.texts("Revolute", name=self.name, body=self.body)
-        validate.kinds(
-            f"Revolute {self.name}", (str, NoneType), "name a body, or None for the ground", other=self.other
-        )
-        validate.vectors(f"Revolute {self.name}", at=self.at, other_at=self.other_at, axis=self.axis)
-        if not any(self.axis):
-            raise bad_value(f"Revolute {self.name}.axis", self.axis, "give a direction other than zero")
+        super().__post_init__()
+        validate.vectors(self.title, at=self.at, other_at=self.other_at, axis=self.axis)
+        _check_direction(f"{self.title}.axis", self.axis)
         if self.nodes not in ("axis", "ends"):
-            raise bad_value(f"Revolute {self.name}.nodes", self.nodes, "choose axis or ends")
+            raise bad_value(f"{self.title}.nodes", self.nodes, "choose axis or ends")
+
+    def ties(self, first: Side, second: Side | None) -> Ties:
+        """Nodes on the axis, in the order along it."""
+        a = self._nodes(first, self.at)
+        if len(a) < 2:
+            what = f"{len(a)} nodes of {self.body} lie on this axis; two are needed"
+            raise bad_value(f"{self.title}.at", self.at, what)
+        return Ties(a, None if second is None else self._nodes(second, self.other_at))
+
+    def _nodes(self, side: Side, at: Vec3) -> Index:
+        found = side.on_axis(at, self.axis)
+        return found[[0, -1]] if self.nodes == "ends" and len(found) > 1 else found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weld(Joint):
+    """All coincident nodes of two node sets move as one, or those of one set stay at rest.
+
+    Attributes:
+        nodes: node set of `body`.
+        other_nodes: node set of `other`; None for the ground. Nodes without a partner there stay free.
+    """
+
+    nodes: str
+    other_nodes: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        validate.texts(self.title, nodes=self.nodes)
+        if (self.other_nodes is None) != (self.other is None):
+            remedy = "name a node set of the other body" if self.other else "leave it out, the ground has no nodes"
+            raise bad_value(f"{self.title}.other_nodes", self.other_nodes, remedy)
+
+    def ties(self, first: Side, second: Side | None) -> Ties:
+        """Each node of the set, with the one of the other set at its place."""
+        a, b = first.mesh.nodes(self.nodes), None
+        if second is not None:
+            assert self.other_nodes is not None
+            a, b = coincident(first, a, second, second.mesh.nodes(self.other_nodes))
+        offset = first.X[a] - first.X[a].mean(axis=0) if len(a) else np.zeros((1, 3))
+        if np.linalg.matrix_rank(offset, tol=first.tolerance) < 2:
+            where = f" coincide with nodes of {self.other_nodes} of {self.other}" if second else ""
+            what = f"{len(a)} of these nodes{where}, and a weld needs three that are not on a line"
+            raise bad_value(f"{self.title}.nodes", self.nodes, f"{what}; name sets that meet, of equal meshes")
+        return Ties(a, b)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spherical(Joint):
+    """A ball joint: two coincident nodes move as one, or one node stays at rest.
+
+    Attributes:
+        at: place of the node in the frame of `body` [m].
+        other_at: place of the other node in the frame of `other` [m].
+    """
+
+    at: Vec3
+    other_at: Vec3 = (0.0, 0.0, 0.0)
+    place = "at"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        validate.vectors(self.title, at=self.at, other_at=self.other_at)
+
+    def ties(self, first: Side, second: Side | None) -> Ties:
+        """The node at the joint, of each body."""
+        a = self._node("at", first, self.at)
+        return Ties(a, None if second is None else self._node("other_at", second, self.other_at))
+
+    def _node(self, field: str, side: Side, at: Vec3) -> Index:
+        away = np.linalg.norm(side.mesh.points - np.asarray(at), axis=1)
+        nearest = int(np.argmin(away))
+        if away[nearest] > side.tolerance:
+            what = f"the nearest node of {side.body} is {away[nearest]:.3g} m away; give the place of a node"
+            raise bad_value(f"{self.title}.{field}", at, what)
+        return np.array([nearest], dtype=np.int32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prismatic(Joint):
+    """The nodes of a set slide along a direction that is fixed in space, each by itself.
+
+    Attributes:
+        nodes: node set of `body`.
+        axis: direction of the slide in the frame of `body` at the start [-].
+    """
+
+    nodes: str
+    axis: Vec3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        validate.texts(self.title, nodes=self.nodes)
+        validate.vectors(self.title, axis=self.axis)
+        _check_direction(f"{self.title}.axis", self.axis)
+        if self.other is not None:
+            remedy = (
+                "leave it out: a body slides along a direction of the ground; nodes that slide on a body leave its own"
+            )
+            raise bad_value(f"{self.title}.other", self.other, remedy)
+
+    def ties(self, first: Side, second: Side | None) -> Ties:
+        """The nodes of the set, across the axis."""
+        axis = first.frame @ np.asarray(self.axis) / np.linalg.norm(self.axis)
+        return Ties(first.mesh.nodes(self.nodes), tied=np.eye(3) - np.outer(axis, axis))
+
+
+def _check_direction(field: str, value: Vec3) -> None:
+    if not any(value):
+        raise bad_value(field, value, "give a direction other than zero")
+
+
+def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:
+    """Nodes among `a` of one body that stand where some of `b` of the other do, and those."""
+    from scipy.spatial import KDTree
+
+    away, place = KDTree(second.X[b]).query(first.X[a])
+    met = away <= first.tolerance
+    return a[met], b[np.asarray(place)[met]]
+
+
+JOINTS: dict[str, type[Joint]] = {kind.__name__: kind for kind in (Revolute, Weld, Spherical, Prismatic)}

@@ -10,13 +10,12 @@ import dataclasses
 import json
 import math
 import os
-import tempfile
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ import warp_mca.geometry
 import warp_mca.scene
 import warp_mca.scene.materials
 from warp_mca.base.errors import McaError, bad_value
-from warp_mca.base.files import check_folder
+from warp_mca.base.files import check_folder, write_atomically
 from warp_mca.base.validate import DAMAGE
 from warp_mca.geometry import Mesh
 from warp_mca.scene import Scene
@@ -104,7 +103,7 @@ def save(path: str | os.PathLike[str], scene: Scene, meshes: Mapping[str, Mesh],
     entries: dict[str, Any] = {f"array{i}": array for i, array in enumerate(arrays)}
     entries["header"] = np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
     try:
-        _write_atomically(target, lambda file: np.savez_compressed(file, **entries))
+        write_atomically(target, lambda file: np.savez_compressed(file, **entries))
     except OSError as error:
         raise McaError(f"the model could not be written to {target}: {error.strerror or error}") from error
 
@@ -249,22 +248,3 @@ def _same(one: object, other: object) -> bool:
         alike = _encoded(one, arrays) == _encoded(other, others)
         return alike and all(map(np.array_equal, arrays, others))
     return one == other
-
-
-def _write_atomically(target: Path, write: Callable[[IO[bytes]], None]) -> None:
-    descriptor, name = tempfile.mkstemp(prefix=f".{target.name}-", dir=target.parent)
-    temporary = Path(name)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            write(file)
-        temporary.chmod(0o666 & ~_umask())  # mkstemp lets only the owner read
-        temporary.replace(target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -1,8 +1,10 @@
-"""Owns the phases of a run: rigid swing and finite-element impact."""
+"""Owns the phases of a run: rigid swing, with what drives it, and finite-element impact."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from types import NoneType
 from typing import Literal
 
 from warp_mca.base import validate
@@ -33,6 +35,82 @@ class Tip:
 
 
 @dataclass(frozen=True, kw_only=True)
+class BaseMotion:
+    """Velocity of the ground hinge over time, linear between the given times, held constant beyond its ends.
+
+    Attributes:
+        times: [s], increasing, counted from the release.
+        vx, vy: velocities along x and y [m/s], as many as times.
+    """
+
+    times: tuple[float, ...]
+    vx: tuple[float, ...]
+    vy: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        _check_table("BaseMotion", self.times, vx=self.vx, vy=self.vy)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slide:
+    """A carriage that bears the ground hinge and slides freely along a direction.
+
+    Attributes:
+        direction: in the xy plane [-], of any length.
+        carriage_mass: [kg].
+        velocity: of the carriage along the direction at the release [m/s].
+    """
+
+    direction: Vec3 = (1.0, 0.0, 0.0)
+    carriage_mass: float = 0.0
+    velocity: float = 0.0
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.vectors("Slide", direction=self.direction)
+        if not any(self.direction[:2]) or self.direction[2]:
+            raise bad_value("Slide.direction", self.direction, "give a direction in the xy plane")
+        if not (validate.is_number(self.carriage_mass) and self.carriage_mass >= 0.0):
+            raise bad_value("Slide.carriage_mass", self.carriage_mass, "give a finite number, 0 or above")
+        validate.finite("Slide", velocity=self.velocity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTorque:
+    """Torque that a drive exerts in a joint over time, linear between the given times, held constant beyond its ends.
+
+    It turns the joint's outer link to greater angles (`RigidPhase`) and acts reversed on the link before it, or on the
+    ground.
+
+    Attributes:
+        joint: name of a revolute joint of the chain.
+        times: [s], increasing, counted from the release.
+        torques: [N m], as many as times.
+    """
+
+    joint: str
+    times: tuple[float, ...]
+    torques: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("JointTorque", joint=self.joint)
+        _check_table("JointTorque", self.times, torques=self.torques)
+
+
+def _check_table(owner: str, times: tuple[float, ...], **values: tuple[float, ...]) -> None:
+    """Times must increase, and each of the values be as many."""
+    for name, column in (("times", times), *values.items()):
+        if not validate.is_list(column):
+            raise bad_value(f"{owner}.{name}", column, "give finite numbers")
+        if len(column) != len(times) or not len(times):
+            raise bad_value(f"{owner}.{name}", column, "give one value for each time")
+    if any(b <= a for a, b in pairwise(times)):
+        raise bad_value(f"{owner}.times", times, "list them in increasing order")
+
+
+@dataclass(frozen=True, kw_only=True)
 class RigidPhase:
     """The large timescale: a planar chain of rigid links swings until its tip reaches the target.
 
@@ -49,6 +127,13 @@ class RigidPhase:
             slender rods from hinge to hinge (the paper's Eq. 3).
         centre_target: the target's body is placed so that its frame origin lies under the tip at contact.
         t_max: give up when nothing was touched by then [s].
+        base_motion: how the ground hinge moves, with its rail where it slides; None: it does not.
+        slide: carriage that bears the ground hinge, or None.
+        joint_friction: Coulomb friction torque of each link's inbound joint [N m]; () for none.
+        joint_damping: viscous torque over rate of each of these joints [N m s/rad]; () for none.
+        friction_rate: rate above which a joint slips with its whole friction torque [rad/s]; the torque is that times
+            tanh(rate / friction_rate). Smaller rates hold a joint at rest better and take longer to compute.
+        torques: of drives in joints.
     """
 
     theta: tuple[float, ...]
@@ -58,6 +143,12 @@ class RigidPhase:
     inertia: Literal["mesh", "slender"] = "mesh"
     centre_target: bool = True
     t_max: float = 5.0
+    base_motion: BaseMotion | None = None
+    slide: Slide | None = None
+    joint_friction: tuple[float, ...] = ()
+    joint_damping: tuple[float, ...] = ()
+    friction_rate: float = 1e-2
+    torques: tuple[JointTorque, ...] = ()
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -71,7 +162,15 @@ class RigidPhase:
         if self.inertia not in ("mesh", "slender"):
             raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
         validate.flags("RigidPhase", centre_target=self.centre_target)
-        validate.positive("RigidPhase", t_max=self.t_max)
+        validate.positive("RigidPhase", t_max=self.t_max, friction_rate=self.friction_rate)
+        validate.kinds("RigidPhase", (BaseMotion, NoneType), "give a BaseMotion or None", base_motion=self.base_motion)
+        validate.kinds("RigidPhase", (Slide, NoneType), "give a Slide or None", slide=self.slide)
+        validate.members("RigidPhase", JointTorque, torques=self.torques)
+        for name, values in (("joint_friction", self.joint_friction), ("joint_damping", self.joint_damping)):
+            if not (validate.is_list(values) and all(value >= 0.0 for value in values)):
+                raise bad_value(f"RigidPhase.{name}", values, "give finite numbers, 0 or above, one for each link")
+            if len(values) not in (0, len(self.theta)):
+                raise bad_value(f"RigidPhase.{name}", values, f"give {len(self.theta)} numbers, one for each link")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,12 +182,15 @@ class ImpactPhase:
         output_interval: time between rows of the history [s].
         time_step_scale: share of the stable time step that is used [-], in (0, 1].
         energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-].
+        open_time: how long all contacts must be open for an impact to end, in a run of many phases [s]; None takes the
+            longest period of bending of a link, see docs/theory.md.
     """
 
     duration: float
     output_interval: float = 1e-6
     time_step_scale: float = 0.9
     energy_tolerance: float = 0.01
+    open_time: float | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -98,5 +200,7 @@ class ImpactPhase:
             raise bad_value(
                 "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
             )
+        if self.open_time is not None:
+            validate.positive("ImpactPhase", open_time=self.open_time)
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")

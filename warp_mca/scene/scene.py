@@ -11,13 +11,12 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
-from warp_mca.scene.joints import Revolute
+from warp_mca.scene.joints import JOINTS, Joint
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
 
 _PARTS = {
     "bodies": Body,
-    "joints": Revolute,
     "contacts": Contact,
     "fixed": Fixed,
     "prescribed": Prescribed,
@@ -34,6 +33,8 @@ class Scene:
         bodies: at least one.
         impact: the finite-element phase.
         rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
+        t_end: the run goes through as many swings and impacts as occur until then, counted from the release [s]; None
+            for one impact.
         joints, contacts, fixed, prescribed: what binds the bodies.
         gravity: [m/s^2].
         paths: lines along which stress is recorded.
@@ -46,7 +47,8 @@ class Scene:
     bodies: tuple[Body, ...]
     impact: ImpactPhase
     rigid: RigidPhase | None = None
-    joints: tuple[Revolute, ...] = ()
+    t_end: float | None = None
+    joints: tuple[Joint, ...] = ()
     contacts: tuple[Contact, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     prescribed: tuple[Prescribed, ...] = ()
@@ -61,8 +63,14 @@ class Scene:
         validate.texts("Scene", name=self.name)
         for name, kind in _PARTS.items():
             validate.members("Scene", kind, **{name: getattr(self, name)})
+        validate.kind_of("Scene.joints", self.joints, (tuple, list), "give a tuple of joints")
+        for k, joint in enumerate(self.joints):
+            if type(joint) not in JOINTS.values():  # others are not registered
+                remedy = f"give a {' or a '.join(JOINTS)}, no class made of them"
+                raise bad_value(f"Scene.joints[{k}]", validate.brief(joint), remedy)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
+        self._check_t_end()
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
         for key in self.parameters:
@@ -78,6 +86,9 @@ class Scene:
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
         if len(set(contacts)) != len(contacts):
             raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
+        joints = [joint.name for joint in self.joints]
+        if len(set(joints)) != len(joints):
+            raise bad_value("Scene.joints", joints, "give each joint a name of its own")
         pairs = [(item.slave, item.master) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:
@@ -88,11 +99,26 @@ class Scene:
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
 
+    def _check_t_end(self) -> None:
+        """Refuse an end that no cycle of swings and impacts can reach.
+
+        Raises:
+            RequestError: it is no time above 0, or the scene does not swing or has driven nodes.
+        """
+        if self.t_end is None:
+            return
+        validate.positive("Scene", t_end=self.t_end)
+        if self.rigid is None:
+            raise bad_value("Scene.t_end", self.t_end, "swings and impacts in turn need a RigidPhase; give one")
+        if self.prescribed:
+            remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
+            raise bad_value("Scene.t_end", self.t_end, remedy)
+
     def _named_bodies(self) -> list[tuple[str, str]]:
         named = [("Fixed.body", item.body) for item in self.fixed]
         named += [("Prescribed.body", item.body) for item in self.prescribed]
-        named += [(f"Revolute {item.name}.body", item.body) for item in self.joints]
-        named += [(f"Revolute {item.name}.other", item.other) for item in self.joints if item.other is not None]
+        named += [(f"{item.title}.body", item.body) for item in self.joints]
+        named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
         named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
         named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]

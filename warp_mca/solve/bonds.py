@@ -1,7 +1,8 @@
-"""Owns the device side of what binds nodes: axes at rest, hinges, driven axes; and which nodes may be touched."""
+"""Owns the device side of what binds nodes: axes at rest, joints, driven axes; and which nodes may be touched."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,26 +16,41 @@ if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 
+@dataclass(eq=False)
+class ConstraintState:
+    """State of joints and driven nodes.
+
+    Attributes:
+        impulse: that each joint's pair gave to its first node [N s], shape (pair_count,), vec3d.
+        work: done on each driven node's axes up to t(n) [J], shape (driven_count,), vec3d.
+        work_after: the same half a step later [J], shape (driven_count,), vec3d.
+        clock: steps that each driven node has taken [-], shape (driven_count,), int32.
+    """
+
+    impulse: wp.array
+    work: wp.array
+    work_after: wp.array
+    clock: wp.array
+
+
 class BondStage:
     """What `kernels.nodes.node` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
 
     Attributes:
         count: tied pairs and driven nodes.
+        partial: whether some pairs are tied in some directions only.
         bonds: pairs, driven nodes and their tables.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
-        at_rest: the same of a model without hinges and driven axes.
-        impulse: that each joint's pair gave to its first node [N s], shape (pair_count,), vec3d.
-        work, work_after: done on each driven node's axes up to t(n), and half a step later [J], shape (driven_count,),
-            vec3d.
-        clock: steps that each driven node has taken, shape (driven_count,), int32.
+        at_rest: the same of a model without joints and driven axes.
+        pairs, driven: their numbers.
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
 
     def __init__(self, model: Model, layout: Layout) -> None:
         """Allocate on the current device."""
         nodes, place = np.unique(model.prescribed_node, return_inverse=True)
-        pairs = len(model.joint_first)
-        self.count = pairs + len(nodes)
+        self.pairs, self.driven = len(model.joint_first), len(nodes)
+        self.count = self.pairs + self.driven
         role = model.fixed_axes.astype(np.uint8)
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
@@ -51,16 +67,19 @@ class BondStage:
         self.bonds = Bonds()
         self.bonds.first = wp.array(model.joint_first, dtype=wp.int32)
         self.bonds.second = wp.array(model.joint_second, dtype=wp.int32)
+        self.partial = bool((model.joint_tied != np.eye(3)).any())
+        self.bonds.tied = wp.array(model.joint_tied if self.partial else model.joint_tied[:0], dtype=wp.mat33d)
         self.bonds.node = wp.array(nodes, dtype=wp.int32)
         self.bonds.begin, self.bonds.end = wp.array(begin, dtype=wp.vec3i), wp.array(end, dtype=wp.vec3i)
         self.bonds.times = wp.array(model.table_time, dtype=wp.float64)
         self.bonds.values = wp.array(model.table_value, dtype=wp.float64)
-        self.impulse = wp.zeros(pairs, dtype=wp.vec3d)
-        self.work = wp.zeros(len(nodes), dtype=wp.vec3d)
-        self.work_after = wp.zeros(len(nodes), dtype=wp.vec3d)
-        self.clock = wp.zeros(len(nodes), dtype=wp.int32)
         self.driven_first = wp.array(np.searchsorted(nodes, layout.nodes), dtype=wp.int32)
 
-    def counts(self) -> list[wp.array]:
-        """What the kernel of bound nodes adds to."""
-        return [self.impulse, self.work, self.work_after, self.clock]
+    def new_state(self) -> ConstraintState:
+        """State before the first step, on the current device."""
+        return ConstraintState(
+            impulse=wp.zeros(self.pairs, dtype=wp.vec3d),
+            work=wp.zeros(self.driven, dtype=wp.vec3d),
+            work_after=wp.zeros(self.driven, dtype=wp.vec3d),
+            clock=wp.zeros(self.driven, dtype=wp.int32),
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,17 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.contact import contact, search, sides, spring
+from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.model.layout import offsets
 from warp_mca.model.surfaces import LIST_LENGTH, ContactPass
-from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
+    from warp_mca.solve.extremes import NormalForce
+    from warp_mca.solve.state import State
+    from warp_mca.solve.workspace import Workspace
 
 
 def per_scene(first: NDArray[np.int32]) -> Any:
@@ -37,20 +42,43 @@ def _vectors(values: Sequence[Any]) -> Any:
     return wp.vec3d(*values[0]) if len(values) == 1 else wp.array(np.asarray(values), dtype=wp.vec3d)
 
 
+@dataclass(eq=False)
+class ContactState:
+    """State of a contact pass; lists are those of the latest search, and empty on a rigid plane.
+
+    Attributes:
+        spring: of each slave node and side, those of slave 0 first; `kernels.contact.spring.Spring` lists its arrays.
+        count: faces in the list of each slave and side [-], shape (spring_count,), int32.
+        candidate: these faces [-], shape (spring_count, LIST_LENGTH), int32.
+        face_count: slaves in the list of each master face [-], shape (face_count,), int32.
+        face_slave: these slaves, sorted [-], shape (face_count, room), int32.
+        u_search: displacement of slaves and masters at the search [m], shape (node_count,), vec3d.
+    """
+
+    spring: Any
+    count: wp.array
+    candidate: wp.array
+    face_count: wp.array
+    face_slave: wp.array
+    u_search: wp.array
+
+
 class ContactStage:
     """Device side of one contact pass.
 
     Attributes:
         items: the pass of each scene; no slave meets the faces of another scene.
+        index: of the pass in a scene; its state is `State.contacts[index]`.
         column: of its sums in a record.
         sides: of the master, the most of any scene; each slave has a spring and a list of faces for each.
         springs, first: first spring of each scene, and the number of all, shape (scene_count + 1,), int32, on the host
             and on the device.
-        spring: state of the springs, those of slave 0 first.
     """
 
-    def __init__(self, items: Sequence[ContactPass], model: Model, column: int) -> None:
-        self.items, self.column = items, column
+    def __init__(self, items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> None:
+        """Allocate on the current device; `normal_force` says how normal forces are summed."""
+        self.items, self.index, self.column = items, index, PASS + PASS_COLUMNS * index
+        self.per_newton, self.node_count = normal_force.per_newton, model.node_count
         self.each = len(items) > 1
         self.sides = max(item.sides for item in items)
         slaves = offsets([len(item.slave) for item in items])
@@ -61,16 +89,18 @@ class ContactStage:
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = _numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
-        self.spring = self._new_springs()
+        self.law = items[0].law
+        rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
+        self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free)
+            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.law)
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free)
+            contact.surface_kernel(friction, self.each, self.stress_free, self.law)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free)
+            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free, self.law)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
@@ -91,22 +121,29 @@ class ContactStage:
             wp.array(np.concatenate(numbers), dtype=wp.int32),
         )
 
+    def new_state(self) -> ContactState:
+        """Springs that no face presses, and empty lists, on the current device."""
+        surface = not self.on_plane
+        lists, faces = (int(self.springs[-1]), len(self.face)) if surface else (0, 0)
+        room = max(item.room for item in self.items)
+        return ContactState(
+            spring=self._new_springs(),
+            count=wp.zeros(lists, dtype=wp.int32),
+            candidate=wp.zeros((lists, LIST_LENGTH), dtype=wp.int32),
+            face_count=wp.zeros(faces, dtype=wp.int32),
+            face_slave=wp.zeros((faces, room), dtype=wp.int32),
+            u_search=wp.zeros(self.node_count if surface else 0, dtype=wp.vec3d),
+        )
+
     def _new_springs(self) -> Any:
-        """Springs that no face presses; where some are stress-free, their resting depth is 0."""
+        """Where some springs begin free of stress, their resting depth is 0."""
         count, found = int(self.springs[-1]), spring.Spring()
         for name in ("tangential", "force", "impulse"):
             setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
-        for name in (
-            "energy",
-            "friction",
-            "drive",
-            "normal_impulse",
-            "stick_impulse",
-            "depth",
-            "lost",
-            "stiffness",
-        ):
+        for name in ("energy", "friction", "drive", "normal_impulse", "stick_impulse", "depth", "lost", "stiffness"):
             setattr(found, name, wp.zeros(count, dtype=wp.float64))
+        found.normal_energy = wp.zeros(0 if self.law == LINEAR else count, dtype=wp.float64)
+        found.parameters = self.parameters
         found.rest = wp.zeros(count if self.stress_free else 0, dtype=wp.float64)
         found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
         found.face = wp.full(count, -1, dtype=wp.int32)
@@ -121,7 +158,7 @@ class ContactStage:
         self.deepest = _numbers([item.deepest for item in self.items])
 
     def _make_faces(self, model: Model) -> None:
-        lists, faces = int(self.springs[-1]), offsets([len(item.face) for item in self.items])
+        faces = offsets([len(item.face) for item in self.items])
         masters = offsets([len(item.master) for item in self.items])
         self.margin = _numbers([item.margin for item in self.items])
         self.longest = _numbers([item.longest for item in self.items])
@@ -135,11 +172,6 @@ class ContactStage:
         if self.sides > 1:
             self.slave_face = wp.array(self._join("slave_face"), dtype=wp.int32)
             self.around_slave = self._rows("slave_face", "slave_offset", "face_of_slave")
-        self.count = wp.zeros(lists, dtype=wp.int32)
-        self.candidate = wp.zeros((lists, LIST_LENGTH), dtype=wp.int32)
-        self.face_count = wp.zeros(len(self.face), dtype=wp.int32)
-        self.face_slave = wp.zeros((len(self.face), max(item.room for item in self.items)), dtype=wp.int32)
-        self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.bvh: Any = None
@@ -162,80 +194,64 @@ class ContactStage:
         """Those of a search."""
         return [] if self.on_plane else [self.bounds, self.find, self.clear]
 
-    def search(self, X: wp.array, u: wp.array, flag: wp.array) -> None:
+    def begin(self, work: Workspace, state: State) -> None:
+        """Note which slaves are clear of the master before the first step, after the first search."""
+        if not self.on_plane:
+            inputs = [self.bvh.id, work.X, state.u, self.slave, self.face, self.side, self.slave_scene, self.origin]
+            held = state.contacts[self.index].spring.held
+            wp.launch(self.clear, len(self.slave), inputs=[*inputs, self.longest], outputs=[held])
+
+    def search(self, work: Workspace, state: State) -> None:
         """Broad phase: list what each slave may touch until the next search."""
         if self.on_plane:
             return
-        inputs = [X, u, self.face, self.face_scene, self.origin, self.margin]
-        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper, self.face_count])
-        slaves = [X, u, self.slave]
+        own, slaves = state.contacts[self.index], [work.X, state.u, self.slave]
+        inputs = [work.X, state.u, self.face, self.face_scene, self.origin, self.margin]
+        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper, own.face_count])
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
-            inputs = [self.bvh.id, *slaves, self.face, self.side, self.slave_scene, self.origin, self.longest]
-            wp.launch(self.clear, len(self.slave), inputs=inputs, outputs=[self.spring.held])
         else:
             self.bvh.refit()
         wp.launch(
             self.find,
             len(self.slave),
             inputs=[self.bvh.id, *slaves, self.side, self.slave_scene, self.origin],
-            outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
+            outputs=[own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag],
         )
-        wp.launch(search.sort_lists, len(self.face), inputs=[self.face_count], outputs=[self.face_slave])
-        wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[self.u_search])
+        wp.launch(search.sort_lists, len(self.face), inputs=[own.face_count], outputs=[own.face_slave])
+        wp.launch(search.mark_masters, len(self.master), inputs=[state.u, self.master], outputs=[own.u_search])
 
-    def touch(
-        self,
-        X: wp.array,
-        u: wp.array,
-        v: wp.array,
-        dt: float,
-        force: wp.array,
-        sums: NormalForce,
-        flag: wp.array,
-        split: Split = whole,
-    ) -> None:
-        """Contact forces of this pass, added to `force`; its normal forces, added to `sums`."""
-        rows = iter(sums.rows)  # a row of sums for each range of slaves
+    def launch(self, work: Workspace, state: State, dt: float, split: Split = whole) -> None:
+        """Contact forces of this pass, added to those on nodes; its normal forces, added to the sums of the step."""
+        own, first = state.contacts[self.index], iter(range(1, len(state.normal_force)))
 
         def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
             threads = lanes * (part.stop - part.start)
-            outputs = [force, next(rows), flag] if kernel is self.kernel else [force, flag]
+            outputs: list[Any] = [work.contact_force, state.flag]
+            if kernel is self.kernel:  # a row of sums for each range of slaves
+                outputs.insert(1, state.normal_force[next(first)])
             wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)
 
-        slaves = [self.slave, self.stiffness]
+        nodes, slaves = [work.X, state.u, state.v], [self.slave, self.stiffness]
         if self.on_plane:
-            inputs = [X, u, v, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest]
-            inputs += [sums.per_newton, dt, self.spring]
+            inputs = [*nodes, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest]
+            inputs += [self.per_newton, dt, own.spring]
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         if self.sides > 1:
             slaves = [self.slave, self.slave_face, *self.around_slave, self.stiffness]
-        inputs = [X, u, v, self.u_search, *slaves, self.face_stiffness, self.face, self.count, self.candidate]
-        inputs += [self.slave_scene, self.mu, self.margin, sums.per_newton, dt, self.spring]
+        inputs = [*nodes, own.u_search, *slaves, self.face_stiffness, self.face, own.count, own.candidate]
+        inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
-        inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
-        inputs += [self.face_count, self.face_slave, self.master_scene, self.margin, self.spring]
+        inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
+        inputs += [own.face_count, own.face_slave, self.master_scene, self.margin, own.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
 
-    def initial_depths(
-        self, X: wp.array, u: wp.array, v: wp.array, force: wp.array, sums: NormalForce, flag: wp.array
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Depth [m] and energy [J] of each spring before the first step, shape (spring_count,), after the first search.
-
-        The springs themselves stay as they are; `force`, `sums` and `flag` are written to.
-        """
-        held = wp.clone(self.spring.held)
-        self.touch(X, u, v, 0.0, force, sums, flag)
-        depth, energy = self.spring.depth.numpy(), self.spring.energy.numpy()
-        self.spring = self._new_springs()
-        self.spring.held = held
-        return depth, energy
-
-    def rest_at(self, depth: NDArray[np.float64]) -> None:
+    def rest_at(self, state: State, depth: NDArray[np.float64]) -> None:
         """Let springs be free of force at these depths [m], shape (spring_count,)."""
-        self.spring.rest = wp.array(depth, dtype=wp.float64)
+        state.contacts[self.index].spring.rest.assign(depth)
 
-    def depths(self, scene: int) -> NDArray[np.float64]:
+    def depths(self, state: State, scene: int) -> NDArray[np.float64]:
         """Largest penetration so far of each spring of a scene [m], those of slave 0 first, shape (spring_count,)."""
-        return self.spring.depth.numpy()[self.springs[scene] : self.springs[scene + 1]]
+        depth = state.contacts[self.index].spring.depth.numpy()
+        return depth[self.springs[scene] : self.springs[scene + 1]]

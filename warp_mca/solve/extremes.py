@@ -17,30 +17,34 @@ _LINE = 8  # numbers in a line of a CPU's cache: two threads that write to one w
 
 
 class NormalForce:
-    """Normal forces of all springs of a step, summed for each scene, and the greatest sum so far.
+    """How normal forces of all springs of a step are summed for each scene: `State.normal_force` holds the sums.
 
     Attributes:
-        array: the greatest sum of any step, then a row of sums of the present step for each range of slaves, shape
-            (1 + range_count, column_count), int64; a column for each scene, and some that stay 0.
-        rows: views of the rows of sums.
         per_newton: what the sums count for a newton [1/N], a power of two; see `kernels.hardware.each`.
     """
 
     def __init__(self, scenes: Sequence[Sequence[ContactPass]], threads: int) -> None:
-        """Allocate for the passes of each scene, none where no scene has contact, and for as many threads of a CPU."""
+        """For the passes of each scene, none where no scene has contact, and for as many threads of a CPU."""
         ranges = RANGES * threads if threads > 1 else 1
-        self.array = wp.zeros((1 + ranges if scenes else 0, -(-len(scenes) // _LINE) * _LINE), dtype=wp.int64)
-        self.rows = [self.array[1 + k] for k in range(ranges)] if scenes else []
+        self._shape = (1 + ranges if scenes else 0, -(-len(scenes) // _LINE) * _LINE)
         self._scales = [_scale(passes) for passes in scenes]
         self.per_newton: Any = self._scales[0] if len(scenes) == 1 else wp.array(self._scales, dtype=wp.float64)
 
-    def greatest(self, scene: int) -> float:
+    def new_state(self) -> wp.array:
+        """The greatest sum of any step, then a row of sums of the present step for each range of slaves.
+
+        Shape (1 + range_count, column_count), int64; a column for each scene, and some that stay 0.
+        """
+        return wp.zeros(self._shape, dtype=wp.int64)
+
+    def greatest(self, sums: wp.array, scene: int) -> float:
         """Greatest normal force of a scene in any step [N]; 0 without contact."""
-        return float(self.array.numpy()[0, scene]) / self._scales[scene] if self._scales else 0.0
+        return float(sums.numpy()[0, scene]) / self._scales[scene] if self._scales else 0.0
 
 
 def _scale(passes: Sequence[ContactPass]) -> float:
     """What sums count for a newton [1/N]: guards stop a run before forces come near the largest whole number."""
-    reach = [item.sides * float(item.stiffness.sum()) * max(item.longest, item.deepest) for item in passes]
+    stiffness = [item.stiffening * item.sides * float(item.stiffness.sum()) for item in passes]
+    reach = [k * max(item.longest, item.deepest) for k, item in zip(stiffness, passes, strict=True)]
     _, exponent = math.frexp(sum(reach))
     return 2.0 ** min(max(_BITS - exponent, -_LARGEST), _LARGEST)

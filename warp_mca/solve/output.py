@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from warp_mca.kernels.records import output
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, SurfaceMesh
 from warp_mca.results.paths import Probes
+from warp_mca.solve.workspace import ROWS
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
+    from warp_mca.solve.state import State
 
 
 class NodalStress:
@@ -51,11 +53,10 @@ class NodalStress:
         self.von_mises = wp.zeros(len(nodes), dtype=wp.float32)
         self.plastic = wp.zeros(len(nodes), dtype=wp.float32)
 
-    def launch(self) -> None:
-        """Compute it for the solver's present displacements."""
-        s = self.solver
+    def launch(self, state: State) -> None:
+        """Compute it for the state's displacements."""
         for stage, element, first in self.parts:
-            stage.stresses(s.X, s.law, s.u, element, first, self.points)
+            stage.stresses(self.solver.work, state, element, first, self.points)
         outputs = [self.tensor, self.von_mises, self.plastic]
         wp.launch(output.nodal_stress, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
 
@@ -87,8 +88,6 @@ class Output:
                 self._make_volume()
 
     def _make_probes(self, probes: Probes) -> None:
-        from warp_mca.solve.solver import ROWS
-
         nodes, local = np.unique(probes.corner, return_inverse=True)
         self.probe_stress = NodalStress(self.solver, nodes.astype(np.int32))
         self.probe_corner = wp.array(local.reshape(probes.corner.shape), dtype=wp.int32)
@@ -116,32 +115,34 @@ class Output:
             "plastic_strain": self.volume_stress.plastic,
         }
 
-    def before_step(self, needs: frozenset[str]) -> None:
+    def before_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
-        s = self.solver
+        work = self.solver.work
         if self.has_probes:
-            self.probe_stress.launch()
-            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, s.row]
+            self.probe_stress.launch(state)
+            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, work.row]
             outputs = [self.path_stress, self.arrays[PATHS]["von_mises"]]
             wp.launch(output.sample_probes, len(self.probe_corner), inputs=inputs, outputs=outputs)
         if SURFACE in needs:
-            self.skin_stress.launch()
+            self.skin_stress.launch(state)
             points = self.arrays[SURFACE]["points"]
-            wp.launch(output.positions, len(points), inputs=[s.X, s.u, self.skin_node], outputs=[points])
+            wp.launch(output.positions, len(points), inputs=[work.X, state.u, self.skin_node], outputs=[points])
         if CONTACT in needs:
             first = 0
-            for stage in s.contacts:
-                inputs = [s.X, s.u, stage.slave, stage.mu, stage.sides, first, stage.spring]
+            for stage in self.solver.contacts:
+                inputs = [work.X, state.u, stage.slave, stage.mu, stage.sides, first]
+                inputs.append(state.contacts[stage.index].spring)
                 outputs = list(self.arrays[CONTACT].values())
                 wp.launch(output.contact_points, len(stage.slave), inputs=inputs, outputs=outputs)
                 first += len(stage.slave)
         if VOLUME in needs:
-            self.volume_stress.launch()
+            self.volume_stress.launch(state)
             to = self.arrays[VOLUME]["displacement"]
-            wp.launch(output.displacements, len(to), inputs=[s.u], outputs=[to])
+            wp.launch(output.displacements, len(to), inputs=[state.u], outputs=[to])
 
-    def after_step(self, needs: frozenset[str]) -> None:
+    def after_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what needs the velocities on both sides of t(n)."""
         if VOLUME in needs:
-            s, to = self.solver, self.arrays[VOLUME]["velocity"]
-            wp.launch(output.velocities, len(to), inputs=[s.v_before, s.v], outputs=[to])
+            to = self.arrays[VOLUME]["velocity"]
+            inputs = [self.solver.work.v_before, state.v]
+            wp.launch(output.velocities, len(to), inputs=inputs, outputs=[to])

@@ -56,6 +56,7 @@ class Imposed:
         self.model = build_model(scene, meshes, start.positions, start.velocities)
         self.solver = Solver(self.model, device=setup.device, precision=setup.precision, dt=self.model.stable.dt)
         self.solver.compile()
+        self.state = self.solver.new_state()
         self.nodal_stress = NodalStress(self.solver, np.arange(self.model.node_count, dtype=np.int32))
         self.X = self.model.X
 
@@ -65,19 +66,19 @@ class Imposed:
         Args:
             u: displacements [m], shape (node_count, 3), float64.
         """
-        self.solver.u.assign(u)
-        self.solver.v.zero_()
-        self.solver.step(1)
-        return self.model.mass[:, None] * self.solver.v.numpy() / self.solver.dt
+        self.state.u.assign(u)
+        self.state.v.zero_()
+        self.solver.step(self.state, 1)
+        return self.model.mass[:, None] * self.state.v.numpy() / self.solver.dt
 
     def largest_element_force(self) -> float:
         """Greatest force of one element on one node [N] in the step that `force` made."""
-        return float(np.linalg.norm(self.solver.force.numpy(), axis=1).max())
+        return float(np.linalg.norm(self.solver.work.force.numpy(), axis=1).max())
 
     def stress(self, u: Array) -> Array:
         """xx, yy, zz, xy, yz, xz at the nodes [Pa], shape (node_count, 6), float64."""
-        self.solver.u.assign(u)
-        self.nodal_stress.launch()
+        self.state.u.assign(u)
+        self.nodal_stress.launch(self.state)
         return self.nodal_stress.tensor.numpy().astype(np.float64)
 
 

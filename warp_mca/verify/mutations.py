@@ -46,9 +46,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "contact_soft": Mutation(
         "contact springs are ten times too soft",
-        "kernels/contact/spring.py",
-        "Fn = -k * gap",
-        "Fn = -wp.float64(0.1) * k * gap",
+        "kernels/contact/penalty.py",
+        "return k * depth",
+        "return wp.float64(0.1) * k * depth",
     ),
     "reaction_halved": Mutation(
         "what touches gives back half the force that it takes",
@@ -172,15 +172,15 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hand_off_spins_backwards": Mutation(
         "nodes take the link's angular velocity with the wrong sign at hand-off",
-        "warp_mca/rigid/handoff.py",
+        "warp_mca/rigid/placement.py",
         "np.cross(self.angular_velocity, r)",
         "np.cross(r, self.angular_velocity)",
     ),
     "vibration_energy_doubled": Mutation(
         "hand-back doubles the kinetic energy that does not fit",
         "warp_mca/rigid/handback.py",
-        "vibration_energy=float(0.5 * left)",
-        "vibration_energy=float(left)",
+        "vibration_energy=float(0.5 * energy)",
+        "vibration_energy=float(energy)",
     ),
     "far_links_weightless": Mutation(
         "a link of the rigid chain does not carry the weight of the links beyond it",

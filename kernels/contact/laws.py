@@ -1,0 +1,46 @@
+"""Owns what the kernels ask of a contact law along the normal; `kernels.contact.penalty` is one.
+
+The kernels are made for elastic springs: the force is a function of the depth alone, and what the spring stores comes
+back as it is released. Friction keeps to Coulomb's law with the same stiffness k along the surface.
+"""
+
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from warp_mca.base.errors import bad_value
+
+LINEAR = "warp_mca.kernels.contact.penalty"
+
+
+@dataclass(frozen=True)
+class LawFunctions:
+    """Device functions of a law, (depth, k, parameters, s) -> number, all in float64; its module has them by this name.
+
+    depth is how far the spring is pressed [m], 0 or above; k its stiffness [N/m], see `model.surfaces`; parameters[s]
+    holds the law's own `parameters` for spring s, shape (spring_count, parameter_count).
+
+    Attributes:
+        force: along the normal [N]; 0 at depth 0, and nowhere below.
+        energy: that the spring stores [J], the integral of the force from 0 to the depth.
+    """
+
+    force: Any
+    energy: Any
+
+
+@cache
+def law_functions(law_name: str) -> LawFunctions:
+    """The functions of the law in the module of that name.
+
+    Raises:
+        RequestError: there is no such module, or it lacks one of them.
+    """
+    names = [field.name for field in fields(LawFunctions)]
+    try:
+        module = import_module(law_name)
+        return LawFunctions(*(getattr(module, name) for name in names))
+    except (ImportError, AttributeError) as error:
+        remedy = f"name a module that has {' and '.join(names)}: {error}"
+        raise bad_value("law of a contact", law_name, remedy) from error

@@ -1,0 +1,189 @@
+"""Welds, ball joints and slides: closed forms, momentum, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from test_joint import BAR, SIZE, SOFT, final_state
+
+import warp_mca as mca
+from warp_mca.base.rotation import turn
+from warp_mca.model.model import nodal_masses
+
+HALF = mca.Box(size=(0.05, 0.02, 0.02), divisions=(5, 2, 2), origin=(0.0, -0.01, -0.01))
+PULL = {"nodes": "xmin", "axis": "x", "times": (0.0, 2e-5, 4e-5), "velocities": (0.0, 2.0, 0.0)}
+
+
+def pulled(joints, **bodies):
+    """Bars at these x, pulled at the end of the body "a": a wave of 10 MPa."""
+    return mca.Scene(
+        name="pulled",
+        bodies=tuple(
+            mca.Body(name=name, geometry=box, material=SOFT, position=(x, 0.0, 0.0))
+            for name, (box, x) in bodies.items()
+        ),
+        joints=joints,
+        prescribed=(mca.Prescribed(body="a", **PULL),),
+        impact=mca.ImpactPhase(duration=1.5e-4, output_interval=1e-5),
+    )
+
+
+def test_a_wave_passes_a_weld_as_it_does_the_whole_bar(monkeypatch):
+    """1 km/s: the pulse of 40 us has left the first half of the bar after 150 us and comes back from its end."""
+    state = final_state(monkeypatch)
+    whole = mca.run(pulled((), a=(BAR, 0.0)), precision="float64")
+    one = dict(state)
+    weld = mca.Weld(name="W", body="a", nodes="xmax", other="b", other_nodes="xmin")
+    welded = mca.run(pulled((weld,), a=(HALF, 0.0), b=(HALF, 0.05)), precision="float64")
+    assert len(state["model"].joint_first) == 9
+    assert welded.summary["dt"] == pytest.approx(whole.summary["dt"], rel=1e-12)
+    places = {tuple(np.round(x, 9)): u for x, u in zip(one["model"].X, one["u"], strict=True)}
+    expected = np.array([places[tuple(np.round(x, 9))] for x in state["model"].X])
+    assert np.ptp(expected[:, 0]) > 1e-5
+    assert state["u"] == pytest.approx(expected, abs=1e-13)
+    second = state["model"].node_start["b"]
+    taken = state["model"].mass[second:] @ state["v"][second:]
+    assert welded.summary["joint_impulse"]["W"] == pytest.approx(-taken, abs=1e-12)
+
+
+def test_a_bar_welded_to_the_ground_moves_as_one_with_a_fixed_end(monkeypatch):
+    state = final_state(monkeypatch)
+    free = pulled((), a=(BAR, 0.0))
+    fixed = mca.Scene(**{**vars(free), "fixed": (mca.Fixed(body="a", nodes="xmax"),)})
+    mca.run(fixed, precision="float64")
+    expected = state["u"]
+    weld = mca.Weld(name="W", body="a", nodes="xmax")
+    result = mca.run(mca.Scene(**{**vars(free), "joints": (weld,)}), precision="float64")
+    assert state["u"] == pytest.approx(expected, abs=1e-15)
+    assert result.summary["joint_impulse"]["W"][0] < -1e-3
+
+
+def test_a_rod_on_a_ball_joint_precesses(monkeypatch):
+    """A steady conical pendulum, omega^2 (I_t - I_a) cos(tilt) = m g d, keeps its angular momentum about the vertical.
+
+    It sags by some 60 um, for it starts free of stress.
+    """
+    state = final_state(monkeypatch)
+    tilt, gravity = 0.5, 1e4
+    box = mca.Body(name="rod", geometry=BAR, material=SOFT)
+    still = mca.Scene(name="rod", bodies=(box,), impact=mca.ImpactPhase(duration=1e-3))
+    points, mass = mca.mesh(still)["rod"].points, nodal_masses(still, mca.mesh(still))["rod"]
+    square = mass @ points**2
+    omega = math.sqrt(mass @ points[:, 0] * gravity / ((square[0] - square[1]) * math.cos(tilt)))
+    rotation = (0.0, 0.0, tilt - math.pi / 2)  # hangs towards -y, tilted to +x
+    rod = mca.Body(
+        name="rod",
+        geometry=BAR,
+        material=SOFT,
+        rotation=rotation,
+        kinematics="finite",
+        angular_velocity=(0.0, omega, 0.0),
+    )
+    scene = mca.Scene(
+        name="rod",
+        bodies=(rod,),
+        joints=(mca.Spherical(name="S", body="rod", at=(0.0, 0.0, 0.0)),),
+        gravity=(0.0, -gravity, 0.0),
+        impact=mca.ImpactPhase(duration=0.25 * 2.0 * math.pi / omega, output_interval=1e-4),
+    )
+    result = mca.run(scene, precision="float64")
+    x, v = state["model"].X + state["u"], state["v"]
+    model = state["model"]
+    assert np.abs(state["u"][model.joint_first]).max() == 0.0
+    spin = [model.mass @ np.cross(a, b)[:, 1] for a, b in ((model.X, model.V), (x, v))]
+    assert spin[1] == pytest.approx(spin[0], rel=1e-11)
+    middle = mass @ x / mass.sum()
+    angle = omega * (result.summary["simulated_time"] + result.summary["dt"])
+    expected = turn((0.0, angle, 0.0)) @ turn(rotation) @ (0.05, 0.0, 0.0)
+    assert middle == pytest.approx(expected, abs=1e-4)
+    weight = np.array([0.0, -gravity, 0.0]) * mass.sum() * (angle / omega)
+    change = mass @ v - mass @ model.V
+    assert np.array(result.summary["joint_impulse"]["S"]) == pytest.approx(change - weight, abs=1e-3 * abs(weight[1]))
+
+
+def test_a_block_slides_on_its_rail_by_the_gravity_along_it(monkeypatch):
+    """The rail takes what is across it, and no more: along it the momentum is m (g . a) t to rounding."""
+    state = final_state(monkeypatch)
+    axis, gravity = np.array([0.6, 0.0, 0.8]), np.array([2e3, -9e3, 1e3])
+    rotation = (0.0, 0.3, 0.0)
+    scene = mca.Scene(
+        name="slide",
+        bodies=(mca.Body(name="block", geometry=HALF, material=SOFT, rotation=rotation),),
+        joints=(mca.Prismatic(name="P", body="block", nodes="ymin", axis=tuple(turn(rotation).T @ axis)),),
+        gravity=tuple(gravity),
+        impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-5),
+    )
+    result = mca.run(scene, precision="float64")
+    model, t = state["model"], result.summary["simulated_time"] + 0.5 * result.summary["dt"]
+    momentum = model.mass @ state["v"]
+    assert momentum @ axis == pytest.approx(model.mass.sum() * (gravity @ axis) * t, rel=1e-12)
+    u = state["u"][model.joint_first]
+    assert u - np.outer(u @ axis, axis) == pytest.approx(0.0, abs=1e-15)
+    assert result.summary["energy_error"] < 1e-4
+    impulse = np.array(result.summary["joint_impulse"]["P"])
+    assert impulse @ axis == pytest.approx(0.0, abs=1e-12 * np.abs(impulse).max())
+    across = gravity - (gravity @ axis) * axis
+    assert impulse == pytest.approx(momentum - (momentum @ axis) * axis - model.mass.sum() * across * t, rel=1e-9)
+
+
+def two(joint, **change):
+    """Two bars end on, and a joint between them."""
+    bodies = (
+        mca.Body(name="a", geometry=BAR, material=SOFT),
+        mca.Body(name="b", geometry=change.pop("other", BAR), material=SOFT, position=(0.1, 0.0, 0.0)),
+    )
+    return mca.Scene(name="two", bodies=bodies, joints=(joint,), impact=mca.ImpactPhase(duration=1e-5), **change)
+
+
+WELD = {"name": "W", "body": "a", "nodes": "xmax"}
+FINE = mca.Box(**SIZE, divisions=(10, 3, 3), origin=(0.0, -0.01, -0.01))
+
+
+@pytest.mark.parametrize(
+    ("joint", "change", "match"),
+    [
+        ({**WELD, "other": "b"}, {}, "Weld W.other_nodes = None: name a node set of the other body"),
+        ({**WELD, "other_nodes": "xmin"}, {}, "Weld W.other_nodes = 'xmin': leave it out"),
+        ({**WELD, "other": "a", "other_nodes": "xmin"}, {}, "Weld W.other = 'a': name a body other"),
+        ({**WELD, "other": "c", "other_nodes": "xmin"}, {}, "Weld W.other = 'c': the scene's bodies are a, b"),
+        ({**WELD, "other": "b", "other_nodes": "xmax"}, {}, "Weld W.nodes = 'xmax': 0 of these nodes coincide"),
+        ({**WELD, "nodes": "no such"}, {}, "no such"),
+        ({**WELD}, {"fixed": (mca.Fixed(body="a", nodes="ymin"),)}, "a node of a joint is also fixed or driven"),
+    ],
+)
+def test_welds_that_tie_nothing_are_refused(joint, change, match):
+    with pytest.raises(mca.RequestError, match=match):
+        mca.run(two(mca.Weld(**joint), **change))
+
+
+def test_a_weld_ties_the_nodes_that_coincide(monkeypatch):
+    """3 x 3 cells on 2 x 2: only the corners do."""
+    state = final_state(monkeypatch)
+    mca.run(two(mca.Weld(**WELD, other="b", other_nodes="xmin"), other=FINE))
+    assert len(state["model"].joint_first) == 4
+
+
+@pytest.mark.parametrize(
+    ("joint", "match"),
+    [
+        (lambda: mca.Spherical(name="S", body="a", at=(0.104, 0, 0)), "at = .*: the nearest node of a is 0.004 m away"),
+        (lambda: mca.Spherical(name="S", body="a", at=(0.1, 0, 0), other="b", other_at=(0.1, 0, 0)), "do not coincide"),
+        (lambda: mca.Prismatic(name="P", body="a", nodes="xmin", axis=(0.0, 0.0, 0.0)), "other than zero"),
+    ],
+)
+def test_joints_without_place_or_direction_are_refused(joint, match):
+    with pytest.raises(mca.RequestError, match=match):
+        mca.run(two(joint()))
+
+
+def test_joints_have_names_of_their_own():
+    joints = tuple(mca.Spherical(name="S", body="a", at=(x, 0.0, 0.0)) for x in (0.0, 0.1))
+    with pytest.raises(mca.RequestError, match=r"Scene.joints = \['S', 'S'\]: give each joint a name of its own"):
+        mca.Scene(**{**vars(two(joints[0])), "joints": joints})
+
+
+def test_a_swing_hangs_on_hinges_only():
+    scene = mca.make_scene("two_link")
+    joints = (*scene.joints, mca.Spherical(name="S", body="AB", at=(0.0, 0.0, 0.0)))
+    with pytest.raises(mca.RequestError, match=r"Scene.joints = 'Spherical S': the links of a rigid phase hang on Rev"):
+        mca.run(mca.Scene(**{**vars(scene), "joints": joints}))

@@ -1,0 +1,93 @@
+"""Owns what a finished run says of contacts whose figures are less sure than they look."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.model.surfaces import is_curved_contact
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.model.surfaces import ContactPass
+    from warp_mca.runs.ledger import Ledger
+    from warp_mca.scene import Contact
+
+Array = NDArray[np.float64]
+
+SOFT = 0.5  # share of the exchanged energy in contact springs from which on they decide the answer
+PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
+POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
+BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
+
+
+def resolution_warnings(
+    contacts: tuple[Contact, ...], model: Model, ledger: Ledger, depths: Sequence[Array]
+) -> list[str]:
+    """What a run's contact leaves in doubt, one sentence each.
+
+    Args:
+        contacts: of the scene. model: of the scene alone. ledger: of the run.
+        depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,).
+    """
+    found = list(_soft(ledger))
+    for k, item in enumerate(model.passes):
+        contact = contacts[item.contact]
+        if item.sign > 0.0:
+            found += _small_patch(contact, model, item, ledger, k)
+        if item.plane is not None:
+            found += _pushed_through(contact, model, item, depths[k])
+    return found
+
+
+def _soft(ledger: Ledger) -> Iterator[str]:
+    share = ledger.greatest_contact_share
+    if share > SOFT:
+        yield (
+            f"contact springs held up to {share:.0%} of the energy that the bodies exchanged, so forces and durations "
+            "are those of the springs: raise the contact's penalty or leave it to its default, or refine the mesh there"
+        )
+
+
+def _small_patch(contact: Contact, model: Model, item: ContactPass, ledger: Ledger, k: int) -> Iterator[str]:
+    planes = sum(bool((model.fixed_axes[item.slave] >> axis & 1).any()) for axis in range(3))
+    # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
+    count = ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes
+    curved = is_curved_contact(model.X, item)
+    if 0.0 < count < (PATCH if curved else POINT):
+        at_all = "less than three cells across" if curved else "a corner or an edge"
+        yield (
+            f"when the force on {contact.slave.body} was greatest, it acted on {count:.1f} nodes, {at_all}: force and "
+            "duration depend on the mesh; refine both bodies where they touch"
+        )
+
+
+def _pushed_through(contact: Contact, model: Model, item: ContactPass, depth: Array) -> Iterator[str]:
+    assert item.plane is not None
+    normal = np.asarray(item.plane.normal, dtype=float)
+    speed = _bound_speed(model, item.slave, normal / np.linalg.norm(normal))
+    pushed = (speed < 0.0) & (depth > 0.0)
+    if pushed.any():
+        yield (
+            f"{int(pushed.sum())} nodes of {contact.slave.body} were driven into the plane, up to "
+            f"{depth[pushed].max():.3g} m deep: contact cannot move a node whose motion is prescribed, so the force "
+            "there is only stiffness times depth; leave these nodes out of the contact's surface, or drive others"
+        )
+
+
+def _bound_speed(model: Model, nodes: NDArray[np.int32], normal: Array) -> Array:
+    """Least speed along a normal of nodes that are bound along it [m/s]; 0 of those that are free."""
+    axes = np.flatnonzero(np.abs(normal) > BOUND)
+    least = np.zeros((model.node_count, 3))
+    bound = np.zeros((model.node_count, 3), dtype=bool)
+    for axis in range(3):
+        bound[:, axis] = (model.fixed_axes >> axis) & 1 == 1
+        least[bound[:, axis], axis] = normal[axis] * model.V[bound[:, axis], axis]
+    for node, axis, table in zip(model.prescribed_node, model.prescribed_axis, model.prescribed_table, strict=True):
+        values = model.table_value[model.table_offset[table] : model.table_offset[table + 1]]
+        bound[node, axis], least[node, axis] = True, (normal[axis] * values).min()
+    return np.where(bound[nodes][:, axes].all(axis=1), least[nodes].sum(axis=1), 0.0)

@@ -1,0 +1,86 @@
+"""Owns the choice of a run's time step, and how often it searches for contact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from warp_mca.base.errors import bad_value
+from warp_mca.model.model import Model
+from warp_mca.scene import Scene
+from warp_mca.solve.steps import Steps
+
+# Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
+SPEED_RESERVE = 4.0
+MAX_ROWS = 10_000_000  # of a history: some 5 GB
+MAX_STEPS = 10_000_000_000  # of a run: more than a week of the smallest model
+
+
+def divide(scene: Scene, model: Model, duration: float) -> Steps:
+    """Choose the time step so that whole steps fill each output interval, and how often to search for contact.
+
+    Raises:
+        RequestError: motion in one step would be lost in the rounding of positions, or the history would have too many
+            rows, or the run too many steps.
+    """
+    return divide_alike([(scene, model)], duration)
+
+
+def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps:
+    """The steps of scenes that share them, as `divide` chooses them: the smallest of their steps, the most searches.
+
+    Raises:
+        RequestError: as in `divide`.
+    """
+    wanted = duration / parts[0][0].impact.output_interval
+    if not wanted < MAX_ROWS:
+        remedy = f"in {duration:g} s that gives {wanted:.3g} rows, a history holds {MAX_ROWS:,}; give a larger one"
+        raise bad_value("ImpactPhase.output_interval", parts[0][0].impact.output_interval, remedy)
+    intervals = max(1, round(wanted))
+    interval = duration / intervals
+    limits = [_limits(scene, model, interval, intervals) for scene, model in parts]
+    stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
+    per_search = math.ceil(interval / searches / stable)
+    return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
+
+
+def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, int]:
+    """Longest step [s] of a scene, and how often it must search for contact in an output interval [s].
+
+    Raises:
+        RequestError: as in `divide`.
+    """
+    stable = scene.impact.time_step_scale * model.stable.dt
+    if not interval * intervals <= MAX_STEPS * stable:
+        (body, element), share = model.owner(model.stable.element), model.stable.contact_share
+        raise bad_value(
+            "time step [s]",
+            float(stable),
+            f"{interval * intervals:g} s would take more than {MAX_STEPS:.0e} of them; it is time_step_scale = "
+            f"{scene.impact.time_step_scale:g} of what element {element} of body {body} allows, {share:.0%} of it by "
+            "contact springs; raise time_step_scale, enlarge that element, lower penalty or duration",
+        )
+    with np.errstate(over="ignore"):
+        speed = float(np.linalg.norm(model.V, axis=1).max())
+    driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
+    fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
+    far = float(np.abs(model.X).max())
+    spacing = float(np.spacing(far))
+    if 0.0 < speed * stable < 4.0 * spacing:
+        lost = f"positions are rounded to {spacing:.2g} m and a step's motion of {speed * stable:.2g} m is lost"
+        if far < 2.0 * float(np.ptp(model.X, axis=0).max()):  # nearer to the origin it would be no better
+            raise bad_value("speed of the bodies", speed, f"{lost}; give a greater one, or start at rest")
+        raise bad_value("Body.position", far, f"this far from the origin, {lost}; move the scene closer to the origin")
+    with np.errstate(over="ignore"):
+        apart = float(np.ptp(model.V, axis=0).max()) * stable
+    if apart > float(np.ptp(model.X, axis=0).max()):
+        remedy = f"in a step some nodes would move {apart:.3g} m more than others; check the unit [m/s or rad/s]"
+        raise bad_value("speed of the bodies", speed, remedy)
+    margins = [item.margin for item in model.passes if item.plane is None]
+    searches = SPEED_RESERVE * fastest * interval / (0.5 * min(margins)) if margins else 1.0
+    if not searches * intervals <= MAX_STEPS:
+        remedy = f"so fast, a run would search for contact more than {MAX_STEPS:.0e} times; check the unit [m/s]"
+        raise bad_value("speed of the bodies", max(float(np.abs(model.V).max()), driven), remedy)
+    return stable, max(1, math.ceil(searches))

@@ -1,0 +1,224 @@
+"""Owns the impact phase: a solver, the state that it advances, and the only loop over its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import GuardError
+from warp_mca.model.join import join_models, join_probes
+from warp_mca.model.layout import offsets
+from warp_mca.runs.account import Account
+from warp_mca.runs.division import divide_alike
+from warp_mca.runs.initial_overlap import settle_initial_overlap
+from warp_mca.solve.output import Output
+from warp_mca.solve.solver import Solver
+from warp_mca.solve.steps import Part
+from warp_mca.solve.transfer import Transfer
+from warp_mca.solve.workspace import ROWS
+
+if TYPE_CHECKING:
+    import os
+
+    from warp_mca.recorders.frames import Recording
+    from warp_mca.recorders.recorder import SurfaceMesh
+    from warp_mca.runs.prepare import Prepared
+
+
+class Impact:
+    """The impact phase of one scene, or of those of a batch side by side.
+
+    Attributes:
+        ready: the scenes at its start.
+        steps: how it is divided.
+        solver: that advances it.
+        state: all that changes.
+        accounts: what comes of each scene.
+        stopped: which guard stopped each scene, in one sentence, or None.
+        recording: recorders of a lone scene, or None.
+    """
+
+    def __init__(
+        self,
+        ready: Sequence[Prepared],
+        span: float,
+        *,
+        device: str,
+        precision: str,
+        threads: int,
+        skins: Mapping[str, SurfaceMesh] | None = None,
+        needs: frozenset[str] = frozenset(),
+    ) -> None:
+        """Allocate, compile and settle what overlaps.
+
+        Args:
+            ready: scenes with the same output interval and contacts of the same kinds.
+            span: simulated time [s].
+            device, precision, threads: as in `warp_mca.run`; threads are not None.
+            skins: surfaces of bodies that recorders show, by body.
+            needs: of recorders.
+
+        Raises:
+            RequestError: steps cannot be chosen, or bodies overlap that must not.
+        """
+        self.ready = tuple(ready)
+        self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
+        model = join_models([item.model for item in ready])
+        self.solver = Solver(model, device=device, precision=precision, dt=self.steps.dt, threads=threads)
+        probes = join_probes([(item.probes, item.model.node_count) for item in ready])
+        if skins or len(probes.corner):
+            self.solver.output = Output(self.solver, skins or {}, probes, needs)
+        self.solver.compile()
+        self.state = self.solver.new_state()
+        self.solver.begin(self.state)
+        settle_initial_overlap(self.ready, self.solver, self.state)
+        self.solver.start(self.state)
+        self.stopped: list[str | None] = [None] * len(self.ready)
+        self.recording: Recording | None = None
+        self._account()
+
+    def _account(self) -> None:
+        first = offsets([len(item.probes.corner) for item in self.ready])
+        self.accounts = [
+            Account(item, self.steps, self.solver, self.state, k, int(first[k])) for k, item in enumerate(self.ready)
+        ]
+
+    def load(self, path: str | os.PathLike[str]) -> None:
+        """Go on from a state that `save` stored.
+
+        Raises:
+            RequestError: as in `State.load`.
+        """
+        self.state.load(path, self.solver.model, self.solver.dt)
+        self._account()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Store the state, between two calls of `advance`.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        self.state.save(path, self.solver.model, self.solver.dt)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the history so far, the most of any scene."""
+        return max(account.ledger.kept.count for account in self.accounts)
+
+    def advance(
+        self, until: int | None = None, told: Callable[[], None] = lambda: None, ended: Callable[[], bool] | None = None
+    ) -> None:
+        """Search for contact, record and step, until so many steps are done, or all.
+
+        Args:
+            until: number of steps since the start of the phase at which to pause; all if None.
+            told: called when records have been read.
+            ended: asked at each row of the history whether the phase ends there; records are then read as they come.
+        """
+        with suppress(GuardError):  # that of the last scene
+            _Loop(self, told, ended).run(until)
+
+    def read(self, written: int, records: Mapping[str, NDArray]) -> None:
+        """Hand records to each scene that no guard has stopped.
+
+        Raises:
+            GuardError: a guard stops the last one.
+        """
+        for k, account in enumerate(self.accounts):
+            if self.stopped[k] is None:
+                try:
+                    account.read(written, records)
+                except GuardError as error:
+                    self.stopped[k] = str(error)
+                    if None not in self.stopped:
+                        raise
+
+
+class _Loop:
+    """One call of `Impact.advance`: launches, and records on their way to the host."""
+
+    def __init__(self, impact: Impact, told: Callable[[], None], ended: Callable[[], bool] | None) -> None:
+        self.impact, self.told, self.ended = impact, told, ended
+        self.solver, self.state, self.steps = impact.solver, impact.state, impact.steps
+        with wp.ScopedDevice(self.solver.device):
+            self.solver.work.row.fill_(ROWS - 1)
+        self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
+        self.written = 0
+
+    def run(self, until: int | None) -> None:
+        """As `Impact.advance`."""
+        last = self.steps.count if until is None else min(until, self.steps.count)
+        interval = self.state.steps // self.steps.per_interval
+        while self.state.steps < last:
+            if self._ends(interval):
+                break
+            self._interval(interval, last)
+            interval += 1
+        if until is None or self.state.steps >= self.steps.count:
+            if self.written == ROWS:
+                self._send()
+            self.solver.search(self.state)
+            self._record(1, self.state.steps // self.steps.per_interval)
+        self._receive_all()
+        if self.written:
+            self.transfer.send(self.written)
+            self.written = 0
+        self._receive_all()
+
+    def _ends(self, interval: int) -> bool:
+        """Whether the phase ends with this row, by what the rows before it say."""
+        if self.ended is None or self.state.steps != interval * self.steps.per_interval:
+            return False
+        return self.ended()
+
+    def _interval(self, interval: int, last: int) -> None:
+        """The steps of an output interval that are not done yet, up to step `last`."""
+        first = interval * self.steps.per_interval
+        for number, part in enumerate(self.steps.parts()):
+            end = first + part.count
+            if self.state.steps < min(end, last):
+                self._part(part, first, min(end, last), interval if number == 0 else None)
+            first = end
+
+    def _part(self, part: Part, first: int, end: int, row: int | None) -> None:
+        """Steps that follow each other without a look from outside, from the present one to `end`."""
+        if self.state.steps > first:  # interrupted in between
+            self.solver.step(self.state, end - self.state.steps)
+            return
+        if part.begins_check and self.written == ROWS:
+            self._send()
+        if part.begins_search:
+            self.solver.search(self.state)
+        if part.begins_check:
+            self._record(end - first, row)
+        else:
+            self.solver.step(self.state, end - first)
+
+    def _record(self, count: int, row: int | None) -> None:
+        """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
+        recording = self.impact.recording
+        needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
+        self.solver.record_and_step(self.state, count, needs, row is not None)
+        self.written += 1
+        if recording and row is not None:
+            recording.take(row, needs)
+
+    def _send(self) -> None:
+        if self.transfer.full:
+            self._receive()
+        self.transfer.send(self.written)
+        self.written = 0
+        while self.transfer.arrived or (self.ended and self.transfer.pending):
+            self._receive()
+
+    def _receive(self) -> None:
+        self.impact.read(*self.transfer.receive())
+        self.told()
+
+    def _receive_all(self) -> None:
+        while self.transfer.pending:
+            self._receive()

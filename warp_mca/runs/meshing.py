@@ -1,0 +1,78 @@
+"""Owns the meshes of a scene's bodies: each recipe meshed once, checked, cut where a formulation asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.elements import ELEMENTS
+from warp_mca.geometry.degenerate import cut_to
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.runs.arguments import check_scene
+from warp_mca.scene import Body, Scene
+
+
+def mesh(
+    scene: Scene, made: dict[object, Mesh] | None = None, given: Mapping[str, Mesh] | None = None
+) -> dict[str, Mesh]:
+    """The mesh of every body, checked.
+
+    Args:
+        scene: whose bodies to mesh.
+        made: meshes by recipe, for scenes that share some; those made here are added.
+        given: finished meshes by body, in place of the bodies' own geometry.
+
+    Raises:
+        RequestError: an element is inverted, a mesh is not whole or not given, or a recipe or file cannot be turned
+            into a mesh.
+    """
+    from warp_mca.geometry.quality import check
+
+    check_scene("scene", scene)
+    if given is not None:
+        validate.kind_of("meshes", given, Mapping, "give a Mesh for each body by its name, as mca.mesh makes them")
+    meshes = {}
+    made = {} if made is None else made
+    for body in scene.bodies:
+        if given is not None and body.name not in given:
+            raise bad_value("meshes", list(given), f"give a mesh of body {body.name} too")
+        geometry = body.geometry if given is None else given[body.name]
+        if given is not None:
+            validate.kind_of(f"meshes[{body.name!r}]", geometry, Mesh, "give a finished Mesh, as mca.mesh makes it")
+        key = _key(geometry)
+        if key not in made:
+            made[key] = geometry if isinstance(geometry, Mesh) else _build(body)
+            check(made[key], body.name)
+        meshes[body.name] = made[key]
+    cut = _cut(scene, meshes)
+    for name, item in cut.items():
+        if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
+            check(item, name)
+    return cut
+
+
+def _build(body: Body) -> Mesh:
+    """The mesh of a recipe, which may be the user's own.
+
+    Raises:
+        RequestError: its `build` failed or returned something else than a mesh.
+    """
+    field, recipe = f"Body {body.name}.geometry", type(body.geometry).__name__
+    made = validate.call(field, recipe, "build()", lambda: getattr(body.geometry, "build")())  # noqa: B009
+    validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
+    return made
+
+
+def _key(geometry: object) -> object:
+    """What equal recipes share; a mesh, and a recipe that cannot be hashed, is like itself alone."""
+    try:
+        hash(geometry)
+    except TypeError:
+        return id(geometry)
+    return geometry
+
+
+def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
+    """The meshes, cut to the cell type of each body's element where that is possible."""
+    return {body.name: cut_to(meshes[body.name], ELEMENTS[body.element].cell) for body in scene.bodies}

@@ -1,0 +1,80 @@
+"""Owns the way from a scene to the start of its impact phase: meshes, rigid phase, model, probes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.model import Model, build_model, nodal_masses
+from warp_mca.results.paths import Found, Probes, locate
+from warp_mca.rigid.handoff import HandOff, hand_off
+from warp_mca.runs.advice import mesh_warnings
+from warp_mca.runs.arguments import Progress
+from warp_mca.runs.meshing import mesh
+from warp_mca.scene import Scene
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene at the start of its impact phase.
+
+    Attributes:
+        scene: as it was asked for.
+        meshes: of its bodies, by name.
+        start: the hand-off.
+        model: assembled.
+        probes: of its paths.
+        warnings: about its meshes, see `mesh_warnings`.
+    """
+
+    scene: Scene
+    meshes: Mapping[str, Mesh]
+    start: HandOff
+    model: Model
+    probes: Probes
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass
+class Clock:
+    """Wall-clock seconds by stage, `wall`, and when the `last` one ended."""
+
+    wall: dict[str, float] = field(
+        default_factory=lambda: dict.fromkeys(("rigid", "mesh", "compile", "fe", "output"), 0.0)
+    )
+    last: float = field(default_factory=time.perf_counter)
+
+    def lap(self, stage: str) -> None:
+        """Count the time since the last lap to a stage."""
+        now = time.perf_counter()
+        self.wall[stage] += now - self.last
+        self.last = now
+
+
+def prepare(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    clock: Clock,
+    tell: Progress,
+    found: Found | None = None,
+    made: dict[object, Mesh] | None = None,
+) -> Prepared:
+    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model.
+
+    `found` as in `locate`, `made` as in `mesh`.
+
+    Raises:
+        RequestError: the scene cannot be built as written.
+    """
+    tell("mesh", 0.0)
+    meshes = mesh(scene, made, meshes)
+    clock.lap("mesh")
+    tell("rigid", 0.0)
+    start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})
+    clock.lap("rigid")
+    model = build_model(scene, meshes, start.positions, start.velocities)
+    probes = locate(scene, model, meshes, found)
+    clock.lap("mesh")
+    return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model)))

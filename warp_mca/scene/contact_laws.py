@@ -1,0 +1,47 @@
+"""Owns the public vocabulary of contact laws: how hard a penalty spring presses along the normal.
+
+A law is plain, immutable data that names the module of its device functions. A new one is a dataclass made of
+`ContactLaw` with a place in the table `CONTACT_LAWS`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from warp_mca.kernels.contact.laws import LINEAR
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactLaw(ABC):
+    """What all contact laws have.
+
+    Attributes:
+        law: module of its device functions, those of `kernels.contact.laws`.
+    """
+
+    law: ClassVar[str]
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """What its device functions read, in SI units."""
+        return ()
+
+    @abstractmethod
+    def stiffening(self, depth: float) -> float:
+        """Greatest slope dF/dg up to a depth [m], as a multiple of the stiffness k [-]: it bounds the time step."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Penalty(ContactLaw):
+    """The linear spring, F_n = k g."""
+
+    law = LINEAR
+
+    def stiffening(self, depth: float) -> float:
+        """1 at any depth."""
+        return 1.0
+
+
+CONTACT_LAWS: dict[str, type[ContactLaw]] = {kind.__name__: kind for kind in (Penalty,)}

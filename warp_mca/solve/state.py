@@ -1,0 +1,196 @@
+"""Owns `State`: everything that changes while a model is advanced, with unit, shape and dtype of each array.
+
+The model's own arrays never change, and neither the solver nor its stages keep anything from one step to the next. So a
+state can be copied, compared, stored and read back on another device, and a run that goes on from it gives the same
+bits as one that was never interrupted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import bad_value
+from warp_mca.base.files import write_atomically
+from warp_mca.base.validate import DAMAGE
+from warp_mca.elements.state import ElementState
+from warp_mca.solve.bonds import ConstraintState
+from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.records import SceneRecords
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+
+FORMAT = "warp_mca state 1"
+
+
+@dataclass(eq=False)
+class State:
+    """Everything that changes during a phase of finite elements.
+
+    Attributes:
+        u: displacement since the start of the phase [m], shape (node_count,), vec3d.
+        v: velocity at the latest half step [m/s], shape (node_count,), vec3d.
+        speed_square: greatest square of each node's speed, of all nodes for one scene on a GPU [m^2/s^2], shape
+            (node_count,) or (1,), float32.
+        normal_force: greatest sum of the normal forces of each scene in any step, then sums of the present step, zero
+            between steps, in units of `extremes.NormalForce` [-], shape (1 + range_count, column_count), int64.
+        flag: guards that kernels raised, by scene, `kernels.contact.search.FLAGS` [-], shape (scene_count, 4), int32.
+        elements: of each block, `ElementState`.
+        contacts: of each contact pass, `ContactState`.
+        constraints: of joints and driven nodes, `ConstraintState`.
+        steps: steps taken since the start of the phase [-].
+        scenes: what each scene has recorded so far, `records.SceneRecords`.
+    """
+
+    u: wp.array
+    v: wp.array
+    speed_square: wp.array
+    normal_force: wp.array
+    flag: wp.array
+    elements: list[ElementState]
+    contacts: list[ContactState]
+    constraints: ConstraintState
+    steps: int = 0
+    scenes: list[SceneRecords] = field(default_factory=list)
+
+    def arrays(self) -> dict[str, Any]:
+        """Device arrays by name, as `elements/0/history`; of `normal_force` what lasts."""
+        return {name: a[:1] if name == "normal_force" and len(a) else a for name, a in _arrays(self, "")}
+
+    def copy(self) -> State:
+        """A copy on the same device."""
+        found = _copied(self)
+        found.scenes = [records.copy() for records in self.scenes]
+        return found
+
+    def assign(self, other: State) -> None:
+        """Take over all of another state of the same model, which may be on another device."""
+        others = other.arrays()
+        for name, to in self.arrays().items():
+            if to.shape == others[name].shape and to.dtype == others[name].dtype:
+                wp.copy(to, others[name])
+            else:
+                _fill(name, to, others[name].numpy())
+        self.steps = other.steps
+        self.scenes = [records.copy() for records in other.scenes]
+
+    def differences(self, other: State) -> list[str]:
+        """Names of what is not the same bit for bit."""
+        mine, others = self.arrays(), other.arrays()
+        found = [name for name in mine if not _same(mine[name].numpy(), others[name].numpy())]
+        found += ["steps"] if self.steps != other.steps else []
+        pairs = zip(self.scenes, other.scenes, strict=True)
+        return found + [f"scenes/{k}/{name}" for k, (a, b) in enumerate(pairs) for name in a.differences(b)]
+
+    def save(self, path: str | os.PathLike[str], model: Model, dt: float) -> None:
+        """Store the state in one file, whole or not at all.
+
+        Args:
+            path: of the file.
+            model: that the state belongs to.
+            dt: time step [s].
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        head = {"format": FORMAT, "model": digest(model), "dt": dt, "steps": self.steps, "scenes": len(self.scenes)}
+        arrays: dict[str, Any] = {name: array.numpy() for name, array in self.arrays().items()}
+        for k, records in enumerate(self.scenes):
+            arrays |= {f"scenes/{k}/{name}": array for name, array in records.arrays().items()}
+        arrays["header"] = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
+        write_atomically(Path(path), lambda file: np.savez(file, **arrays))
+
+    def load(self, path: str | os.PathLike[str], model: Model, dt: float) -> None:
+        """Take over what `save` stored of a state of the same model, on whichever device.
+
+        Raises:
+            RequestError: there is no such file, it is damaged, or of another model or time step; nothing has changed.
+        """
+        if not Path(path).is_file():
+            raise bad_value("state", str(path), "there is no such file")
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                stored = {name: archive[name] for name in archive.files}
+            head = json.loads(stored.pop("header").tobytes())
+            if head["format"] != FORMAT:
+                raise ValueError(head["format"])
+            alike = head["model"] == digest(model) and head["dt"] == dt
+            mine = {name: stored.pop(name) for name in self.arrays()} if alike else {}
+            scenes = [SceneRecords.of(_part(stored, f"scenes/{k}/")) for k in range(head["scenes"])]
+        except DAMAGE as error:
+            raise bad_value("state", str(path), "it is damaged or of another version; run again") from error
+        if not alike:
+            raise bad_value("state", str(path), "it is of another model or time step; use the run's own")
+        for name, to in self.arrays().items():
+            _fill(name, to, mine[name])
+        self.steps, self.scenes = head["steps"], scenes
+
+
+def _fill(name: str, to: wp.array, array: NDArray) -> None:
+    """Copy an array that may come from another device."""
+    if name == "speed_square" and len(array) != len(to):  # of each node on one device, of all nodes on another
+        most = array.max(initial=0.0)
+        array = np.zeros(len(to), array.dtype)
+        array[:1] = most
+    if to.size:
+        to.assign(array)
+
+
+def _copied(part: Any) -> Any:
+    """A copy of a dataclass, struct or list of arrays; other values are shared."""
+    if isinstance(part, wp.array):
+        return wp.clone(part) if part.is_contiguous else wp.clone(part.transpose()).transpose()
+    if isinstance(part, list):
+        return [_copied(item) for item in part]
+    if hasattr(part, "__dataclass_fields__"):
+        return type(part)(**{name: _copied(getattr(part, name)) for name in _names(part)})
+    if hasattr(part, "_cls"):
+        found = part._cls()
+        for name in _names(part):
+            setattr(found, name, _copied(getattr(part, name)))
+        return found
+    return part
+
+
+def _names(part: Any) -> list[str]:
+    return [f.name for f in fields(part)] if hasattr(part, "__dataclass_fields__") else list(part._cls.vars)
+
+
+def _arrays(owner: Any, prefix: str) -> Iterator[tuple[str, wp.array]]:
+    """Device arrays of a dataclass, of its parts and lists of parts, with their names."""
+    for name in _names(owner):
+        value = getattr(owner, name)
+        if isinstance(value, wp.array):
+            yield prefix + name, value
+        elif isinstance(value, list) and name != "scenes":
+            for k, part in enumerate(value):
+                yield from _arrays(part, f"{prefix}{name}/{k}/")
+        elif hasattr(value, "__dataclass_fields__") or hasattr(value, "_cls"):
+            yield from _arrays(value, f"{prefix}{name}/")
+
+
+def _same(a: NDArray, b: NDArray) -> bool:
+    return a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+def _part(stored: dict[str, NDArray], prefix: str) -> dict[str, NDArray]:
+    return {name.removeprefix(prefix): array for name, array in stored.items() if name.startswith(prefix)}
+
+
+def digest(model: Model) -> str:
+    """SHA-256 of what a model is made of: equal for the same scene and meshes."""
+    found = hashlib.sha256()
+    parts: Sequence[NDArray] = (model.X, model.V, model.mass, model.law, model.joint_first, model.prescribed_node)
+    for array in (*parts, *(block.conn for block in model.blocks), *(item.stiffness for item in model.passes)):
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()

@@ -1,0 +1,55 @@
+"""Owns the model's arrays on the device, and what a step computes and forgets."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.records.columns import JACOBIAN, PASS, PASS_COLUMNS
+from warp_mca.kernels.records.ledger import SUM_WIDTH
+from warp_mca.model.layout import Layout
+from warp_mca.model.model import Model
+from warp_mca.model.precision import limited
+
+ROWS = 32  # records kept on the device before the host reads them
+
+
+class Workspace:
+    """Arrays that stages share.
+
+    Attributes:
+        X: reference positions [m], shape (node_count,), vec3d.
+        mass, inverse_mass: lumped masses [kg], [1/kg], shape (node_count,), float64.
+        law: parameters of each material, see `Model.law`, in the scalars of the precision.
+        near, more: slots of the forces on each node, see `gather_lists`.
+        force: of each element on its nodes, by slot [N], vec3 in the scalars of the precision.
+        contact_force: other forces on nodes [N], shape (node_count,), vec3d, zero between steps; empty without contact.
+        v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
+        energy: of each element at a record, see `ElementStage.energies`, shape (5, element_count).
+        row: of the latest record in the rings, shape (1,), int32.
+        partial: ring of partial sums, shape (ROWS, scene_count, column_count, SUM_WIDTH), float64.
+        point_node: recorded nodes, 0 where there is none, shape (point_count,), int32.
+        point_velocity: ring of their velocities [m/s], shape (ROWS, point_count), vec3d.
+        gravity: of each scene [m/s^2], shape (scene_count,), vec3d.
+    """
+
+    def __init__(self, model: Model, layout: Layout, precision: str, near: np.ndarray, more: np.ndarray, slots: int):
+        """Allocate on the current device; `slots` are those of the forces."""
+        t, passes = scalars(precision), len(model.passes) // layout.count
+        self.X = wp.array(model.X, dtype=wp.vec3d)
+        self.mass = wp.array(model.mass, dtype=wp.float64)
+        self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
+        self.law = wp.array(limited(model.law, precision), dtype=t.real)
+        self.near, self.more = wp.array(near, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)
+        self.force = wp.zeros(slots, dtype=t.vec3)
+        self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
+        self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
+        self.energy = wp.zeros((5, model.element_count), dtype=t.real)
+        self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
+        columns = PASS + PASS_COLUMNS * passes
+        self.partial = wp.zeros((ROWS, layout.count, columns, SUM_WIDTH), dtype=wp.float64)
+        self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written
+        self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
+        self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
+        self.gravity = wp.array(model.gravity, dtype=wp.vec3d)
