@@ -14,6 +14,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.elements import ELEMENTS
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 INSTRUCTION = re.compile(r"^\s*(?:@\S+\s+)?([a-z]+)(?:\.(?!f32|f64)\w+)*\.(f32|f64)\b", re.MULTILINE)
@@ -50,8 +51,8 @@ def flops(element: str, precision: str, plastic: bool, patches: bool) -> dict[st
     """Operations for each element and step, in float32 and float64; with `patches`, of the kernels of a GPU."""
     import importlib
 
-    patches = patches and element != "tet4"
-    kernels = importlib.import_module(f"warp_mca.kernels.{element}{'_patch' if patches else ''}")
+    patches = patches and ELEMENTS[element].patches
+    kernels = importlib.import_module(f"warp_mca.kernels.elements.{element}{'_patch' if patches else ''}")
     law = J2Bilinear.law if plastic else Elastic.law
     total: Counter[str] = Counter(count(kernels.force_kernel(precision, law)))
     if element == "tet4":

@@ -8,7 +8,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.kernels.hardware.lanes import LANES
 from warp_mca.model.patches import PATCH, make_patches
-from warp_mca.results.result import ALL_FILES
+from warp_mca.results.storage import ALL_FILES
 from warp_mca.runs.batch import check_alike
 from warp_mca.solve.solver import Solver
 

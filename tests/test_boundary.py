@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.geometry.boundary import HEX_FACES, TET_FACES, boundary_faces
+from warp_mca.geometry.boundary import boundary_faces
+from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.verify.elements import mixed_cube
 
@@ -32,10 +33,11 @@ def meshes() -> dict[str, mca.Mesh]:
 
 def counted(mesh: mca.Mesh) -> set[tuple[int, frozenset[int]]]:
     """Cell and nodes of each face that no other cell has."""
-    faces = []
-    for cells, table, first in ((mesh.hexahedra, HEX_FACES, 0), (mesh.tetrahedra, TET_FACES, len(mesh.hexahedra))):
+    faces, first = [], 0
+    for name, cells in mesh.cells.items():
         for k, cell in enumerate(cells):
-            faces += [(first + k, frozenset(cell[face].tolist())) for face in table]
+            faces += [(first + k, frozenset(cell[list(face)].tolist())) for face in CELL_TYPES[name].faces]
+        first += len(cells)
     count = Counter(nodes for _, nodes in faces)
     return {(cell, nodes) for cell, nodes in faces if count[nodes] == 1 and len(nodes) > 2}
 
@@ -55,7 +57,7 @@ def test_faces_of_one_cell_are_found(name: str):
 def test_faces_look_outwards():
     """Their areas enclose the volume: sum of x . n A / 3."""
     mesh = mixed_cube()
-    p = mesh.points[boundary_faces(mesh.hexahedra, mesh.tetrahedra, len(mesh.points))[0]]
+    p = mesh.points[boundary_faces(mesh.cells, len(mesh.points))[0]]
     normal = 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     assert (normal * p.mean(axis=1)).sum() / 3.0 == pytest.approx(1.0, rel=1e-12)
 

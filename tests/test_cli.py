@@ -14,7 +14,11 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.cli import main as cli
-from warp_mca.results.result import CONTACT_FILES, FILES, HISTORY_COLUMNS, load
+from warp_mca.cli.parser import make_parser
+from warp_mca.cli.request import read_request
+from warp_mca.cli.warp_start import start_warp
+from warp_mca.results.result import HISTORY_COLUMNS
+from warp_mca.results.storage import CONTACT_FILES, FILES, load
 
 SCENE = '''"""A block lands on a rigid floor."""
 from typing import Annotated
@@ -149,8 +153,8 @@ def test_version(capsys: pytest.CaptureFixture[str]):
 def test_scenes_lists_presets_and_every_parameter(capsys: pytest.CaptureFixture[str]):
     assert cli.main(["scenes"]) == 0
     out = capsys.readouterr().out
-    for name in mca.registry.scene_names():
-        source = mca.registry.load_source(name)
+    for name in mca.scene.catalogue.scene_names():
+        source = mca.scene.catalogue.load_source(name)
         assert all(word in out for word in (name, *source.presets, *source.parameters))
     assert "0 to 10" in out and "kg/m^3" in out
 
@@ -162,7 +166,7 @@ def test_time_steps_of_any_scene_can_be_shortened(here: Path):
         assert cli.main(["run", "landing.py", "--duration", "1e-5", "--time-step-scale", scale, "--out", scale]) == 0
         dts.append(load(scale).summary["dt"])
     assert dts[0] == pytest.approx(2.0 * dts[1], rel=0.1)  # whole numbers of steps in an interval
-    request = cli._request(cli._parser().parse_args(["run", "two_link", "--time-step-scale", "0.4"]))
+    request = read_request(make_parser().parse_args(["run", "two_link", "--time-step-scale", "0.4"]))
     assert request.scene.impact.time_step_scale == 0.4
     assert request.origin is not None and request.origin.parameters["time_step_scale"] == 0.4
 
@@ -294,7 +298,7 @@ def test_as_a_program_it_writes_one_line_on_stderr_and_no_progress_bar(here: Pat
 @pytest.mark.parametrize(("arguments", "frozen"), [("", "True"), ("['--version']", "False")], ids=["program", "call"])
 def test_only_a_program_ends_without_looking_for_garbage(arguments: str, frozen: str):
     """What is registered first runs last."""
-    code = "import atexit, gc, sys; from warp_mca import cli; sys.argv[1:] = ['--version'];"
+    code = "import atexit, gc, sys; from warp_mca.cli import main as cli; sys.argv[1:] = ['--version'];"
     code += f"atexit.register(lambda: print(gc.get_freeze_count() > 0)); cli.main({arguments})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == frozen
@@ -314,7 +318,7 @@ def test_modules_are_imported_while_warp_starts(here: Path, monkeypatch: pytest.
         found.append("needed_next" in sys.modules)
 
     monkeypatch.setattr(warp, "init", driver)
-    cli._start_warp("needed_next", "no_such_module")
+    start_warp("needed_next", "no_such_module")
     assert found == [True]
 
 

@@ -321,10 +321,11 @@ def test_forces_of_each_contact_are_saved_and_loaded(tmp_path: Path):
 
 def test_results_saved_before_load_without_the_new_columns(tmp_path: Path):
     from warp_mca.results.result import HISTORY_COLUMNS
+    from warp_mca.results.storage import save
 
     result = mca.run(falling(block("a"), duration=3e-5))
     old = {name: result[name] for name in HISTORY_COLUMNS}
-    mca.results.save(replace(result, history=old, contacts=()), tmp_path / "old")
+    save(replace(result, history=old, contacts=()), tmp_path / "old")
     loaded = mca.load(tmp_path / "old")
     assert tuple(loaded.history) == HISTORY_COLUMNS
     assert loaded.contacts == ()

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 import warp_mca as mca
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import gather_lists
-from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds, tetrahedral
+from warp_mca.geometry.cell_types import CELL_TYPES
+from warp_mca.geometry.degenerate import cell_names, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
 from warp_mca.kernels.nodes.node import gather_function
@@ -149,8 +150,8 @@ def test_bounds_hold_the_largest_eigenvalue(element: str):
     rng = np.random.default_rng(5)
     box = mca.Box(size=(1.0, 0.7, 1.6), divisions=(4, 4, 4)).build()
     points = box.points + rng.uniform(-0.05, 0.05, box.points.shape)
-    mesh = tetrahedral(dataclasses.replace(box, points=points)) if kind.corners == 4 else box
-    x = points[mesh.tetrahedra if kind.corners == 4 else mesh.hexahedra]
+    mesh = tetrahedral(dataclasses.replace(box, points=points)) if kind.cell == "tetrahedron" else box
+    x = points[mesh.tetrahedra if kind.cell == "tetrahedron" else mesh.hexahedra]
     n = len(x)
     K, G, rho = np.full(n, 175e9), np.full(n, 80e9), np.full(n, 7850.0)
     mass = kind.lumped_masses(x, rho)
@@ -168,7 +169,7 @@ def test_element_eigenvalue_is_that_of_its_forces(element: str, kinematics: str)
     kind = ELEMENTS[element]
     x = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
     x = x * [1.0, 0.6, 1.3] + np.random.default_rng(2).uniform(-0.08, 0.08, x.shape)
-    if kind.corners == 4:
+    if kind.cell == "tetrahedron":
         mesh = Mesh(x[[0, 1, 3, 4]], np.zeros((0, 8), np.int32), {}, {}, np.arange(4, dtype=np.int32)[None])
     else:
         mesh = Mesh(x, np.arange(8, dtype=np.int32)[None])
@@ -224,9 +225,9 @@ def test_cells_keep_their_kind():
     padded = np.full((mesh.cell_count, 8), -1)
     padded[: len(mesh.hexahedra)] = mesh.hexahedra
     padded[len(mesh.hexahedra) :, :4] = mesh.tetrahedra
-    kinds = cell_kinds(padded)
-    assert {name: int((kinds == name).sum()) for name in CORNERS_OF} == {
-        "hexahedron": 5, "wedge": 4, "pyramid": 4, "tetra": 4,
+    names = cell_names(padded)
+    assert {name: int((names == name).sum()) for name in CELL_TYPES} == {
+        "hexahedron": 5, "wedge": 4, "pyramid": 4, "tetrahedron": 4,
     }  # fmt: skip
     assert scaled_jacobian(mesh).min() > 0.2
 

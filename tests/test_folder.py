@@ -18,7 +18,8 @@ from warp_mca.base.errors import GuardError, McaError, RequestError
 from warp_mca.base.folder import held
 from warp_mca.cli import main as cli
 from warp_mca.results.paths import PathHistory
-from warp_mca.results.result import FILES, PATH_FILES, Result, hold, load, save
+from warp_mca.results.result import Result
+from warp_mca.results.storage import FILES, PATH_FILES, hold, load, save
 
 MOVES = len(FILES) + len(PATH_FILES)
 
@@ -167,7 +168,7 @@ def test_runs_into_one_folder_do_not_mix(folder: Path):
 
 
 def test_a_folder_that_vanishes_during_the_run_is_made_again(tmp_path: Path):
-    from warp_mca.results.result import write
+    from warp_mca.results.storage import write
 
     with hold(tmp_path / "out") as held_folder:
         (tmp_path / "out").rmdir()

@@ -15,7 +15,8 @@ from test_results import facts, history
 import warp_mca as mca
 from warp_mca.base.errors import McaError, RequestError
 from warp_mca.recorders import UsdFile, usd_file
-from warp_mca.results.result import Result, save, summarise
+from warp_mca.results.result import Result, summarise
+from warp_mca.results.storage import save
 from warp_mca.scene import model_file as scene_file
 
 

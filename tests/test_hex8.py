@@ -8,7 +8,8 @@ import warp as wp
 from scipy.spatial.transform import Rotation
 
 from warp_mca.elements import ELEMENTS
-from warp_mca.elements.hexahedron import eigenvalue_bounds, gradients, largest_eigenvalues, lumped_masses
+from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
+from warp_mca.geometry.hexahedron import gradients
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements import hex8
 from warp_mca.kernels.elements.rotation import nearest_rotation

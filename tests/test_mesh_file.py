@@ -13,6 +13,7 @@ from flying_bars import FlyingBars
 
 import warp_mca as mca
 from warp_mca.base.errors import McaError, RequestError
+from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.model.model import build_model
 from warp_mca.recorders import mesh_file
 from warp_mca.recorders.mesh_file import COMPONENTS, FinalState, cells
@@ -99,8 +100,8 @@ def test_elements_come_in_the_order_of_the_meshes(bars: FlyingBars):
     X = {name: mesh.points for name, mesh in meshes.items()}
     model = build_model(scene, meshes, X, {name: np.zeros_like(x) for name, x in X.items()})
     assert model.element_of[0] == 10  # the model puts plastic elements first
-    ((kind, nodes),), body, material = cells(model)
-    assert kind == "hexahedron"
+    ((cell, nodes),), body, material = cells(model)
+    assert cell is HEXAHEDRON
     np.testing.assert_array_equal(nodes, elements(bars))
     np.testing.assert_array_equal(body, np.repeat([0, 1], 10))
     assert model.law[material[10:], 2] == pytest.approx(100e6)

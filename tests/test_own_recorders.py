@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_cli import SCENE
 from test_recording import Memory, bar
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.recorders import FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
+from warp_mca.cli import main as cli
+from warp_mca.recorders import FILES, Cadence, FinalState, Kind, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
 from warp_mca.recorders.recorder import SURFACE
 
 MAKE = {
@@ -106,3 +108,18 @@ def test_a_recorder_that_fails_at_its_first_frame_took_none(error: BaseException
     result = mca.run(bar(), recorders=[own])
     assert result.warnings[1:] == ("memory: recording stopped after 0 frames: no space left",)
     assert result.failed == ("memory",)
+
+
+def test_a_recorder_gets_its_option_by_one_registration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """`peak_stress.py` writes what a recorder in memory sees, from the command line and from Python."""
+    monkeypatch.setitem(FILES, "peak", Kind("peak_stress", "PeakStress", "write the greatest stress of each frame"))
+    monkeypatch.chdir(tmp_path)
+    Path("landing.py").write_text(SCENE)
+    assert cli.main(["run", "landing.py", "--duration", "1e-5", "--peak", "a.csv", "--frames", "4"]) == 0
+    seen = Memory(SURFACE, cadence=Cadence(frames=4))
+    own = FILES["peak"].make("b.csv", cadence=seen.cadence)
+    mca.run(mca.make_scene("landing.py"), duration=1e-5, recorders=[own, seen])
+    assert Path("a.csv").read_text() == Path("b.csv").read_text()
+    expected = [(frame.time, max(value.max() for value in frame.von_mises.values())) for frame in seen.frames]
+    np.testing.assert_array_equal(np.loadtxt("a.csv", delimiter=","), expected)
+    assert len(expected) == 4 and expected[-1][1] > 1e5

@@ -442,7 +442,7 @@ def test_a_path_that_leaves_its_body_is_refused():
 
 
 def test_results_with_paths_are_saved_and_loaded(tmp_path, plain: mca.Result):
-    from warp_mca.results.result import save
+    from warp_mca.results.storage import save
 
     save(plain, tmp_path / "run")
     again = mca.load(tmp_path / "run")

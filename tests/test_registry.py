@@ -13,15 +13,8 @@ import pytest
 from warp_mca.base.errors import RequestError
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene
-from warp_mca.scene.catalogue import (
-    Param,
-    Parameter,
-    SceneSource,
-    load_source,
-    make_scene,
-    parse_overrides,
-    scene_names,
-)
+from warp_mca.scene.catalogue import SceneSource, load_source, make_scene, parse_overrides, scene_names
+from warp_mca.scene.parameters import Param, Parameter
 
 SCENE = '''"""A block falls.
 

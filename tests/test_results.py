@@ -23,7 +23,8 @@ from warp_mca.results.force_history import (
     reverses,
     stick_intervals,
 )
-from warp_mca.results.result import FILES, HISTORY_COLUMNS, Result, RunFacts, check_output, load, save, summarise
+from warp_mca.results.result import HISTORY_COLUMNS, Result, RunFacts, summarise
+from warp_mca.results.storage import FILES, check_output, load, save
 
 TIME = np.arange(1, 601) * 1e-6
 

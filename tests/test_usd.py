@@ -17,7 +17,7 @@ from flying_bars import DT, STEPS, FlyingBars
 from test_full_disk import files_up_to
 
 from warp_mca.base.errors import RequestError
-from warp_mca.recorders import UsdFile, usd_file
+from warp_mca.recorders import UsdFile, usd_file, usd_prims
 from warp_mca.recorders.colours import PALETTE
 from warp_mca.recorders.recorder import SurfaceMesh
 
@@ -245,10 +245,10 @@ def test_a_frame_that_is_interrupted_is_whole(
         os.kill(os.getpid(), number)
         return levels(*values)
 
-    recorder, levels = UsdFile(tmp_path / "a.usdc"), usd_file.levels
+    recorder, levels = UsdFile(tmp_path / "a.usdc"), usd_prims.levels
     recorder.start(bars.info)
     recorder.frame(bars.frame(0))
-    monkeypatch.setattr(usd_file, "levels", interrupted)
+    monkeypatch.setattr(usd_prims, "levels", interrupted)
     before = signal.signal(number, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):

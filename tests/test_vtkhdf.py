@@ -23,9 +23,10 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from warp_mca.base.errors import RequestError
+from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.recorders import vtkhdf_file
 from warp_mca.recorders.recorder import Cadence
-from warp_mca.recorders.vtkhdf_file import FIELDS, VTK_TYPES, VtkHdfFile
+from warp_mca.recorders.vtkhdf_file import FIELDS, VtkHdfFile
 
 FRAMES = 11  # as many as the bars' run has ends of output intervals
 
@@ -89,7 +90,7 @@ def test_the_mesh_is_stored_once_and_stands_still(tmp_path: Path, bars: FlyingBa
         np.testing.assert_array_equal(vtk_to_numpy(grid.GetPoints().GetData()), model.X)
         connectivity = vtk_to_numpy(grid.GetCells().GetConnectivityArray())
         np.testing.assert_array_equal(connectivity.reshape(-1, 8), elements)
-        assert set(vtk_to_numpy(grid.GetCellTypes())) == {VTK_TYPES["hexahedron"]}
+        assert set(vtk_to_numpy(grid.GetCellTypes())) == {HEXAHEDRON.vtk}
         data = arrays(grid.GetCellData())
         np.testing.assert_array_equal(data["body"], np.repeat([0, 1], 10))
         np.testing.assert_array_equal(data["material"], np.zeros(20))

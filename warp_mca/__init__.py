@@ -37,10 +37,12 @@ from warp_mca.scene.materials import Elastic, J2Bilinear
 if TYPE_CHECKING:
     from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
-    from warp_mca.results.result import Result, load
+    from warp_mca.results.result import Result
+    from warp_mca.results.storage import load
     from warp_mca.runs.batch import run_batch
     from warp_mca.runs.simulation import mesh, run
-    from warp_mca.scene.catalogue import Param, make_scene
+    from warp_mca.scene.catalogue import make_scene
+    from warp_mca.scene.parameters import Param
 
 __version__ = "0.1.0"
 
@@ -51,10 +53,10 @@ _LAZY = {
     "Plate": "warp_mca.geometry",
     "Rod": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
-    "Param": "warp_mca.scene.catalogue",
+    "Param": "warp_mca.scene.parameters",
     "make_scene": "warp_mca.scene.catalogue",
     "Result": "warp_mca.results.result",
-    "load": "warp_mca.results.result",
+    "load": "warp_mca.results.storage",
     "quality_table": "warp_mca.report.quality",
     "mesh": "warp_mca.runs.simulation",
     "run": "warp_mca.runs.simulation",

@@ -30,10 +30,14 @@ def nearest(path: Path) -> Path:
 
 
 def check_folder(field: str, path: Path) -> None:
-    """Refuses a path that cannot be made: what exists of it takes no file.
+    """Check that a folder exists and can be written to, or can be created.
+
+    Args:
+        field: name of the option, for the message.
+        path: the folder.
 
     Raises:
-        RequestError: so it is, of what the user named `field`.
+        RequestError: it cannot be created or written.
     """
     try:
         existing = nearest(path)

@@ -175,7 +175,7 @@ def call(field: str, value: object, what: str, function: Callable[..., Any], *ar
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a finite real number; text, None, sequences and truth values are none."""
+    """Whether it is a finite real number; text, None, sequences and booleans are not."""
     try:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:  # a whole number that no float holds
@@ -183,7 +183,7 @@ def is_number(value: object) -> bool:
 
 
 def is_list(value: object) -> bool:
-    """Whether it is a sequence of finite numbers; sets, mappings and generators have no places."""
+    """Whether it is a sequence of finite numbers; sets, mappings and generators cannot be indexed and are not."""
     if isinstance(value, np.ndarray):
         return value.ndim == 1 and all(map(is_number, value))
     return _is_sequence(value) and all(map(is_number, value))

@@ -15,18 +15,20 @@ Array = NDArray[np.float64]
 
 
 class Element(Protocol):
-    """An element formulation, by which a body's cells are computed.
+    """An element formulation: mass, stable step and device stage of the cells of one type.
 
     Arguments `x` are corners [m], shape (element_count, corners, 3); `K`, `G` moduli [Pa] and `rho` [kg/m^3], shape
     (element_count,); `mass` lumped masses [kg], shape (element_count, corners); all float64.
 
     Attributes:
-        name: as `Body.element` and the command line have it.
-        corners: nodes of each element.
+        name: in `Body.element` and on the command line.
+        cell: name of the cell type that it computes, out of `geometry.cell_types.STORED_TYPES`.
+        patches: whether its stage may compute compact patches of elements, so that the model orders them that way.
     """
 
     name: str
-    corners: int
+    cell: str
+    patches: bool
 
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """Lumped masses [kg], shape (element_count, corners), that keep the mass and the centre of mass exactly."""
@@ -46,6 +48,6 @@ class Element(Protocol):
 
 
 def largest(matrices: Array, coarse: bool = False) -> Array:
-    """Largest eigenvalue of symmetric positive matrices, shape (count, n, n), or what bounds it: their norm."""
+    """Largest eigenvalue of symmetric positive matrices, shape (count, n, n); `coarse`: their norm, which bounds it."""
     found = np.linalg.norm(matrices, axis=(1, 2)) if coarse else np.linalg.eigvalsh(matrices)[:, -1]
     return found.astype(np.float64)

@@ -16,7 +16,8 @@ class Hex8:
     """See `warp_mca.kernels.elements.hex8`; wedges and pyramids are hexahedra whose corners coincide."""
 
     name = "hex8"
-    corners = 8
+    cell = "hexahedron"
+    patches = True
     lumped_masses = staticmethod(lumped_masses)
     eigenvalue_bounds = staticmethod(eigenvalue_bounds)
     largest_eigenvalues = staticmethod(largest_eigenvalues)

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warp_mca.base.chunks import chunks
 from warp_mca.elements.element import Array, largest
-from warp_mca.elements.hexahedron import CORNERS, chunks, gradients, lumped_masses
+from warp_mca.elements.hexahedron import lumped_masses
+from warp_mca.geometry.hexahedron import CORNERS, gradients
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
@@ -55,7 +57,8 @@ class Hex8r:
     """See `warp_mca.kernels.elements.hex8r`; wedges and pyramids are hexahedra whose corners coincide."""
 
     name = "hex8r"
-    corners = 8
+    cell = "hexahedron"
+    patches = True
     lumped_masses = staticmethod(lumped_masses)
 
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:

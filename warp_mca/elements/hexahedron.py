@@ -1,32 +1,21 @@
-"""Owns the host-side integrals of the trilinear hexahedron: volume, lumped mass and largest eigenvalue."""
+"""Owns what the hexahedral elements share on the host: lumped masses and largest eigenvalues."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
-CORNERS = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float
+from warp_mca.base.chunks import CHUNK, chunks
+from warp_mca.elements.element import Array
+from warp_mca.geometry.hexahedron import (
+    GRID,
+    SLOPE,
+    by_element,
+    cofactors,
+    gradients,
+    grid_determinants,
+    interpolated,
+    tangents,
 )
-
-
-def shape_functions(xi: Array) -> tuple[Array, Array]:
-    """Shape functions [-], shape (..., 8), and their natural derivatives, shape (..., 8, 3), at xi, shape (..., 3)."""
-    factor = 1.0 + xi[..., None, :] * CORNERS
-    value = factor.prod(axis=-1) / 8.0
-    slope = np.empty((*xi.shape[:-1], 8, 3))
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        slope[..., axis] = CORNERS[:, axis] * factor[..., others].prod(axis=-1) / 8.0
-    return value, slope
-
-
-_SLOPE = shape_functions(CORNERS / np.sqrt(3.0))[1]  # at the Gauss points, shape (8 points, 8 corners, 3)
-_GRID = [0, 1, 3, 2, 4, 5, 7, 6]  # corners counted along xi, then eta, then zeta, and back
-_NEAR, _FAR = 0.5 + 0.5 / np.sqrt(3.0), 0.5 - 0.5 / np.sqrt(3.0)  # weights of the ends of an axis at a Gauss point
-CHUNK = 2048  # elements that are computed at a time: what they need stays in a core's cache
 
 # A Laplacian's entries are sums of those of the metric cofactor_k . cofactor_j / det at the points, times slopes.
 _ROW, _COLUMN = np.triu_indices(8)
@@ -38,76 +27,13 @@ def _metric_slopes() -> Array:
     """What the metric adds to the entries of a Laplacian, shape (36, 6 pairs x 8 points)."""
     found = []
     for k, j in _PAIRS:
-        product = _SLOPE[:, _ROW, k] * _SLOPE[:, _COLUMN, j]
-        found.append(product if k == j else product + _SLOPE[:, _ROW, j] * _SLOPE[:, _COLUMN, k])
-    return np.ascontiguousarray(np.stack(found)[:, _GRID].reshape(48, 36).T)
+        product = SLOPE[:, _ROW, k] * SLOPE[:, _COLUMN, j]
+        found.append(product if k == j else product + SLOPE[:, _ROW, j] * SLOPE[:, _COLUMN, k])
+    return np.ascontiguousarray(np.stack(found)[:, GRID].reshape(48, 36).T)
 
 
 _METRIC = _metric_slopes()
-_MEAN = np.ascontiguousarray(_SLOPE.transpose(2, 0, 1)[:, _GRID].reshape(24, 8).T)
-
-
-def chunks(count: int, size: int) -> list[slice]:
-    """Slices of `size` that cut `count` entries, the last one shorter."""
-    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
-
-
-def _interpolated(value: Array, axis: int) -> Array:
-    """From the two ends of an axis of length 2 to its two Gauss points; the transposed step is the same."""
-    found = np.empty_like(value)
-    (low, high), (first, second) = np.moveaxis(value, axis, 0), np.moveaxis(found, axis, 0)
-    np.multiply(low, _NEAR, out=first)
-    np.multiply(high, _NEAR, out=second)
-    first += _FAR * high
-    second += _FAR * low
-    return found
-
-
-def _tangents(x: Array) -> list[Array]:
-    """Derivatives dx/dxi, dx/deta, dx/dzeta [m], each constant along its own axis.
-
-    Arrays of a chunk of elements: components first, then two places along each of zeta, eta, xi, then elements. All is
-    computed so, without BLAS: memory is read once, and digits depend neither on the machine nor on the neighbours.
-
-    Args:
-        x: corners [m], shape (element_count, 8, 3).
-
-    Returns:
-        Shapes (3, 2, 2, 1, element_count), (3, 2, 1, 2, element_count), (3, 1, 2, 2, element_count).
-    """
-    corner = np.ascontiguousarray(x.transpose(2, 1, 0)[:, _GRID]).reshape(3, 2, 2, 2, len(x))
-    found = []
-    for axis in (3, 2, 1):
-        low, high = np.moveaxis(corner, axis, 0)
-        slope = _interpolated(_interpolated(0.5 * (high - low), 1), 2)
-        found.append(np.expand_dims(slope, axis))
-    return found
-
-
-def _cross(p: Array, q: Array) -> Array:
-    """Cross product of vectors whose components come first."""
-    pairs = ((1, 2), (2, 0), (0, 1))
-    return np.stack([p[j] * q[k] - p[k] * q[j] for j, k in pairs])
-
-
-def _determinants(tangents: list[Array]) -> Array:
-    """Determinants of the Jacobian at the Gauss points [m^3], shape (2, 2, 2, element_count)."""
-    a, b, c = tangents
-    normal = _cross(b, c)
-    return a[0] * normal[0] + a[1] * normal[1] + a[2] * normal[2]
-
-
-def _by_element(value: Array) -> Array:
-    """Shape (element_count, 8), in the order of CORNERS, from (2, 2, 2, element_count)."""
-    return value.reshape(8, -1)[_GRID].T
-
-
-def determinants(x: Array) -> Array:
-    """Of the Jacobian at the Gauss points [m^3], shape (element_count, 8); corners x [m] as in `lumped_masses`."""
-    found = np.empty((len(x), 8))
-    for part in chunks(len(x), CHUNK):
-        found[part] = _by_element(_determinants(_tangents(x[part])))
-    return found
+_MEAN = np.ascontiguousarray(SLOPE.transpose(2, 0, 1)[:, GRID].reshape(24, 8).T)
 
 
 def lumped_masses(x: Array, rho: Array) -> Array:
@@ -119,31 +45,9 @@ def lumped_masses(x: Array, rho: Array) -> Array:
     """
     mass = np.empty((len(x), 8))
     for part in chunks(len(x), CHUNK):
-        weight = rho[part] * _determinants(_tangents(x[part]))
-        mass[part] = _by_element(_interpolated(_interpolated(_interpolated(weight, 0), 1), 2))
+        weight = rho[part] * grid_determinants(tangents(x[part]))
+        mass[part] = by_element(interpolated(interpolated(interpolated(weight, 0), 1), 2))
     return mass
-
-
-def volumes(x: Array) -> Array:
-    """Volumes [m^3], shape (element_count,), by 8-point Gauss quadrature, which is exact."""
-    volume = np.empty(len(x))
-    for part in chunks(len(x), CHUNK):
-        volume[part] = _determinants(_tangents(x[part])).reshape(8, -1).sum(axis=0)
-    return volume
-
-
-def _cofactors(x: Array) -> tuple[Array, Array]:
-    """Of the Jacobian, shape (3 axes, 3 components, 2, 2, 2, element_count), and its determinants as above."""
-    a, b, c = _tangents(x)
-    cofactor = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)])
-    return cofactor, (a * cofactor[0]).sum(axis=0)
-
-
-def gradients(x: Array) -> tuple[Array, Array]:
-    """Gradients of the shape functions [1/m], shape (element_count, 8 points, 8 nodes, 3), and weights [m^3]."""
-    cofactor, det = _cofactors(x)
-    inverse = (cofactor / det).reshape(3, 3, 8, -1)[:, :, _GRID].transpose(3, 2, 0, 1)
-    return _SLOPE @ np.ascontiguousarray(inverse), _by_element(det)
 
 
 def eigenvalue_bounds(x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
@@ -182,7 +86,7 @@ def _product(matrix: Array, columns: Array) -> Array:
 def _laplacians(x: Array, mass: Array) -> tuple[Array, Array]:
     """Entries (_ROW, _COLUMN) of M^-1/2 (sum over points w grad N_a . grad N_b) M^-1/2 [m/kg], shape (36,
     element_count), and the eigenvalue of the mean dilatation's matrix without K [m/kg], shape (element_count,)."""
-    cofactor, det = _cofactors(x)
+    cofactor, det = cofactors(x)
     metric = np.stack([(cofactor[k] * cofactor[j]).sum(axis=0) / det for k, j in _PAIRS])
     root = 1.0 / np.sqrt(mass.T)
     laplacian = _product(_METRIC, metric.reshape(48, -1))

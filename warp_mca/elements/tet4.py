@@ -6,30 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warp_mca.base.chunks import chunks
 from warp_mca.elements.element import Array, largest
-from warp_mca.elements.hexahedron import chunks
+from warp_mca.geometry.tetrahedron import gradients, volumes
 
 if TYPE_CHECKING:
     from warp_mca.elements.stage import ElementStage
     from warp_mca.model.model import Block
 
 
-def volumes(x: Array) -> Array:
-    """Volumes [m^3], shape (element_count,), negative where inverted."""
-    return (np.linalg.det(x[:, 1:] - x[:, :1]) / 6.0).astype(np.float64)
-
-
-def gradients(x: Array) -> Array:
-    """Gradients of the shape functions [1/m], shape (element_count, 4, 3)."""
-    last = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
-    return np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1).astype(np.float64)
-
-
 class Tet4:
     """See `warp_mca.kernels.elements.tet4`."""
 
     name = "tet4"
-    corners = 4
+    cell = "tetrahedron"
+    patches = False
 
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """A quarter of the mass at each corner."""

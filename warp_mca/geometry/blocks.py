@@ -14,12 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import RequestError
+from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import check_size
 
-# Faces and edges of a block by the position of their corners; edges are grouped by the direction they run in.
-_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_EDGES = (((0, 1), (3, 2), (4, 5), (7, 6)), ((0, 3), (1, 2), (4, 7), (5, 6)), ((0, 4), (1, 5), (2, 6), (3, 7)))
+_SIDE = np.array(HEXAHEDRON.natural)  # -1 or 1 along each direction of a block, shape (8 corners, 3)
+_LOW, _HIGH = ([np.flatnonzero(_SIDE[:, axis] == side) for axis in range(3)] for side in (-1, 1))
+# Edges of a block that run along each direction, from its low to its high side.
+_EDGES = [
+    [(a, b) if side[a] < side[b] else (b, a) for a, b in HEXAHEDRON.edges if side[a] != side[b]] for side in _SIDE.T
+]
 FINEST = 1e-8  # smallest edge of a cell [extent of all blocks]
 _LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
 _one_at_a_time = threading.Lock()  # gmsh keeps one global state
@@ -182,14 +186,14 @@ class Blocks:
 
         volumes = []
         for corners, *_ in self._blocks:
-            shell = geo.addSurfaceLoop([surface([corners[i] for i in face]) for face in _FACES])
+            shell = geo.addSurfaceLoop([surface([corners[i] for i in face]) for face in HEXAHEDRON.faces])
             volumes.append(geo.addVolume([shell]))
             geo.mesh.setTransfiniteVolume(volumes[-1], [points[corner] for corner in corners])
         return surfaces, volumes
 
     def _read(self, meshed: ModuleType, surfaces: dict[frozenset[int], int], volumes: list[int]) -> Mesh:
         """Collects hexahedra and sets; nodes that no hexahedron uses (arc centres) are left out."""
-        blocks = [meshed.getElementsByType(5, tag)[1].reshape(-1, 8) for tag in volumes]
+        blocks = [meshed.getElementsByType(HEXAHEDRON.gmsh, tag)[1].reshape(-1, HEXAHEDRON.corners) for tag in volumes]
         if [len(block) for block in blocks] != [math.prod(counts) for _, counts, _ in self._blocks]:
             raise RequestError("gmsh left a block without its hexahedra: change the recipe's values")
         tags, hexahedra = np.unique(np.concatenate(blocks), return_inverse=True)
@@ -204,16 +208,14 @@ class Blocks:
         for name, faces in self._faces.items():
             on_faces = [meshed.getNodes(2, surfaces[face], includeBoundary=True)[0] for face in faces]
             node_sets[name] = np.searchsorted(tags, np.unique(np.concatenate(on_faces))).astype(np.int32)
-        hexahedra = _outwards(points, hexahedra.reshape(-1, 8).astype(np.int32))
+        hexahedra = _outwards(points, hexahedra.reshape(-1, HEXAHEDRON.corners).astype(np.int32))
         return Mesh(points, hexahedra, node_sets, {str(name): cells for name, cells in cell_sets.items()})
 
 
 def _outwards(points: np.ndarray, hexahedra: np.ndarray) -> np.ndarray:
     """Swaps bottom and top of the elements that gmsh numbered left-handed."""
     p = points[hexahedra]
-    u = p[:, [1, 2, 5, 6]].sum(1) - p[:, [0, 3, 4, 7]].sum(1)
-    v = p[:, [2, 3, 6, 7]].sum(1) - p[:, [0, 1, 4, 5]].sum(1)
-    w = p[:, 4:].sum(1) - p[:, :4].sum(1)
+    u, v, w = (p[:, high].sum(1) - p[:, low].sum(1) for low, high in zip(_LOW, _HIGH, strict=True))
     left_handed = np.einsum("ij,ij->i", np.cross(u, v), w) < 0.0
     return np.where(left_handed[:, None], np.roll(hexahedra, 4, axis=1), hexahedra)
 

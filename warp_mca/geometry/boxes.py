@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.elements.hexahedron import CHUNK, chunks
+from warp_mca.base.chunks import CHUNK, chunks
 
 Array = NDArray[np.float64]
+Boxes = tuple[Array, Array]  # least and greatest coordinates of each cell, as from `cell_boxes`
 
 
-def cell_boxes(points: Array, cells: NDArray[np.int32]) -> tuple[Array, Array]:
+def cell_boxes(points: Array, cells: NDArray[np.int32]) -> Boxes:
     """Least and greatest coordinates of each cell [m], each shape (3, cell_count), float64.
 
     Args:

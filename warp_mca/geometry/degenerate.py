@@ -1,50 +1,57 @@
-"""Owns cells other than bricks: wedges and pyramids as hexahedra with coinciding corners, cuts into tetrahedra."""
+"""Owns conversions between cell types: wedges and pyramids as hexahedra with coinciding corners, cuts to tetrahedra."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.elements import hexahedron, tet4
-from warp_mca.geometry.boundary import HEX_FACES
+from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MOST_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
+from warp_mca.geometry.integrals import INTEGRALS
 from warp_mca.geometry.mesh import Mesh
 
 Cells = NDArray[np.int32]
 
-AS_HEXAHEDRON = {"wedge": [0, 1, 2, 2, 3, 4, 5, 5], "pyramid": [0, 1, 2, 3, 4, 4, 4, 4]}  # VTK's corner orders
-_MIRRORED = {"wedge": [0, 2, 1, 3, 5, 4], "pyramid": [0, 3, 2, 1, 4], "tetra": [0, 2, 1, 3]}
 
+def stored(points: NDArray[np.float64], cells: Cells, name: str) -> Cells:
+    """Cells as a mesh stores those of their type, shape (cell_count, corners of the stored type), int32.
 
-def oriented(points: NDArray[np.float64], cells: Cells, kind: str) -> Cells:
-    """Wedges, pyramids or tetrahedra with the corners of those that are numbered the other way round exchanged."""
-    if kind == "tetra":
-        volume = tet4.volumes(points[cells])
-    else:
-        volume = hexahedron.volumes(points[cells[:, AS_HEXAHEDRON[kind]]])
-    turned = cells.copy()
-    turned[volume < 0.0] = cells[volume < 0.0][:, _MIRRORED[kind]]
-    return turned.astype(np.int32)
+    Wedges, pyramids and tetrahedra that are numbered the other way round, so that their volume is negative, are
+    mirrored; hexahedra stay as they are, so that checks find those that are inverted.
 
-
-CORNERS_OF = {
-    "hexahedron": list(range(8)),
-    "wedge": [0, 1, 2, 4, 5, 6],
-    "pyramid": [0, 1, 2, 3, 4],
-    "tetra": [0, 1, 2, 3],
-}  # of each kind, out of the eight of a padded cell
-
-
-def cell_kinds(nodes: NDArray[np.integer]) -> NDArray[np.str_]:
-    """Kind of each cell, shape (cell_count,), from its nodes, shape (cell_count, 8), -1 beyond a tetrahedron's four.
-
-    A hexahedron that collapsed in another way than AS_HEXAHEDRON stays a hexahedron.
+    Args:
+        points: node positions [m], shape (node_count, 3), float64.
+        cells: nodes of the cells, shape (cell_count, corners).
+        name: their type, out of CELL_TYPES.
     """
-    kinds = np.full(len(nodes), "hexahedron", dtype="<U10")
+    cell = CELL_TYPES[name]
+    corners = list(cell.stored_corners)
+    upright = cells.copy()
+    if cell is not HEXAHEDRON:
+        negative = INTEGRALS[cell.stored_as].volumes(points[cells[:, corners]]) < 0.0
+        upright[negative] = cells[negative][:, list(cell.mirrored)]
+    return upright[:, corners].astype(np.int32)
+
+
+def cell_names(nodes: NDArray[np.integer]) -> NDArray[np.str_]:
+    """Type of each cell, shape (cell_count,), out of CELL_TYPES.
+
+    A hexahedron that collapsed in another way than a wedge or a pyramid is stored stays a hexahedron.
+
+    Args:
+        nodes: of each cell, shape (cell_count, MOST_CORNERS), -1 beyond its last corner.
+    """
+    names = np.full(len(nodes), HEXAHEDRON.name, dtype=f"<U{max(map(len, CELL_TYPES))}")
     different = 1 + (np.diff(np.sort(nodes, axis=1), axis=1) != 0).sum(axis=1)
-    kinds[(nodes[:, 2] == nodes[:, 3]) & (nodes[:, 6] == nodes[:, 7]) & (different == 6)] = "wedge"
-    kinds[(nodes[:, 4:] == nodes[:, 4:5]).all(axis=1) & (different == 5)] = "pyramid"
-    kinds[nodes[:, 4] < 0] = "tetra"
-    return kinds
+    for cell in (WEDGE, PYRAMID):
+        first = [cell.own_corners[corner] for corner in cell.stored_corners]
+        names[(nodes == nodes[:, first]).all(axis=1) & (different == cell.corners)] = cell.name
+    names[(nodes[:, TETRAHEDRON.corners : MOST_CORNERS] < 0).all(axis=1)] = TETRAHEDRON.name
+    return names
+
+
+def cut_to(mesh: Mesh, name: str) -> Mesh:
+    """The mesh with cells that can be cut to those of the type `name` cut so; others stay."""
+    return tetrahedral(mesh) if name == TETRAHEDRON.name else mesh
 
 
 def tetrahedral(mesh: Mesh) -> Mesh:
@@ -56,11 +63,11 @@ def tetrahedral(mesh: Mesh) -> Mesh:
     if not len(mesh.hexahedra):
         return mesh
     apex = mesh.hexahedra.min(axis=1)
-    faces = mesh.hexahedra[:, HEX_FACES]
+    faces = mesh.hexahedra[:, HEXAHEDRON.quads]
     low = faces.argmin(axis=2)
     faces = np.take_along_axis(faces, (low[..., None] + np.arange(4)) % 4, axis=2)
     corners = np.stack([faces[..., [0, 1, 2]], faces[..., [0, 2, 3]]], axis=2).reshape(-1, 3)
-    owner = np.repeat(np.arange(len(mesh.hexahedra)), 2 * len(HEX_FACES))
+    owner = np.repeat(np.arange(len(mesh.hexahedra)), 2 * len(HEXAHEDRON.faces))
     # cones from the apex over the triangles of the faces without it; collapsed triangles have no volume
     real = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     used = real & (corners != apex[owner][:, None]).all(axis=1)
@@ -72,6 +79,6 @@ def tetrahedral(mesh: Mesh) -> Mesh:
         name: np.flatnonzero(np.isin(np.sort(owner), np.arange(mesh.cell_count)[cells])).astype(np.int32)
         for name, cells in mesh.cell_sets.items()
     }
-    none = np.zeros((0, 8), dtype=np.int32)
+    none = np.zeros((0, HEXAHEDRON.corners), dtype=np.int32)
     tetrahedra = np.concatenate([cut, mesh.tetrahedra])[order].astype(np.int32)
     return Mesh(mesh.points, none, mesh.node_sets, cell_sets, tetrahedra)

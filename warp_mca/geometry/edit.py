@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import bad_value
+from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.geometry.mesh import Mesh
 
 _ROUNDING = 1e-7  # share of the mesh's extent within which places count as equal: gmsh divides arcs to about 1e-9
-_MIRRORED = [0, 3, 2, 1, 4, 7, 6, 5]  # keeps the Jacobian of a reflected hexahedron positive
 
 
 def mirror(mesh: Mesh, axis: int) -> Mesh:
@@ -30,7 +30,7 @@ def mirror(mesh: Mesh, axis: int) -> Mesh:
     cell_sets = {name: np.append(cells, cells + len(mesh.hexahedra)) for name, cells in mesh.cell_sets.items()}
     return Mesh(
         np.concatenate([points, reflected]),
-        np.concatenate([mesh.hexahedra, image[mesh.hexahedra][:, _MIRRORED]]),
+        np.concatenate([mesh.hexahedra, image[mesh.hexahedra][:, list(HEXAHEDRON.mirrored)]]),
         node_sets,
         {name: cells.astype(np.int32) for name, cells in cell_sets.items()},
     )
@@ -70,7 +70,7 @@ def pinned(points: np.ndarray, place: ArrayLike) -> np.ndarray:
 
 def compact(mesh: Mesh) -> Mesh:
     """The mesh without the nodes that no element uses; sets keep the nodes that are left."""
-    used = np.union1d(mesh.hexahedra, mesh.tetrahedra)
+    used = np.unique(np.concatenate([cells.ravel() for cells in mesh.cells.values()]))
     if len(used) == len(mesh.points):
         return mesh
     index = np.full(len(mesh.points), -1, dtype=np.int32)

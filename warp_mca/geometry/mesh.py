@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boundary import boundary_faces
+from warp_mca.geometry.cell_types import STORED_TYPES
 
 
 @dataclass(frozen=True)
@@ -32,14 +33,22 @@ class Mesh:
     tetrahedra: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
 
     @property
+    def cells(self) -> dict[str, NDArray[np.int32]]:
+        """Nodes of the cells of each stored type, by its name, in the order in which cells are counted."""
+        return {name: getattr(self, cell.field) for name, cell in STORED_TYPES.items()}
+
+    @property
     def cell_count(self) -> int:
         """Number of cells."""
-        return len(self.hexahedra) + len(self.tetrahedra)
+        return sum(map(len, self.cells.values()))
 
     def cell(self, index: int) -> NDArray[np.int32]:
         """Nodes of one cell."""
-        first = len(self.hexahedra)
-        return self.hexahedra[index] if index < first else self.tetrahedra[index - first]
+        for cells in self.cells.values():
+            if index < len(cells):
+                return cells[index]
+            index -= len(cells)
+        raise IndexError(index)
 
     @cached_property
     def boundary(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -47,7 +56,7 @@ class Mesh:
 
         Triangles have their last corner twice.
         """
-        return boundary_faces(self.hexahedra, self.tetrahedra, len(self.points))
+        return boundary_faces(self.cells, len(self.points))
 
     def surface(self, name: str) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Boundary faces whose nodes all lie in the node set `name` ("boundary", unless there is one: all of them).

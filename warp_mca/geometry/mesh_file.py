@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.degenerate import AS_HEXAHEDRON, oriented
+from warp_mca.geometry.cell_types import CELL_TYPES, STORED_TYPES
+from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.mesh import Mesh
 
 if TYPE_CHECKING:
     import meshio
 
-KINDS = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4}  # cells that are read, in the order they are kept
+_READ = {cell.meshio: cell for cell in CELL_TYPES.values()}  # cells that are read, in the order they are kept
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,14 @@ class MeshFile:
         for block in cells.values():
             if len(block) and (block.min() < 0 or block.max() >= len(points)):
                 raise self._bad(f"its elements use nodes beyond its {len(points)} points; repair the mesh")
-        hexahedra = [cells["hexahedron"]]
-        hexahedra += [oriented(points, cells[kind], kind)[:, order] for kind, order in AS_HEXAHEDRON.items()]
         node_sets, cell_sets = _sets(read, self._physical_names())
-        tetrahedra = oriented(points, cells["tetra"], "tetra")
-        return compact(Mesh(points, np.concatenate(hexahedra), node_sets, cell_sets, tetrahedra))
+        arrays = {
+            kept.field: np.concatenate(
+                [stored(points, cells[name], name) for name, cell in CELL_TYPES.items() if cell.stored_as == kept.name]
+            )
+            for kept in STORED_TYPES.values()
+        }
+        return compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, **arrays))
 
     def _read(self) -> meshio.Mesh:
         try:
@@ -124,19 +128,19 @@ class MeshFile:
                     raise self._bad(f"its *INSTANCE is moved, which meshio would pass over; {remedy}")
 
     def _cells(self, read: meshio.Mesh) -> dict[str, NDArray[np.int32]]:
-        """Nodes of the cells of each kind, in the order of KINDS."""
-        other = sorted({block.type for block in read.cells if block.dim == 3 and block.type not in KINDS})
+        """Nodes of the cells of each type, by its name in CELL_TYPES."""
+        other = sorted({block.type for block in read.cells if block.dim == 3 and block.type not in _READ})
         if other:
-            raise self._bad(f"it holds {', '.join(other)}; save it with linear cells: {', '.join(KINDS)}")
+            raise self._bad(f"it holds {', '.join(other)}; save it with linear cells: {', '.join(_READ)}")
         found = {
-            kind: np.concatenate(
-                [np.zeros((0, size), np.int64), *(block.data for block in read.cells if block.type == kind)]
+            cell.name: np.concatenate(
+                [np.zeros((0, cell.corners), np.int64), *(block.data for block in read.cells if block.type == kind)]
             )
-            for kind, size in KINDS.items()
+            for kind, cell in _READ.items()
         }
         if not any(map(len, found.values())):
             raise self._bad("it holds no volume cells; mesh the volume with hexahedra or tetrahedra")
-        return {kind: cells.astype(np.int32) for kind, cells in found.items()}
+        return {name: cells.astype(np.int32) for name, cells in found.items()}
 
     def _bad(self, remedy: str) -> RequestError:
         return bad_value("MeshFile.path", str(self.path), remedy)
@@ -153,7 +157,7 @@ def _sets(
         for block, first, members in zip(read.cells, firsts, by_block, strict=False):
             if members is not None and len(members):
                 members = np.asarray(members, dtype=np.int64)
-                if block.type in KINDS:
+                if block.type in _READ:
                     cells.setdefault(name, []).append(first + members)
                 else:
                     nodes.setdefault(name, []).append(np.asarray(block.data)[members].ravel())
@@ -164,7 +168,7 @@ def _first_cells(read: meshio.Mesh) -> list[int]:
     """Index that the first cell of each block of the file has in the mesh."""
     firsts = [0] * len(read.cells)
     count = 0
-    for kind in KINDS:
+    for kind in _READ:
         for index, block in enumerate(read.cells):
             if block.type == kind:
                 firsts[index] = count

@@ -7,27 +7,23 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.elements import hexahedron, tet4
+from warp_mca.geometry.cell_types import CELL_TYPES
+from warp_mca.geometry.integrals import INTEGRALS
 from warp_mca.geometry.mesh import Mesh
 
-# The three neighbours of each corner, ordered so that the edges towards them are right-handed.
-_NEIGHBOURS = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
-_EDGES = np.array([[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3], [1, 2, 3, 0, 5, 6, 7, 4, 4, 5, 6, 7]])
 _KEEP_ONE = "keep one of them (gmsh's format 2.2 writes a cell once for each of its physical groups, 4.1 does not)"
 
-# The same of a tetrahedron.
-_TET_NEIGHBOURS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-_TET_EDGES = np.array([[0, 0, 0, 1, 1, 2], [1, 2, 3, 2, 3, 3]])
 
-
-def _corner_volumes(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Determinants of the three unit edges at each corner of hexahedra and tetrahedra [-].
+def _corner_volumes(mesh: Mesh) -> list[NDArray[np.float64]]:
+    """Determinants of the three unit edges at each corner of the cells of each stored type [-].
 
     1 where edges collapsed, as in wedges and pyramids.
     """
     found = []
-    for cells, neighbours in ((mesh.hexahedra, _NEIGHBOURS), (mesh.tetrahedra, _TET_NEIGHBOURS)):
+    for name, cells in mesh.cells.items():
+        neighbours = np.array(CELL_TYPES[name].neighbours)
         corners = mesh.points[cells]
         edges = corners[:, neighbours] - corners[:, :, None, :]
         length = np.linalg.norm(edges, axis=-1, keepdims=True)
@@ -35,7 +31,7 @@ def _corner_volumes(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64
         near = cells[:, neighbours]
         collapsed = (length[..., 0] == 0.0).any(axis=-1) | (np.diff(np.sort(near, axis=-1), axis=-1) == 0).any(axis=-1)
         found.append(np.where(collapsed, 1.0, volume))
-    return found[0], found[1]
+    return found
 
 
 def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
@@ -46,25 +42,30 @@ def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
     return np.concatenate([part.min(axis=1, initial=1.0) for part in _corner_volumes(mesh)])
 
 
-def gauss_jacobians(mesh: Mesh) -> NDArray[np.float64]:
-    """Jacobian determinants of the hexahedra at the 2 x 2 x 2 Gauss points [m^3], shape (hexahedron_count, 8)."""
-    found = np.empty(mesh.hexahedra.shape)
-    for part in hexahedron.chunks(len(found), hexahedron.CHUNK):
-        found[part] = hexahedron.determinants(mesh.points[mesh.hexahedra[part]])
+def gauss_jacobians(mesh: Mesh) -> list[NDArray[np.float64]]:
+    """Jacobian determinants times weights [m^3] of the cells of each stored type, shape (cell_count, point_count).
+
+    Hexahedra have 2 x 2 x 2 Gauss points, tetrahedra one point.
+    """
+    found = []
+    for name, cells in mesh.cells.items():
+        parts = [INTEGRALS[name].determinants(mesh.points[cells[part]]) for part in chunks(len(cells), CHUNK)]
+        found.append(np.concatenate(parts) if parts else np.zeros((0, 1)))
     return found
 
 
 def volumes(mesh: Mesh) -> NDArray[np.float64]:
     """Volume of each cell [m^3], shape (cell_count,)."""
-    return np.concatenate([gauss_jacobians(mesh).sum(axis=1), tet4.volumes(mesh.points[mesh.tetrahedra])])
+    return np.concatenate([part.sum(axis=1) for part in gauss_jacobians(mesh)])
 
 
 def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
     """Lengths of the edges of all cells [m], shape (edge_count,), without those that collapsed."""
     found = []
-    for cells, edges in ((mesh.hexahedra, _EDGES), (mesh.tetrahedra, _TET_EDGES)):
+    for name, cells in mesh.cells.items():
+        first, second = np.array(CELL_TYPES[name].edges).T
         corners = mesh.points[cells]
-        found.append(np.linalg.norm(corners[:, edges[1]] - corners[:, edges[0]], axis=-1).ravel())
+        found.append(np.linalg.norm(corners[:, second] - corners[:, first], axis=-1).ravel())
     length = np.concatenate(found)
     return length[length > 0.0]
 
@@ -91,8 +92,7 @@ def check(mesh: Mesh, name: str) -> None:
             point, or the volume of a tetrahedron is not.
     """
     check_whole(mesh, name)
-    hexahedra = gauss_jacobians(mesh).min(axis=1) > 0.0
-    good = np.append(hexahedra, tet4.volumes(mesh.points[mesh.tetrahedra]) > 0.0)
+    good = np.concatenate([part.min(axis=1) > 0.0 for part in gauss_jacobians(mesh)])
     bad = np.flatnonzero(~good)
     if len(bad):
         raise RequestError(
@@ -112,14 +112,14 @@ def check_whole(mesh: Mesh, name: str) -> None:
         RequestError: an array has another shape or type than `Mesh` says, there is no cell, a cell or a set counts
             beyond the end, a node is in no cell or in a set twice, or two cells have the same corners.
     """
-    points, cells = mesh.points, {"hexahedra": (mesh.hexahedra, 8), "tetrahedra": (mesh.tetrahedra, 4)}
+    points = mesh.points
     whole = _is_array(points, "f", 2) and points.shape[1] == 3 and points.itemsize in (4, 8)
     if not whole or not np.isfinite(points).all():
         remedy = "give three finite coordinates for each node, as float64"
         raise bad_value(f"body {name}: Mesh.points", _what(points), remedy)
     used = np.zeros(len(points), dtype=bool)
-    for field, (nodes, corners) in cells.items():
-        owner = f"body {name}: Mesh.{field}"
+    for cell, nodes in mesh.cells.items():
+        owner, corners = f"body {name}: Mesh.{CELL_TYPES[cell].field}", CELL_TYPES[cell].corners
         if not _is_array(nodes, "iu", 2) or nodes.shape[1] != corners:
             raise bad_value(owner, _what(nodes), f"give the {corners} nodes of each cell, as int32")
         _check_indices(owner, nodes, len(points), "nodes")

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import bad_value
-from warp_mca.elements import ELEMENTS, Element
-from warp_mca.elements.hexahedron import CHUNK, chunks
+from warp_mca.elements import ELEMENTS, Element, default_element
+from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.patches import PATCH, compact_order
 from warp_mca.model.stable_step import StableStep, stable_step
@@ -107,19 +108,18 @@ def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
     """The cells of a body by formulation, in the mesh's own numbering.
 
     Raises:
-        RequestError: the mesh holds hexahedra, and the body takes tetrahedra only.
+        RequestError: the mesh holds cells that should have been cut to those of the body's element.
     """
-    finite, split = body.kinematics == "finite", len(mesh.hexahedra)
-    found = []
-    if split:
-        element = ELEMENTS[body.element]
-        if element.corners != 8:
-            remedy = "its mesh holds hexahedra; pass meshes through warp_mca.mesh"
-            raise bad_value(f"Body {body.name}.element", body.element, remedy)
-        found.append(Cells(element, finite, mesh.hexahedra, np.arange(split, dtype=np.int32)))
-    if len(mesh.tetrahedra):
-        index = np.arange(split, mesh.cell_count, dtype=np.int32)
-        found.append(Cells(ELEMENTS["tet4"], finite, mesh.tetrahedra, index))
+    finite, own = body.kinematics == "finite", ELEMENTS[body.element]
+    found, first = [], 0
+    for name, conn in mesh.cells.items():
+        if len(conn):
+            if name in CELL_TYPES[own.cell].cut_from:
+                remedy = f"its mesh holds {CELL_TYPES[name].field}; pass meshes through warp_mca.mesh"
+                raise bad_value(f"Body {body.name}.element", body.element, remedy)
+            index = np.arange(first, first + len(conn), dtype=np.int32)
+            found.append(Cells(own if name == own.cell else default_element(name), finite, conn, index))
+            first += len(conn)
     return found
 
 
@@ -224,7 +224,7 @@ class Assembly:
             for part in self.cells:
                 mine = np.flatnonzero(flowing[part.index])
                 if len(mine):
-                    if part.element.corners == 8:  # tetrahedra are not computed by patches
+                    if part.element.patches:
                         mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
                     index = part.index[mine]
                     blocks.append(

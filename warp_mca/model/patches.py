@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.elements.hexahedron import chunks
+from warp_mca.base.chunks import chunks
 from warp_mca.geometry.boxes import cell_boxes
 
 PATCH = 128  # elements of a patch, and threads of its block

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.elements import Element
-from warp_mca.elements.hexahedron import CHUNK, chunks
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

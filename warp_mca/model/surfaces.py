@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.model.sides import find_sides, is_curved, stiffest_fold
 from warp_mca.scene import Contact, RigidPlane
 
@@ -166,7 +167,7 @@ def _room(slave: Faces, master: Faces, margin: float) -> int:
     again where that face lies aslant to its box or an edge of the slave reaches in; a multiple of LIST_LENGTH."""
 
     def cell(faces: Faces) -> Array:  # area for each node of a grid; the box around a triangle has twice its area
-        return np.where(faces.node[:, 2] == faces.node[:, 3], 2.0, 1.0) * faces.area
+        return np.where(is_triangle(faces.node), 2.0, 1.0) * faces.area
 
     side = float(np.sqrt(cell(master).max())) + 2.0 * margin
     spacing = float(np.sqrt(_node_mean(slave.nodes, slave, cell(slave)).min()))
@@ -179,7 +180,7 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
     corner = face.ravel()
     order = np.argsort(corner, kind="stable")
     again = np.zeros(face.shape, dtype=bool)
-    again[:, 3] = face[:, 2] == face[:, 3]
+    again[:, 3] = is_triangle(face)
     order = order[~again.ravel()[order]]  # a triangle's last corner counts once
     offset = np.searchsorted(corner[order], np.append(nodes, nodes[-1] + 1))
     return offset.astype(np.int32), (order // 4).astype(np.int32)

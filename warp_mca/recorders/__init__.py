@@ -16,14 +16,18 @@ if TYPE_CHECKING:
 
 
 class Kind(NamedTuple):
-    """A recorder that writes a file: its module, its class, and what the command line says of its option."""
+    """A recorder that writes a file: its module, its class, and the help of its option on the command line.
+
+    Its class is called with the file and, where it takes `frames` during the run, with `cadence`.
+    """
 
     module: str
     name: str
     help: str
+    frames: bool = True
 
     def make(self, *args: object, **options: object) -> Recorder:
-        """The recorder; its module, and what that needs, is loaded only now."""
+        """The recorder; its module is imported only now."""
         return getattr(import_module(self.module), self.name)(*args, **options)
 
 
@@ -32,7 +36,9 @@ FILES = {
     "rrd": Kind("warp_mca.recorders.rerun_stream", "RerunStream", "record for the rerun viewer (.rrd)"),
     "usd": Kind("warp_mca.recorders.usd_file", "UsdFile", "write deformed skins as USD (.usdc, .usda)"),
     "vtkhdf": Kind("warp_mca.recorders.vtkhdf_file", "VtkHdfFile", "write all fields for ParaView (.vtkhdf)"),
-    "final": Kind("warp_mca.recorders.mesh_file", "FinalState", "write the last state in a format of meshio (.vtu, …)"),
+    "final": Kind(
+        "warp_mca.recorders.mesh_file", "FinalState", "write the last state in a format of meshio (.vtu, …)", False
+    ),
 }
 _MODULES = {kind.name: kind.module for kind in FILES.values()} | {"SnapshotFile": "warp_mca.recorders.snapshot_file"}
 

@@ -37,7 +37,7 @@ _PACKED = (PALETTE.astype(np.uint32) @ np.array([1 << 24, 1 << 16, 1 << 8], dtyp
 
 
 def levels(value: NDArray[np.floating], limit: float) -> NDArray[np.uint8]:
-    """Nearest palette entry of each value, 255 sqrt(value / limit): 255 at `limit` and above, 0 for what is no number.
+    """Nearest palette entry of each value, 255 sqrt(value / limit): 255 at `limit` and above, 0 for nan.
 
     The root spreads small values: waves of a few MPa show beside a contact of some hundred.
 
@@ -50,7 +50,7 @@ def levels(value: NDArray[np.floating], limit: float) -> NDArray[np.uint8]:
 
 
 def stress_at(share: float, limit: float) -> float:
-    """Value at a share of the palette's length, 0 to 1: what `levels` undoes."""
+    """Value at a share of the palette's length, 0 to 1: the inverse of `levels`."""
     return limit * share**2
 
 
@@ -60,10 +60,10 @@ def packed(value: NDArray[np.floating], limit: float) -> NDArray[np.uint32]:
 
 
 def check_limit(limit: float | None) -> None:
-    """The stress at the upper end of the palette [Pa] must be a finite number above 0, or None.
+    """Check the stress at the upper end of the palette [Pa].
 
     Raises:
-        RequestError: it is none.
+        RequestError: it is neither None nor a finite number above 0.
     """
     if limit is not None and not (is_number(limit) and limit > 0.0):
         raise bad_value("limit", brief(limit), "give the stress at the upper end of the colours, above 0 Pa")

@@ -28,7 +28,7 @@ from warp_mca.recorders.recorder import (
     Volume,
     file_path,
 )
-from warp_mca.results.result import ALL_FILES
+from warp_mca.results.storage import ALL_FILES
 from warp_mca.solve.transfer import Transfer
 
 if TYPE_CHECKING:
@@ -53,10 +53,15 @@ def _files(recorders: Sequence[Recorder]) -> list[Path]:
 
 
 def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None = None) -> None:
-    """Refuse attributes that are none, and outputs that cross: one would write over the other or be a folder above it.
+    """Check the attributes of recorders, and that no two outputs write the same file.
+
+    Args:
+        recorders: of the run.
+        out: folder of the results, or None.
 
     Raises:
-        RequestError: so it is, for files of the recorders, or one of them and the results in `out`.
+        RequestError: an attribute has another type than `Recorder` says; or two files, of recorders or in `out`, are
+            the same, or one is a folder above the other.
     """
     for k, recorder in enumerate(recorders):
         _check_attributes(f"recorders[{k}]", recorder)
@@ -72,7 +77,7 @@ def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | Non
 
 
 def _check_attributes(field: str, recorder: Recorder) -> None:
-    """What a recorder, which may be the user's own, says of itself must be of the kinds that `Recorder` states."""
+    """Raise RequestError for attributes of a recorder that have other types than `Recorder` says."""
     validate.texts(field, name=recorder.name)
     validate.kinds(field, Cadence, "give a Cadence, as Cadence(frames=100)", cadence=recorder.cadence)
     remedy = f"give a frozenset of what frames must hold, out of {', '.join(NEEDS)}"

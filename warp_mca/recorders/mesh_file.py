@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.base.errors import McaError, RequestError, bad_value
-from warp_mca.geometry.degenerate import CORNERS_OF, cell_kinds
+from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MOST_CORNERS, CellType
+from warp_mca.geometry.degenerate import cell_names
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file, file_path
 
 if TYPE_CHECKING:
@@ -34,11 +35,11 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 class FinalState:
     """Writes the last frame: displaced points, hexahedra, the fields at nodes, body and material of each element.
 
-    The file appears once the run has ended as it should, and then whole; what was there before stays until then.
+    The file appears, complete, when the run has ended without an error; an older file stays until then.
     """
 
     def __init__(self, file: str | os.PathLike[str]) -> None:
-        """Write to `file`, in the format that its suffix stands for; one element is written and read for a trial.
+        """Write to `file`, in the format of its suffix; one element is written and read back as a trial.
 
         Raises:
             RequestError: `file` cannot be written, or its format holds no 8-node hexahedra.
@@ -56,7 +57,7 @@ class FinalState:
         self._fields: dict[str, NDArray] | None = None
 
     def start(self, info: RunInfo) -> None:
-        """Make missing folders, and say which fields the format has no place for.
+        """Make missing folders, and warn about fields that the format cannot hold.
 
         Raises:
             RequestError: the folder cannot be made.
@@ -75,7 +76,7 @@ class FinalState:
         self._fields = {name: np.array(field) for name, field in vars(frame.volume).items()}
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Holds nothing that such a file could take."""
+        """Is not written to this file."""
 
     def finish(self, ok: bool) -> None:
         """Write the file; after a run that failed there is no final state, and none is written.
@@ -90,23 +91,23 @@ class FinalState:
             _save(self.path, _mesh(self.path, points, runs, fields, {"body": body, "material": material}))
 
 
-def cells(model: Model) -> tuple[list[tuple[str, NDArray[np.int64]]], NDArray[np.int32], NDArray[np.int32]]:
-    """Runs of cells of one kind, as (kind, nodes); index of each cell's body in the scene; its row in `Model.law`.
+def cells(model: Model) -> tuple[list[tuple[CellType, NDArray[np.int64]]], NDArray[np.int32], NDArray[np.int32]]:
+    """Runs of cells of one type, as (type, nodes); index of each cell's body in the scene; its row in `Model.law`.
 
     Cells come in the order of the concatenated meshes, which is not the model's.
     """
-    nodes = np.full((model.element_count, 8), -1, dtype=np.int64)
+    nodes = np.full((model.element_count, MOST_CORNERS), -1, dtype=np.int64)
     material = np.empty(model.element_count, dtype=np.int32)
     for block in model.blocks:
         index = model.element_of[block.first : block.first + block.conn.shape[1]]
         nodes[index, : len(block.conn)] = block.conn.T
         material[index] = block.material
-    kinds = cell_kinds(nodes)
-    ends = [0, *(np.flatnonzero(kinds[1:] != kinds[:-1]) + 1), len(kinds)]
+    names = cell_names(nodes)
+    ends = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), len(names)]
     runs = []
     for first, end in itertools.pairwise(ends):
-        kind = str(kinds[first])
-        runs.append((kind, nodes[first:end][:, CORNERS_OF[kind]]))
+        cell = CELL_TYPES[str(names[first])]
+        runs.append((cell, nodes[first:end][:, cell.own_corners]))
     start = list(model.element_start.values())
     body = np.searchsorted(start, np.arange(model.element_count), side="right") - 1
     return runs, body.astype(np.int32), material
@@ -129,7 +130,7 @@ def _format(path: Path) -> str:
 def _mesh(
     path: Path,
     points: NDArray,
-    runs: list[tuple[str, NDArray]],
+    runs: list[tuple[CellType, NDArray]],
     fields: Mapping[str, NDArray],
     cell_fields: Mapping[str, NDArray],
 ) -> meshio.Mesh:
@@ -141,7 +142,7 @@ def _mesh(
         at_points |= {f"stress_{name}": np.ascontiguousarray(stress[:, k]) for k, name in enumerate(COMPONENTS)}
     ends = np.cumsum([len(nodes) for _, nodes in runs])[:-1]
     at_cells: dict[str, list[ArrayLike]] = {name: list(np.split(field, ends)) for name, field in cell_fields.items()}
-    blocks: list[Any] = list(runs)
+    blocks: list[Any] = [(cell.meshio, nodes) for cell, nodes in runs]
     return _load_meshio().Mesh(points, blocks, point_data=at_points, cell_data=at_cells)
 
 
@@ -157,18 +158,18 @@ def _try(path: Path) -> tuple[list[str], list[str]]:
     Raises:
         RequestError: the element does not come back.
     """
-    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+    points = np.array(HEXAHEDRON.natural, dtype=float)
     widths = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
-    fields = {name: np.zeros((8, *width), np.float32) for name, width in widths.items()}
-    nodes, index = np.arange(8)[None], np.zeros(1, dtype=np.int32)
-    mesh = _mesh(path, points, [("hexahedron", nodes)], fields, {"body": index, "material": index})
+    fields = {name: np.zeros((len(points), *width), np.float32) for name, width in widths.items()}
+    nodes, index = np.arange(len(points))[None], np.zeros(1, dtype=np.int32)
+    mesh = _mesh(path, points, [(HEXAHEDRON, nodes)], fields, {"body": index, "material": index})
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / path.name
         try:
             _write(trial, mesh)
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
                 read = _load_meshio().read(trial)
-            if [block.type for block in read.cells] != ["hexahedron"] or (read.cells[0].data != nodes).any():
+            if [block.type for block in read.cells] != [HEXAHEDRON.meshio] or (read.cells[0].data != nodes).any():
                 raise ValueError("they do not come back")
             parts = [part.name for part in trial.parent.iterdir()]
         except (Exception, SystemExit) as error:  # its writers and readers raise whatever went wrong, or exit
@@ -182,7 +183,7 @@ def _try(path: Path) -> tuple[list[str], list[str]]:
 
 
 def _save(path: Path, mesh: meshio.Mesh) -> None:
-    """Write beside `path` first and then rename, so that the file there is whole at any time.
+    """Write beside `path` first and then rename, so that the file there is complete at any time.
 
     Raises:
         McaError: meshio or the disk fails.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import check_folder, given_path
 from warp_mca.base.validate import brief, is_list, is_number
+from warp_mca.geometry.cell_types import is_triangle, triangulated
 from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
@@ -87,13 +88,12 @@ class SurfaceMesh:
     @cached_property
     def triangles(self) -> Index:
         """The faces, quadrilaterals cut in two, shape (triangle_count, 3), int32."""
-        four = self.quads[:, 2] != self.quads[:, 3]
-        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[four][:, [0, 2, 3]]]).astype(np.int32)
+        return triangulated(self.quads)
 
     @property
     def corner_counts(self) -> Index:
         """Corners of each face: 4, or 3 for triangles, shape (face_count,), int32."""
-        return np.where(self.quads[:, 2] == self.quads[:, 3], 3, 4).astype(np.int32)
+        return np.where(is_triangle(self.quads), 3, 4).astype(np.int32)
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ class RerunStream:
             viewer_options: of rerun's own program, such as --headless.
 
         Raises:
-            RequestError: `file` cannot be written, there is nowhere to send to, or a value is none of its kind.
+            RequestError: `file` cannot be written, neither file nor viewer is given, or a value has the wrong type.
         """
         kinds("RerunStream", bool, "give True or False", viewer=viewer)
         members("RerunStream", str, viewer_options=viewer_options)

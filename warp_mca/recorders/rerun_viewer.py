@@ -157,7 +157,7 @@ def recording_in(path: Path) -> Path:
     """The recording that `path` is, or the newest one in the folder `path`.
 
     Raises:
-        RequestError: there is none.
+        RequestError: the folder holds no recording.
     """
     if path.is_file():
         return path

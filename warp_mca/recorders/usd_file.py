@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import nearest
-from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, check_limit, levels
+from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, apart, check_file
+from warp_mca.recorders.usd_prims import BodyPrim, ContactPrim
 
 if TYPE_CHECKING:
-    from warp_mca.recorders.recorder import Frame, RunInfo, SurfaceMesh
+    from warp_mca.recorders.recorder import Frame, RunInfo
 
 FRAMES = Cadence(frames=100)
 SAVE_EVERY = 5  # frames: what a killed run may lack; a save costs more than a frame
@@ -49,7 +50,7 @@ class UsdFile:
             limit: stress at the upper end of the colours [Pa], see `ColourScale`.
 
         Raises:
-            RequestError: `file` cannot be written, or the limit is none.
+            RequestError: `file` cannot be written, or the limit is not a number above 0.
         """
         check_limit(limit)
         self.path = check_file("usd", file, ".usdc", ".usd", ".usda")
@@ -63,16 +64,16 @@ class UsdFile:
     def _reset(self) -> None:
         self.times: list[float] = []
         self.limits: list[float] = []
-        self.bodies: dict[str, _Body] = {}
+        self.bodies: dict[str, BodyPrim] = {}
         self.stage: Any = None
         self.contact: Any = None
         self.saved_count = self.unsaved_count = 0  # frames that the file holds, and lacks
 
     def check(self, info: RunInfo) -> None:
-        """Load USD; refuse a disk that is full.
+        """Load USD, and check the disk.
 
         Raises:
-            RequestError: so it is.
+            RequestError: the disk is full.
         """
         with _signals_held():
             from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401
@@ -103,9 +104,9 @@ class UsdFile:
         self.stage.SetDefaultPrim(world.GetPrim())
         contact, *names = apart(["contact", *map(Tf.MakeValidIdentifier, info.surfaces)])
         for name, (body, surface) in zip(names, info.surfaces.items(), strict=True):
-            self.bodies[body] = _Body(UsdGeom.Mesh.Define(self.stage, f"/World/{name}"), body, surface)
+            self.bodies[body] = BodyPrim(UsdGeom.Mesh.Define(self.stage, f"/World/{name}"), body, surface)
         size = float(np.ptp(np.concatenate([info.model.X[s.nodes] for s in info.surfaces.values()]), axis=0).max())
-        self.contact = _Contact(UsdGeom.Points.Define(self.stage, f"/World/{contact}"), POINT_SIZE * size)
+        self.contact = ContactPrim(UsdGeom.Points.Define(self.stage, f"/World/{contact}"), POINT_SIZE * size)
         try:
             self._save()
         except OSError as error:
@@ -134,7 +135,7 @@ class UsdFile:
                 self._save()
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Has no place in this file."""
+        """Is not written to this file."""
 
     def finish(self, ok: bool) -> None:
         """Save what is left; a file without a frame is removed.
@@ -156,7 +157,7 @@ class UsdFile:
     def _save(self) -> None:
         from pxr import Tf, Vt
 
-        self.unsaved_count = 0  # what cannot be saved now is not tried again
+        self.unsaved_count = 0  # frames that cannot be saved now are not tried again
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
             raise OSError(FULL)
         self.stage.SetStartTimeCode(0.0)
@@ -178,61 +179,6 @@ class UsdFile:
             self.path.unlink(missing_ok=True)
             raise OSError(f"{_reason(error)}; the broken file is removed") from error
         self.saved_count = len(self.times)
-
-
-class _Body:
-    """A skin as a mesh."""
-
-    def __init__(self, mesh: Any, name: str, surface: SurfaceMesh) -> None:
-        from pxr import Sdf, UsdGeom, Vt
-
-        self.mesh = mesh
-        mesh.GetPrim().SetDisplayName(name)
-        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(surface.corner_counts))
-        corners = surface.quads[np.arange(4) < surface.corner_counts[:, None]]
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(corners)))
-        self.points, self.extent = mesh.CreatePointsAttr(), mesh.CreateExtentAttr()
-        self.colour = _colours(mesh, _linear(PALETTE / 255.0))
-        primvars = UsdGeom.PrimvarsAPI(mesh)
-        float_array = Sdf.ValueTypeNames.FloatArray
-        self.stress, self.plastic = (
-            primvars.CreatePrimvar(name, float_array, UsdGeom.Tokens.vertex) for name in ("vonMises", "plasticStrain")
-        )
-        self.plastic_max = -1.0
-
-    def write(self, code: Any, points: NDArray, von_mises: NDArray, plastic: NDArray, limit: float) -> None:
-        from pxr import Vt
-
-        _place(self, code, points)
-        self.colour.Set(Vt.IntArray.FromNumpy(levels(von_mises, limit).astype(np.int32)), code)
-        self.stress.Set(Vt.FloatArray.FromNumpy(_rounded(von_mises)), code)
-        # Plastic strain only grows, and held values fill the gaps: what does not change costs nothing.
-        if (greatest := float(plastic.sum(dtype=np.float64))) != self.plastic_max:
-            if self.plastic_max >= 0.0 and self._held != code.GetValue() - 1:
-                self.plastic.Set(self._last, code.GetValue() - 1)  # USD interpolates: end the time without change
-            self._last = Vt.FloatArray.FromNumpy(_rounded(plastic))
-            self.plastic.Set(self._last, code)
-            self.plastic_max, self._held = greatest, code.GetValue()
-
-
-class _Contact:
-    """Slave nodes in contact as points."""
-
-    def __init__(self, prim: Any, width: float) -> None:
-        from pxr import UsdGeom
-
-        prim.CreateWidthsAttr([width])
-        prim.SetWidthsInterpolation(UsdGeom.Tokens.constant)
-        self.points, self.extent = prim.CreatePointsAttr(), prim.CreateExtentAttr()
-        rgb = [[(colour >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)] for colour in (SLIP, STICK)]
-        self.colour = _colours(prim, _linear(np.array(rgb)))
-
-    def write(self, code: Any, points: NDArray, stick: NDArray) -> None:
-        from pxr import Vt
-
-        _place(self, code, points)
-        self.colour.Set(Vt.IntArray.FromNumpy(stick.astype(np.int32)), code)
 
 
 def _new_stage(path: str) -> Any:
@@ -264,7 +210,7 @@ def _is_utf8(name: str) -> bool:
 
 @contextmanager
 def _signals_held() -> Iterator[None]:
-    """Let signals that stop a run act only afterwards: what they raise cuts a frame in two, and breaks pxr's import."""
+    """Delay signals that stop a run: in between, they would leave half a frame or a broken import of pxr."""
     held: list[int] = []
     main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if main_thread else ()
@@ -276,35 +222,6 @@ def _signals_held() -> Iterator[None]:
             signal.signal(number, handler or signal.SIG_DFL)
         for number in held[:1]:
             signal.raise_signal(number)
-
-
-def _place(item: _Body | _Contact, code: Any, points: NDArray) -> None:
-    """Set points and their extent."""
-    from pxr import Vt
-
-    item.points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points)), code)
-    box = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), dtype=np.float32)
-    item.extent.Set(Vt.Vec3fArray.FromNumpy(box), code)
-
-
-def _colours(prim: Any, palette: NDArray) -> Any:
-    """Author the static palette; the attribute that takes each frame's indices into it."""
-    from pxr import UsdGeom, Vt
-
-    colour = prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-    colour.Set(Vt.Vec3fArray.FromNumpy(palette.astype(np.float32)))
-    return colour.CreateIndicesAttr()
-
-
-def _linear(srgb: NDArray) -> NDArray:
-    """Linear colours of sRGB ones (IEC 61966-2-1), both 0 to 1."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-
-
-def _rounded(value: NDArray) -> NDArray[np.float32]:
-    """Values rounded to 256 of them, which USD stores in a byte or less each."""
-    greatest = float(value.max(initial=0.0))
-    return np.float32(greatest) * (levels(value, greatest).astype(np.float32) / np.float32(255.0)) ** 2
 
 
 def _vertical(info: RunInfo) -> int:

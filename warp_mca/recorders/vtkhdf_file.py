@@ -2,9 +2,9 @@
 
 https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/vtkhdf_specifications.html
 
-HDF5 promises nothing about a file whose writer is killed, or whose disk is full, while it grows. So this one never
-grows: all frames that the run will have get their place before it begins, in a file that stays sparse until they come.
-A frame then is plain data written to where it belongs, and after that the number of steps, in place.
+A file that grows may be unreadable after its writer is killed or its disk is full. This one never grows: space for
+all frames is reserved before the run, in a sparse file. Each frame is written to its place, and then the number of
+steps is raised.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     _Datasets = dict[str, h5py.Dataset]
 
 FRAMES = Cadence(frames=100)
-VTK_TYPES = {"tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14}
 FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
 
 
@@ -106,7 +105,7 @@ class VtkHdfFile:
             raise OSError(f"{_reason(error)}; the file holds the {self.frame_count} frames before") from error
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Has no place in this file; ParaView opens history.csv."""
+        """Is not written to this file; ParaView opens history.csv."""
 
     def finish(self, ok: bool) -> None:
         """Close the file.
@@ -148,9 +147,9 @@ class VtkHdfFile:
         file.flush()
 
     def _abandon(self) -> None:
-        """Let go of a file that HDF5 may be unable to close, and of one that never got a frame."""
+        """Close a file that HDF5 may be unable to write, and remove one without frames."""
         if self._file is not None:
-            # HDF5 would try again to write what it could not, at last when Python exits, and crash: let it succeed.
+            # HDF5 writes again what failed when Python exits, and crashes; writing to the null device succeeds.
             null = os.open(os.devnull, os.O_RDWR)
             os.dup2(null, self._file.id.get_vfd_handle())
             os.close(null)
@@ -198,7 +197,7 @@ def _write_mesh(root: h5py.Group, model: Model) -> None:
     root["Points"] = model.X
     root["Connectivity"] = np.concatenate([nodes.ravel() for _, nodes in runs])
     root["Offsets"] = np.append(0, np.cumsum(sizes))
-    root["Types"] = np.concatenate([np.full(len(nodes), VTK_TYPES[kind], dtype=np.uint8) for kind, nodes in runs])
+    root["Types"] = np.concatenate([np.full(len(nodes), cell.vtk, dtype=np.uint8) for cell, nodes in runs])
     root["CellData/body"] = body
     root["CellData/body"].attrs["names"] = list(model.element_start)
     root["CellData/material"] = material

@@ -13,11 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.results.force_history import contact_intervals, unfinished
+from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Contact, RigidPlane
 
 Array = NDArray[np.float64]
 
 ONE_WAY = 0.1  # least share of the normal forces that their vector sum keeps, for them to have a direction
+_COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` that they hold
+    "force_N": "force",
+    "pressure_N": "pressure",
+    "normal_force_N": "normal_force",
+    "closing_speed": "closing_speed",
+}
 OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
 
 
@@ -136,27 +143,14 @@ def _off_axis(name: str, true: Array, normal: Array, tangent: Array) -> list[str
 
 def save_contacts(file: Path, time: Array, contacts: Sequence[ContactHistory]) -> None:
     """Write time_s, and for each contact NAME/force_N and the other arrays of `ContactHistory`, as an npz archive."""
-    arrays: dict[str, Array] = {"time_s": time}
-    for contact in contacts:
-        arrays[f"{contact.name}/force_N"] = contact.force
-        arrays[f"{contact.name}/pressure_N"] = contact.pressure
-        arrays[f"{contact.name}/normal_force_N"] = contact.normal_force
-        arrays[f"{contact.name}/closing_speed"] = contact.closing_speed
-    with file.open("wb") as stream:
-        np.savez(stream, **arrays)  # pyright: ignore[reportArgumentType]
+    columns = {contact.name: {key: getattr(contact, field) for key, field in _COLUMNS.items()} for contact in contacts}
+    save_histories(file, time, columns)
 
 
 def load_contacts(file: str | os.PathLike[str]) -> tuple[ContactHistory, ...]:
     """The contacts that `save_contacts` wrote."""
-    with np.load(file) as arrays:
-        names = [key.removesuffix("/force_N") for key in arrays if key.endswith("/force_N")]
-        return tuple(
-            ContactHistory(
-                name=name,
-                force=arrays[f"{name}/force_N"],
-                pressure=arrays[f"{name}/pressure_N"],
-                normal_force=arrays[f"{name}/normal_force_N"],
-                closing_speed=arrays[f"{name}/closing_speed"],
-            )
-            for name in names
-        )
+    found = load_histories(file, *_COLUMNS)
+    return tuple(
+        ContactHistory(name=name, **dict(zip(_COLUMNS.values(), columns, strict=True)))
+        for name, columns in found.items()
+    )

@@ -12,21 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.elements.hexahedron import shape_functions
-from warp_mca.elements.tet4 import gradients
-from warp_mca.geometry.boxes import cell_boxes
+from warp_mca.geometry.boxes import Boxes, cell_boxes
+from warp_mca.geometry.cell_types import MOST_CORNERS
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.point_location import LOCATE
+from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Line, Path, Scene
-
-MOST_PROBES = 100_000  # of a line
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 Array = NDArray[np.float64]
 
-CANDIDATES = 64  # elements near a probe that are tried: long thin ones have their centres far away
-OUTSIDE = 0.05  # of an element's diagonal that a probe may lie outside: curved surfaces have flat faces
+MOST_PROBES = 100_000  # of a line
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,6 @@ class PathHistory:
 
 
 Place = tuple[NDArray[np.int32], Array]  # corners of the cells around the probes of a line, and their weights
-Boxes = tuple[Array, Array]  # as from `cell_boxes`
 Found = dict[tuple[int, Line, float], Place]  # by mesh, line and spacing
 
 
@@ -86,9 +83,9 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
         RequestError: a probe lies outside its body.
     """
     position: dict[str, Array] = {}
-    corner, weight = [np.zeros((0, 8), np.int32)], [np.zeros((0, 8))]
+    corner, weight = [np.zeros((0, MOST_CORNERS), np.int32)], [np.zeros((0, MOST_CORNERS))]
     found = {} if found is None else found
-    boxes: dict[str, list[Boxes]] = {}
+    boxes: dict[str, dict[str, Boxes]] = {}
     for path in scene.paths:
         along = []
         for line in path.lines:
@@ -102,7 +99,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
             if key not in found:
                 at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
                 if line.body not in boxes:
-                    boxes[line.body] = [cell_boxes(mesh.points, cells) for cells in (mesh.hexahedra, mesh.tetrahedra)]
+                    boxes[line.body] = {name: cell_boxes(mesh.points, cells) for name, cells in mesh.cells.items()}
                 found[key] = _elements_around(at, mesh, boxes[line.body], path)
             nodes, weights = found[key]
             along.append(line.position + share * line.length)
@@ -112,17 +109,13 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
     return Probes(position, np.concatenate(corner), np.concatenate(weight))
 
 
-def _elements_around(at: Array, mesh: Mesh, boxes: Sequence[Boxes], path: Path) -> Place:
-    """Corners of the cell around each point, shape (point_count, 8), and their weights there.
+def _elements_around(at: Array, mesh: Mesh, boxes: Mapping[str, Boxes], path: Path) -> Place:
+    """Corners of the cell around each point, shape (point_count, MOST_CORNERS), and their weights there.
 
     Raises:
         RequestError: a point lies outside the mesh.
     """
-    found = []
-    if len(mesh.hexahedra):
-        found.append(_in_hexahedra(at, mesh, boxes[0]))
-    if len(mesh.tetrahedra):
-        found.append(_in_tetrahedra(at, mesh, boxes[1]))
+    found = [LOCATE[name](at, mesh.points, cells, boxes[name]) for name, cells in mesh.cells.items() if len(cells)]
     corners, weights, apart, allowed = (np.stack(parts) for parts in zip(*found, strict=True))
     rows = np.arange(len(at))
     best = (apart - allowed).argmin(axis=0)
@@ -132,68 +125,6 @@ def _elements_around(at: Array, mesh: Mesh, boxes: Sequence[Boxes], path: Path) 
         place = ", ".join(f"{x:.6g}" for x in at[far])
         raise bad_value(f"Path {path.name}.lines", f"({place})", f"this point lies {apart[far]:.3g} m outside the body")
     return corners[best, rows], weights[best, rows]
-
-
-def _nearest(at: Array, points: Array, cells: NDArray[np.int32], boxes: Boxes) -> NDArray[np.intp]:
-    """The cells whose centres lie nearest to each point, shape (point_count, candidate_count).
-
-    Only cells near the line are looked at, unless there are none: then the message tells how far it runs outside.
-    """
-    from scipy.spatial import KDTree
-
-    lower, upper = boxes
-    margin = OUTSIDE * np.linalg.norm(upper - lower, axis=0)
-    beside = (lower - margin > at.max(axis=0)[:, None]) | (upper + margin < at.min(axis=0)[:, None])
-    index = np.flatnonzero(~beside.any(axis=0))
-    index = index if len(index) else np.arange(len(cells))
-    _, near = KDTree(points[cells[index]].mean(axis=1)).query(at, k=min(CANDIDATES, len(index)))
-    return index[np.asarray(near).reshape(len(at), -1)]
-
-
-def _in_hexahedra(at: Array, mesh: Mesh, boxes: Boxes) -> tuple[NDArray[np.int32], Array, Array, Array]:
-    """Best hexahedron for each point: corners, weights, distance from the point [m], and what may count as none."""
-    near = _nearest(at, mesh.points, mesh.hexahedra, boxes)
-    x = mesh.points[mesh.hexahedra[near]]  # (point, candidate, corner, axis)
-    # No point of an element is nearer than its box: few candidates remain.
-    gap = np.linalg.norm(at[:, None] - np.clip(at[:, None], x.min(axis=2), x.max(axis=2)), axis=2)
-    apart, weight = np.full(near.shape, np.inf), np.zeros((*near.shape, 8))
-    round_off = 1e-12 * np.ptp(x)
-    tried = gap <= gap.min(axis=1, keepdims=True) + round_off
-    while tried.any():
-        weight[tried], apart[tried] = _weights(np.repeat(at, tried.sum(axis=1), axis=0), x[tried])
-        tried = np.isinf(apart) & (gap <= apart.min(axis=1, keepdims=True) + round_off)
-    alike = apart <= apart.min(axis=1, keepdims=True) + round_off  # a point on a face: the first of its cells
-    best, rows = np.where(alike, near, len(mesh.hexahedra)).argmin(axis=1), np.arange(len(at))
-    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
-    return mesh.hexahedra[near[rows, best]], weight[rows, best], apart[rows, best], allowed
-
-
-def _weights(at: Array, x: Array) -> tuple[Array, Array]:
-    """Shape functions at the place in a hexahedron nearest to a point, shape (count, 8), and its distance [m]."""
-    xi = np.zeros_like(at)
-    for _ in range(8):  # Newton's method on x(xi) = at, kept within the element
-        value, slope = shape_functions(xi)
-        J = np.einsum("cak,cai->cik", slope, x)
-        missing = at - np.einsum("ca,cai->ci", value, x)
-        # the Jacobian has no inverse where corners of a wedge or a pyramid coincide
-        xi = np.clip(xi + (np.linalg.pinv(J) @ missing[..., None])[..., 0], -1.0, 1.0)
-    value, _ = shape_functions(xi)
-    return value, np.linalg.norm(at - np.einsum("ca,cai->ci", value, x), axis=-1)
-
-
-def _in_tetrahedra(at: Array, mesh: Mesh, boxes: Boxes) -> tuple[NDArray[np.int32], Array, Array, Array]:
-    """The same of tetrahedra, with their last corner repeated at no weight."""
-    near = _nearest(at, mesh.points, mesh.tetrahedra, boxes)
-    x = mesh.points[mesh.tetrahedra[near]]
-    slope = gradients(x.reshape(-1, 4, 3)).reshape(x.shape)
-    weight = np.einsum("pcai,pci->pca", slope, at[:, None] - x.mean(axis=2)) + 0.25
-    weight = np.clip(weight, 0.0, None)
-    weight /= weight.sum(axis=-1, keepdims=True)
-    apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", weight, x), axis=-1)
-    best, rows = apart.argmin(axis=1), np.arange(len(at))
-    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
-    nodes = mesh.tetrahedra[near[rows, best]][:, [0, 1, 2, 3, 3, 3, 3, 3]]
-    return nodes, np.pad(weight[rows, best], ((0, 0), (0, 4))), apart[rows, best], allowed
 
 
 def path_histories(probes: Probes, rings: Sequence[NDArray[np.float32]]) -> tuple[PathHistory, ...]:
@@ -207,17 +138,14 @@ def path_histories(probes: Probes, rings: Sequence[NDArray[np.float32]]) -> tupl
 
 def save_paths(file: FilePath, time: Array, paths: Sequence[PathHistory]) -> None:
     """Write time_s, and for each path NAME/position_m, NAME/stress_Pa and NAME/von_mises_Pa, as an npz archive."""
-    arrays: dict[str, NDArray] = {"time_s": time}
-    for path in paths:
-        arrays[f"{path.name}/position_m"] = path.position
-        arrays[f"{path.name}/stress_Pa"] = path.stress
-        arrays[f"{path.name}/von_mises_Pa"] = path.von_mises
-    with file.open("wb") as stream:
-        np.savez(stream, **arrays)  # pyright: ignore[reportArgumentType]
+    columns = {
+        path.name: {"position_m": path.position, "stress_Pa": path.stress, "von_mises_Pa": path.von_mises}
+        for path in paths
+    }
+    save_histories(file, time, columns)
 
 
 def load_paths(file: str | os.PathLike[str]) -> tuple[PathHistory, ...]:
     """The paths that `save_paths` wrote."""
-    with np.load(file) as arrays:
-        names = [key.removesuffix("/position_m") for key in arrays if key.endswith("/position_m")]
-        return tuple(PathHistory(n, arrays[f"{n}/position_m"], arrays[f"{n}/stress_Pa"]) for n in names)
+    found = load_histories(file, "position_m", "stress_Pa")
+    return tuple(PathHistory(name, *columns) for name, columns in found.items())

@@ -1,28 +1,17 @@
-"""Owns what a run leaves behind: `Result`, its summary, and the folder it is saved in and loaded from."""
+"""Owns what a run leaves behind: `Result`, and the figures of its summary."""
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import json
-import os
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from warp_mca.base.errors import McaError, RequestError, bad_value
-from warp_mca.base.files import check_folder, given_path
-from warp_mca.base.folder import Folder, held
-from warp_mca.base.validate import DAMAGE
-from warp_mca.results.contact_history import ContactHistory, load_contacts, save_contacts
+from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.force_history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
-from warp_mca.results.paths import PathHistory, load_paths, save_paths
+from warp_mca.results.paths import PathHistory
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -39,11 +28,6 @@ HISTORY_COLUMNS = (
     "E_friction",
     "E_total_error",
 )  # of every history.csv; a run adds some, see docs/outputs.md
-FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
-CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
-PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
-ALL_FILES = FILES + CONTACT_FILES + PATH_FILES
-DIGESTS = "files"  # key of summary.json: SHA-256 of each other file of the run, by its name
 
 
 @dataclass(frozen=True)
@@ -94,7 +78,7 @@ class Result:
 
 @dataclass(frozen=True, kw_only=True)
 class RunFacts:
-    """What the simulation alone knows and the summary reports. What a scene lacks is None.
+    """Figures of a run that the summary reports and the history does not hold; None where a scene lacks them.
 
     Attributes:
         scene: its name.
@@ -174,185 +158,3 @@ def summarise(history: Mapping[str, Array], facts: RunFacts, pairs: Sequence[Con
         "version": __version__,
         **facts.more,
     }
-
-
-def check_output(directory: str | os.PathLike[str], *, force: bool = False) -> Path:
-    """The folder as a path, when results may be written there.
-
-    Raises:
-        RequestError: it is a file, cannot be written to, or holds results and `force` is off.
-    """
-    path = folder_path("out", directory)
-    check_folder("out", path)
-    _check_free(path, force)
-    return path
-
-
-def _check_free(path: Path, force: bool) -> None:
-    for name in ALL_FILES:
-        if (path / name).is_dir():
-            raise bad_value("out", str(path), f"{name} is a folder there; name another folder")
-        if not force and (path / name).exists():
-            remedy = "it holds results already; name another folder, or use --force (force=True)"
-            raise bad_value("out", str(path), remedy)
-
-
-@contextmanager
-def hold(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[Folder]:
-    """Hold the folder of a run's results from its start to its end; it is made if need be.
-
-    Raises:
-        RequestError: as in `check_output`; or another run holds it.
-    """
-    with held(check_output(directory, force=force)) as folder:
-        _check_free(folder.path, force)  # another run may have saved there between check and lock
-        yield folder
-
-
-def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
-    """Write summary.json, history.csv and the figures, all or none of them.
-
-    Args:
-        result: of a run.
-        directory: is made if need be.
-        force: replace results that are there already; other files stay.
-
-    Returns:
-        The result with its `path` set, and with the time that writing took in wall.output.
-
-    Raises:
-        RequestError: as in `check_output`; or another run writes to the folder.
-        McaError: the disk is full or fails.
-    """
-    with hold(directory, force=force) as folder:
-        return write(result, folder, force=force)
-
-
-def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
-    """As `save`, to a folder that is held already."""
-    from warp_mca.report.energies import save_energies
-    from warp_mca.report.forces import save_forces
-    from warp_mca.report.paths import save_path_figures
-
-    path = folder.path
-    try:
-        folder.renew()
-        _check_free(path, force)
-        with folder.staging() as staging:
-            written = staging / "results"
-            written.mkdir()
-            begun = time.perf_counter()
-            _write_history(written / "history.csv", result.history)
-            save_forces(written / "forces.png", result)
-            save_energies(written / "energies.png", result)
-            if result.contacts:
-                save_contacts(written / "forces.npz", result.time, result.contacts)
-            if result.paths:
-                save_paths(written / "paths.npz", result.time, result.paths)
-                save_path_figures(written, result)
-            digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
-            result = _with_output_time(result, path, time.perf_counter() - begun)
-            summary = {**result.summary, "warnings": list(result.warnings), DIGESTS: digests}
-            text = json.dumps(summary, indent=2, default=_plain)
-            (written / "summary.json").write_text(text + "\n", encoding="utf-8")
-            folder.put(written, ALL_FILES)
-    except OSError as error:
-        raise McaError(f"the results could not be written to {path}: {error.strerror or error}") from error
-    return result
-
-
-def _digest(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def load(directory: str | os.PathLike[str]) -> Result:
-    """The result that a run saved in `directory`.
-
-    Raises:
-        RequestError: there is none, its files cannot be read, or they are of different runs.
-    """
-    path = folder_path("results", directory)
-    try:
-        summary = json.loads((path / "summary.json").read_text(encoding="utf-8"))
-        warnings, digests = tuple(summary.pop("warnings", ())), summary.pop(DIGESTS, None)
-        history = _read_history(path / "history.csv")
-        paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
-        contacts = load_contacts(path / "forces.npz") if (path / "forces.npz").exists() else ()
-        strange = _of_other_runs(path, digests)
-    except FileNotFoundError as error:
-        raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
-    except DAMAGE as error:
-        raise bad_value("results", str(path), "its files are damaged; run again") from error
-    if strange:
-        remedy = f"{strange[0]} was changed, or is not of the run that summary.json is of; run again"
-        raise bad_value("results", str(path), remedy)
-    return Result(summary, history, path, warnings, paths, contacts=contacts)
-
-
-def _of_other_runs(path: Path, digests: Mapping[str, str] | None) -> list[str]:
-    """Names of the files with data in `path` that differ from those of the run whose `digests` these are."""
-    if digests is None:  # results of an earlier version
-        return []
-    found = [name for name in ("history.csv", "forces.npz", "paths.npz") if (path / name).exists()]
-    return [name for name in found if digests.get(name) != _digest(path / name)]
-
-
-def folder_path(field: str, directory: object) -> Path:
-    """The folder that the user named `field`.
-
-    Raises:
-        RequestError: it is no path.
-    """
-    return given_path(field, directory, "name a folder, or . for this one")
-
-
-def _read_history(path: Path) -> dict[str, Array]:
-    """The columns of history.csv.
-
-    Raises:
-        ValueError: it has other columns than a run writes, no rows, or no end.
-        OSError: it cannot be read, or is empty.
-    """
-    with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        whole = file.read() == b"\n"
-    with path.open(encoding="utf-8") as file:
-        names = file.readline().strip().split(",")
-        if not (whole and tuple(names[: len(HISTORY_COLUMNS)]) == HISTORY_COLUMNS and len(set(names)) == len(names)):
-            raise ValueError(names)
-        first = file.readline()
-        if not first:
-            raise ValueError("no rows")
-        rows = np.loadtxt(chain([first], file), delimiter=",", dtype=np.float64, comments=None, ndmin=2)
-        rows = rows.reshape(-1, len(names))
-    return dict(zip(names, rows.T.copy(), strict=True))
-
-
-def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
-    """The result as saved in `path`, with the time that writing it took added to wall.output."""
-    summary = dict(result.summary)
-    wall = summary.get("wall")
-    if isinstance(wall, Mapping):
-        summary["wall"] = {**wall, "output": wall.get("output", 0.0) + seconds}
-    return dataclasses.replace(result, summary=summary, path=path)
-
-
-def _write_history(path: Path, history: Mapping[str, Array]) -> None:
-    missing = [name for name in HISTORY_COLUMNS if name not in history]
-    if missing:
-        raise RequestError(f"history: the columns {', '.join(missing)} are missing; give every one of HISTORY_COLUMNS")
-    names = [*HISTORY_COLUMNS, *(name for name in history if name not in HISTORY_COLUMNS)]
-    rows = np.column_stack([np.asarray(history[name], dtype=np.float64) for name in names])
-    # repr gives the shortest text that reads back as the same float64.
-    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _plain(value: object) -> object:
-    """NumPy numbers and arrays, tuples and mappings as JSON knows them."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return dict(value)
-    return str(value)

@@ -13,7 +13,8 @@ from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.folder import held
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.results.result import ALL_FILES, Result, check_output, folder_path, save
+from warp_mca.results.result import Result
+from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
 from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_of, teller
 from warp_mca.runs.settings import settings_of
 from warp_mca.runs.simulation import simulate

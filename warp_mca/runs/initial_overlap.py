@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry.cell_types import triangulated
 from warp_mca.kernels.contact.inside import depths_inside
 from warp_mca.results.contact_history import contact_names
 from warp_mca.scene import OVERLAP_CHOICES, RigidPlane
@@ -112,12 +113,11 @@ def _deep_overlap(ready: Prepared, stage: ContactStage, scene: int, solver: Solv
 def _depths_inside(points: Array, body: Array, quads: NDArray[np.int32]) -> Array:
     """Depth of points below the surface of a body, negative outside [m], shape (point_count,), to float32's digits."""
     origin = body.mean(axis=0)
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[quads[:, 2] != quads[:, 3]][:, [0, 2, 3]]])
     reach = float(np.linalg.norm(np.ptp(body, axis=0)))
     with wp.ScopedDevice("cpu"):
         surface = wp.Mesh(
             wp.array((body - origin).astype(np.float32), dtype=wp.vec3f),
-            wp.array(triangles.ravel().astype(np.int32), dtype=wp.int32),
+            wp.array(triangulated(quads).ravel(), dtype=wp.int32),
             support_winding_number=True,
         )
         distance = wp.zeros(len(points), dtype=wp.float32)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
-from warp_mca.geometry.degenerate import tetrahedral
+from warp_mca.geometry.degenerate import cut_to
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.runs.arguments import check_scene
 from warp_mca.scene import Body, Scene
@@ -74,6 +74,5 @@ def _key(geometry: object) -> object:
 
 
 def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
-    """The meshes, cut to tetrahedra where a body's formulation takes them."""
-    cut = {body.name for body in scene.bodies if ELEMENTS[body.element].corners == 4}
-    return {name: tetrahedral(mesh) if name in cut else mesh for name, mesh in meshes.items()}
+    """The meshes, cut to the cell type of each body's element where that is possible."""
+    return {body.name: cut_to(meshes[body.name], ELEMENTS[body.element].cell) for body in scene.bodies}

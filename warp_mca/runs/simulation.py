@@ -12,7 +12,8 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.precision import check_range
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results.paths import Found
-from warp_mca.results.result import Result, check_output, hold, write
+from warp_mca.results.result import Result
+from warp_mca.results.storage import check_output, hold, write
 from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
 from warp_mca.runs.meshing import mesh

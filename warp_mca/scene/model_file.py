@@ -142,8 +142,8 @@ def _check_unpacked(path: Path) -> None:
     """Refuse a file that would unpack to more than meshes of its size do, or than memory holds.
 
     Raises:
-        RequestError: so it is.
-        zipfile.BadZipFile: it is no archive.
+        RequestError: its content is larger than that.
+        zipfile.BadZipFile: it is not an archive.
     """
     packed = path.stat().st_size
     with zipfile.ZipFile(path) as archive:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.geometry.degenerate import AS_HEXAHEDRON, oriented
+from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.verify.case import Row, Setup, case
 
@@ -108,8 +108,8 @@ def mixed_cube() -> Mesh:
     kept = [c for c in range(8) if c not in column and (box.hexahedra[c] != corners).any()]
     hexahedra = [box.hexahedra[kept]]
     for kind, cells in (("wedge", wedges), ("pyramid", pyramids)):
-        hexahedra.append(oriented(points, np.array(cells), kind)[:, AS_HEXAHEDRON[kind]])
-    tetrahedra = oriented(points, np.array(tetrahedra), "tetra")
+        hexahedra.append(stored(points, np.array(cells), kind))
+    tetrahedra = stored(points, np.array(tetrahedra), "tetrahedron")
     return Mesh(points, np.concatenate(hexahedra).astype(np.int32), {}, {}, tetrahedra)
 
 

@@ -1,0 +1,144 @@
+"""Owns the commands and options of the command line, and their help."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import NoReturn
+
+import warp_mca as mca
+from warp_mca.cli import commands, run
+from warp_mca.elements import ELEMENTS
+
+WELCOME = """\
+warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
+elastoplastic finite elements with frictional contact take over.
+
+  warp-mca run two_link                            falling two-link manipulator strikes a rough plate (Table 1)
+  warp-mca run two_link --preset paper --device cuda:0
+  warp-mca run two_link --set mu=0.3 --set v_plate=0.8 --out slippery
+  warp-mca run my_scene.py                         a scene of your own, in Python
+  warp-mca build two_link --preset paper -o paper.mca && warp-mca run paper.mca
+  warp-mca scenes                                  scenes, presets and parameters
+
+warp-mca COMMAND --help lists the options; README.md has an example in Python."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports a bad command in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser; each command leaves the function that carries it out in `command`."""
+    parser = Parser(prog="warp-mca", description="Impact of flexible machines.", allow_abbrev=False)
+    parser.add_argument("--version", action="version", version=f"warp-mca {mca.__version__}")
+    parser.set_defaults(command=lambda args: print(WELCOME))
+    add = partial(parser.add_subparsers(metavar="COMMAND").add_parser, allow_abbrev=False)
+    _run(add("run", help="run a scene or a built model"))
+    _build(add("build", help="make the meshes of a scene and store them with it"))
+    _scenes(add("scenes", help="list scenes, presets and parameters"))
+    _view(add("view", help="open a recording in the rerun viewer"))
+    _verify(add("verify", help="measure the engine against known answers"))
+    return parser
+
+
+def _run(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    _add_device(parser)
+    parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
+    parser.add_argument(
+        "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
+    )
+    parser.add_argument(
+        "--time-step-scale", type=float, metavar="SHARE", help="time step over the stable one (default: the scene's)"
+    )
+    parser.add_argument(
+        "--sweep",
+        dest="sweeps",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE,…",
+        help="run a scene for each value, all at once, to folders 0, 1, … in DIR; several times: all combinations",
+    )
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
+    parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")
+    _add_recorders(parser)
+    parser.set_defaults(command=run.run)
+
+
+def _build(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="model file, suffix .mca")
+    parser.set_defaults(command=commands.build)
+
+
+def _scenes(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", nargs="*", metavar="SCENE", help="name or Python file (default: all built-in ones)")
+    parser.set_defaults(command=commands.scenes)
+
+
+def _view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", metavar="DIR_OR_FILE", type=Path, help=".rrd file, or a folder that holds some")
+    parser.set_defaults(command=commands.view)
+
+
+def _verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="case or group of cases (default: all)")
+    _add_device(parser)
+    _add_element(parser)
+    parser.add_argument("--level", default="quick", choices=("quick", "full"), help="meshes (default: %(default)s)")
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="write verification.md and its figure there")
+    parser.set_defaults(command=commands.verify)
+
+
+def _folder(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("'': name a folder, or . for this one")
+    return Path(text)
+
+
+def _add_element(parser: argparse.ArgumentParser) -> None:
+    names = ", ".join(ELEMENTS)
+    parser.add_argument(
+        "--element", metavar="NAME", choices=tuple(ELEMENTS), help=f"formulation of every body: {names}"
+    )
+
+
+def _add_device(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    parser.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
+
+
+def _add_scene(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
+    parser.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
+    help_text = "change a parameter; may be given several times"
+    _add_element(parser)
+    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
+
+
+def _add_recorders(parser: argparse.ArgumentParser) -> None:
+    from warp_mca.recorders import FILES
+
+    group = parser.add_argument_group("see the run", "options with FILE may be given several times")
+    group.add_argument(
+        "--viewer", default="none", choices=("rerun", "none"), help="open a viewer and stream to it (default: none)"
+    )
+    for option, kind in FILES.items():
+        group.add_argument(f"--{option}", metavar="FILE", type=Path, action="append", default=[], help=kind.help)
+    group.add_argument(
+        "--frames", type=int, default=100, metavar="N", help="frames of each file (default: %(default)s)"
+    )
+    group.add_argument(
+        "--snapshot",
+        dest="snapshots",
+        type=float,
+        action="append",
+        default=[],
+        metavar="SECONDS",
+        help="draw the bodies at this time after first contact; may be given several times",
+    )

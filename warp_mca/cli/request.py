@@ -1,0 +1,78 @@
+"""Owns what the command line asks for: a scene with its parameters, or a model file."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import warp_mca as mca
+from warp_mca.base.errors import bad_value
+from warp_mca.scene import Scene, catalogue, model_file
+from warp_mca.scene.model_file import SUFFIX, Origin
+
+SCALE = "time_step_scale"  # an option for every scene, and a parameter of some
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be run or built.
+
+    Attributes:
+        scene: built from its parameters.
+        label: names the default output folder.
+        source: the scene file, or None when a model file was given.
+        origin: the built-in scene and its parameters, or None.
+        meshes: those of a model file, or None.
+    """
+
+    scene: Scene
+    label: str
+    source: catalogue.SceneSource | None = None
+    origin: Origin | None = None
+    meshes: dict[str, mca.Mesh] | None = None
+
+
+def read_request(args: argparse.Namespace, more: Mapping[str, str] | None = None) -> Request:
+    """Build the scene that the arguments ask for, with `more` parameters changed."""
+    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **(more or {})}
+    scale = getattr(args, SCALE, None)
+    if Path(args.scene).suffix != SUFFIX:
+        source = catalogue.load_source(args.scene)
+        scale = _where_no_parameter(scale, source.parameters, overrides)
+        values = source.resolve(args.preset, overrides)
+        preset = args.preset or source.default_preset
+        origin = Origin(source.name, preset, values) if source.builtin else None
+        label = f"{source.name}-{preset}" if preset else source.name
+        return Request(_with(source.build(values), args.element, scale), label, source, origin)
+    if args.preset is not None:
+        raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
+    stored = model_file.load(args.scene)
+    scale = _where_no_parameter(scale, stored.origin.parameters if stored.origin else (), overrides)
+    stored = model_file.changed(stored, overrides)
+    scene = _with(stored.scene, args.element, scale)
+    return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
+
+
+def parameters_given(args: argparse.Namespace) -> set[str]:
+    """Parameters that the command sets for all scenes of a sweep."""
+    return {*catalogue.parse_overrides(args.settings), *([SCALE] if args.time_step_scale is not None else ())}
+
+
+def _where_no_parameter(scale: float | None, names: Collection[str], overrides: dict[str, object]) -> float | None:
+    """The share of the stable time step, or None where the scene has it among its parameters, which take it then."""
+    if scale is not None and SCALE in names:
+        overrides[SCALE] = scale
+        return None
+    return scale
+
+
+def _with(scene: Scene, element: str | None, scale: float | None) -> Scene:
+    """The scene with another element formulation, or share of the stable time step, where one is given."""
+    if element is not None:
+        scene = dataclasses.replace(scene, bodies=tuple(dataclasses.replace(b, element=element) for b in scene.bodies))
+    if scale is not None:
+        scene = dataclasses.replace(scene, impact=dataclasses.replace(scene.impact, time_step_scale=scale))
+    return scene

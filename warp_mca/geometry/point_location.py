@@ -1,0 +1,104 @@
+"""Owns the search for the cells of a mesh that hold given points, and the shape functions there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.geometry import tetrahedron
+from warp_mca.geometry.boxes import Boxes
+from warp_mca.geometry.cell_types import HEXAHEDRON, MOST_CORNERS, TETRAHEDRON
+from warp_mca.geometry.hexahedron import shape_functions
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+CANDIDATES = 64  # cells near a point that are tried: long thin ones have their centres far away
+OUTSIDE = 0.05  # of a cell's diagonal that a point may lie outside: curved surfaces have flat faces
+
+# For each point: nodes of its cell, shape (point_count, MOST_CORNERS), int32; shape functions there [-], of that shape;
+# distance between point and cell [m], and the largest distance at which the point still counts as inside [m], both
+# shape (point_count,).
+Located = tuple[Index, Array, Array, Array]
+
+
+def _nearest(at: Array, points: Array, cells: Index, boxes: Boxes) -> NDArray[np.intp]:
+    """The cells whose centres lie nearest to each point, shape (point_count, candidate_count).
+
+    Only cells whose boxes lie beside the points are searched, or all where there are none, so that the distance from
+    the nearest one is known.
+    """
+    from scipy.spatial import KDTree
+
+    lower, upper = boxes
+    margin = OUTSIDE * np.linalg.norm(upper - lower, axis=0)
+    beside = (lower - margin > at.max(axis=0)[:, None]) | (upper + margin < at.min(axis=0)[:, None])
+    index = np.flatnonzero(~beside.any(axis=0))
+    index = index if len(index) else np.arange(len(cells))
+    _, near = KDTree(points[cells[index]].mean(axis=1)).query(at, k=min(CANDIDATES, len(index)))
+    return index[np.asarray(near).reshape(len(at), -1)]
+
+
+def in_hexahedra(at: Array, points: Array, cells: Index, boxes: Boxes) -> Located:
+    """The hexahedron around or nearest to each point.
+
+    Args:
+        at: the points [m], shape (point_count, 3).
+        points: positions of the nodes [m], shape (node_count, 3).
+        cells: nodes of the hexahedra, shape (cell_count, 8).
+        boxes: around the cells, from `cell_boxes`.
+    """
+    near = _nearest(at, points, cells, boxes)
+    x = points[cells[near]]  # (point, candidate, corner, axis)
+    # No point of an element is nearer than its box: few candidates remain.
+    gap = np.linalg.norm(at[:, None] - np.clip(at[:, None], x.min(axis=2), x.max(axis=2)), axis=2)
+    apart, weight = np.full(near.shape, np.inf), np.zeros((*near.shape, HEXAHEDRON.corners))
+    round_off = 1e-12 * np.ptp(x)
+    tried = gap <= gap.min(axis=1, keepdims=True) + round_off
+    while tried.any():
+        weight[tried], apart[tried] = _weights(np.repeat(at, tried.sum(axis=1), axis=0), x[tried])
+        tried = np.isinf(apart) & (gap <= apart.min(axis=1, keepdims=True) + round_off)
+    alike = apart <= apart.min(axis=1, keepdims=True) + round_off  # a point on a face: the first of its cells
+    best, rows = np.where(alike, near, len(cells)).argmin(axis=1), np.arange(len(at))
+    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
+    return cells[near[rows, best]], weight[rows, best], apart[rows, best], allowed
+
+
+def _weights(at: Array, x: Array) -> tuple[Array, Array]:
+    """Shape functions at the place in a hexahedron nearest to a point, shape (count, 8), and its distance [m]."""
+    xi = np.zeros_like(at)
+    for _ in range(8):  # Newton's method on x(xi) = at, kept within the element
+        value, slope = shape_functions(xi)
+        J = np.einsum("cak,cai->cik", slope, x)
+        missing = at - np.einsum("ca,cai->ci", value, x)
+        # the Jacobian has no inverse where corners of a wedge or a pyramid coincide
+        xi = np.clip(xi + (np.linalg.pinv(J) @ missing[..., None])[..., 0], -1.0, 1.0)
+    value, _ = shape_functions(xi)
+    return value, np.linalg.norm(at - np.einsum("ca,cai->ci", value, x), axis=-1)
+
+
+def in_tetrahedra(at: Array, points: Array, cells: Index, boxes: Boxes) -> Located:
+    """The tetrahedron around or nearest to each point; arguments as of `in_hexahedra`.
+
+    Beyond its four corners the last one is repeated with weight 0.
+    """
+    near = _nearest(at, points, cells, boxes)
+    x = points[cells[near]]
+    slope = tetrahedron.gradients(x.reshape(-1, 4, 3)).reshape(x.shape)
+    weight = np.einsum("pcai,pci->pca", slope, at[:, None] - x.mean(axis=2)) + 0.25
+    weight = np.clip(weight, 0.0, None)
+    weight /= weight.sum(axis=-1, keepdims=True)
+    apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", weight, x), axis=-1)
+    best, rows = apart.argmin(axis=1), np.arange(len(at))
+    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
+    missing = (0, 0), (0, MOST_CORNERS - TETRAHEDRON.corners)
+    nodes = np.pad(cells[near[rows, best]], missing, mode="edge")
+    return nodes, np.pad(weight[rows, best], missing), apart[rows, best], allowed
+
+
+LOCATE: dict[str, Callable[[Array, Array, Index, Boxes], Located]] = {
+    HEXAHEDRON.name: in_hexahedra,
+    TETRAHEDRON.name: in_tetrahedra,
+}  # by stored cell type

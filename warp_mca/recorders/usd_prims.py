@@ -1,0 +1,99 @@
+"""Owns what the USD recorder shows: the skin of a body as a mesh, and slave nodes in contact as points."""
+# pyright: reportAttributeAccessIssue=false
+# (usd-core comes without types)
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.recorders.colours import PALETTE, SLIP, STICK, levels
+
+if TYPE_CHECKING:
+    from warp_mca.recorders.recorder import SurfaceMesh
+
+
+class BodyPrim:
+    """A skin as a mesh."""
+
+    def __init__(self, mesh: Any, name: str, surface: SurfaceMesh) -> None:
+        from pxr import Sdf, UsdGeom, Vt
+
+        self.mesh = mesh
+        mesh.GetPrim().SetDisplayName(name)
+        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(surface.corner_counts))
+        corners = surface.quads[np.arange(4) < surface.corner_counts[:, None]]
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(corners)))
+        self.points, self.extent = mesh.CreatePointsAttr(), mesh.CreateExtentAttr()
+        self.colour = _colours(mesh, _linear(PALETTE / 255.0))
+        primvars = UsdGeom.PrimvarsAPI(mesh)
+        float_array = Sdf.ValueTypeNames.FloatArray
+        self.stress, self.plastic = (
+            primvars.CreatePrimvar(name, float_array, UsdGeom.Tokens.vertex) for name in ("vonMises", "plasticStrain")
+        )
+        self.plastic_max = -1.0
+
+    def write(self, code: Any, points: NDArray, von_mises: NDArray, plastic: NDArray, limit: float) -> None:
+        from pxr import Vt
+
+        _place(self, code, points)
+        self.colour.Set(Vt.IntArray.FromNumpy(levels(von_mises, limit).astype(np.int32)), code)
+        self.stress.Set(Vt.FloatArray.FromNumpy(_rounded(von_mises)), code)
+        # Plastic strain only grows, and held values fill the gaps: what does not change costs nothing.
+        if (greatest := float(plastic.sum(dtype=np.float64))) != self.plastic_max:
+            if self.plastic_max >= 0.0 and self._held != code.GetValue() - 1:
+                self.plastic.Set(self._last, code.GetValue() - 1)  # USD interpolates: end the time without change
+            self._last = Vt.FloatArray.FromNumpy(_rounded(plastic))
+            self.plastic.Set(self._last, code)
+            self.plastic_max, self._held = greatest, code.GetValue()
+
+
+class ContactPrim:
+    """Slave nodes in contact as points."""
+
+    def __init__(self, prim: Any, width: float) -> None:
+        from pxr import UsdGeom
+
+        prim.CreateWidthsAttr([width])
+        prim.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+        self.points, self.extent = prim.CreatePointsAttr(), prim.CreateExtentAttr()
+        rgb = [[(colour >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)] for colour in (SLIP, STICK)]
+        self.colour = _colours(prim, _linear(np.array(rgb)))
+
+    def write(self, code: Any, points: NDArray, stick: NDArray) -> None:
+        from pxr import Vt
+
+        _place(self, code, points)
+        self.colour.Set(Vt.IntArray.FromNumpy(stick.astype(np.int32)), code)
+
+
+def _place(item: BodyPrim | ContactPrim, code: Any, points: NDArray) -> None:
+    """Set points and their extent."""
+    from pxr import Vt
+
+    item.points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points)), code)
+    box = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), dtype=np.float32)
+    item.extent.Set(Vt.Vec3fArray.FromNumpy(box), code)
+
+
+def _colours(prim: Any, palette: NDArray) -> Any:
+    """Author the static palette; the attribute that takes each frame's indices into it."""
+    from pxr import UsdGeom, Vt
+
+    colour = prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    colour.Set(Vt.Vec3fArray.FromNumpy(palette.astype(np.float32)))
+    return colour.CreateIndicesAttr()
+
+
+def _linear(srgb: NDArray) -> NDArray:
+    """Linear colours of sRGB ones (IEC 61966-2-1), both 0 to 1."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def _rounded(value: NDArray) -> NDArray[np.float32]:
+    """Values rounded to 256 of them, which USD stores in a byte or less each."""
+    greatest = float(value.max(initial=0.0))
+    return np.float32(greatest) * (levels(value, greatest).astype(np.float32) / np.float32(255.0)) ** 2
