@@ -33,7 +33,7 @@ from warp_mca.elements.stage import gather_lists
 from warp_mca.kernels.contact import contact, search, spring
 from warp_mca.kernels.hardware import subnormals
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes import constraint, node
+from warp_mca.kernels.nodes import constraint, node, slide
 from warp_mca.kernels.records import ledger, output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
@@ -193,6 +193,10 @@ class Solver:
         inputs += [self.node_gravity, self.bonds.bonds, self.dt]
         outputs = [self.contact_force, self.u, self.v, before, self.speed_square, *self.bonds.counts()]
         wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=ELEMENT_BLOCK)
+        if len(self.bonds.rails):
+            inputs = [self.X, self.mass, self.bonds.bonds.first, self.bonds.rails, self.dt]
+            outputs = [self.u, self.v, self.speed_square, self.bonds.impulse]
+            wp.launch(slide.slide, len(self.bonds.rails), inputs=inputs, outputs=outputs)
 
     def _advance(self, split: Split = whole, before: wp.array | None = None) -> None:
         """Advance all nodes by a step, those that are bound beside the others; `before` takes their velocities."""
@@ -285,6 +289,7 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         sums = [ledger.record_motion, spring.sum_springs, self.sum_elements_kernel]
         sums += [output.nodal_stress] if self._shows_stress else []
+        sums += [slide.slide] if len(self.bonds.rails) else []
         sums += [] if self.side else [subnormals.begin_flush]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if self._shows_stress]
