@@ -7,7 +7,7 @@
 | 3 record at t(n) | `hex8_energy`, …, sums | first step of each output interval, checks between: `steps.py` |
 | 3a paths, frames at t(n) | `hex8_stress`, …, `nodal_stress` | each output interval, if paths or a frame need it |
 | 4 gather and integrate | `integrate` | every step |
-| 4a re-joint, prescribed motion | `advance_bound` | every step, beside 4, in scenes with joints or driven axes |
+| 4a joints, prescribed motion | `advance_bound`, `slide` | every step, beside 4, in scenes with joints or driven axes |
 | 5 record of motion | `record_motion` | as 3 |
 
 Broad-phase search runs between captured graphs, often enough that no contact can be missed: nodes that move too far
