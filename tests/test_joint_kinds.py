@@ -9,6 +9,7 @@ from test_joint import BAR, SIZE, SOFT, final_state
 import warp_mca as mca
 from warp_mca.base.rotation import turn
 from warp_mca.model.model import nodal_masses
+from warp_mca.scene import model_file
 
 HALF = mca.Box(size=(0.05, 0.02, 0.02), divisions=(5, 2, 2), origin=(0.0, -0.01, -0.01))
 PULL = {"nodes": "xmin", "axis": "x", "times": (0.0, 2e-5, 4e-5), "velocities": (0.0, 2.0, 0.0)}
@@ -101,6 +102,28 @@ def test_a_rod_on_a_ball_joint_precesses(monkeypatch):
     assert np.array(result.summary["joint_impulse"]["S"]) == pytest.approx(change - weight, abs=1e-3 * abs(weight[1]))
 
 
+def test_bars_on_a_ball_joint_keep_momentum_and_angular_momentum(monkeypatch):
+    """One turns about y and one about z; the start, where their speeds at the joint differ, is inelastic."""
+    state = final_state(monkeypatch)
+    kind = {"geometry": BAR, "material": SOFT, "kinematics": "finite"}
+    scene = mca.Scene(
+        name="bars",
+        bodies=(
+            mca.Body(name="a", angular_velocity=(0.0, 0.0, 20.0), **kind),
+            mca.Body(name="b", position=(0.1, 0.0, 0.0), angular_velocity=(0.0, 30.0, 0.0), **kind),
+        ),
+        joints=(mca.Spherical(name="S", body="a", at=(0.1, 0.0, 0.0), other="b"),),
+        impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-4, energy_tolerance=1.0),
+    )
+    mca.run(scene, precision="float64")
+    model, v = state["model"], state["v"]
+    assert model.mass @ v == pytest.approx(model.mass @ model.V, abs=1e-14)
+    before, after = (model.mass @ np.cross(x, w) for x, w in ((model.X, model.V), (model.X + state["u"], v)))
+    assert np.abs(before).min() < 1e-12 and np.abs(before).max() > 1e-3
+    assert after == pytest.approx(before, abs=1e-14)
+    assert (state["u"][model.joint_first] == state["u"][model.joint_second]).all()
+
+
 def test_a_block_slides_on_its_rail_by_the_gravity_along_it(monkeypatch):
     """The rail takes what is across it, and no more: along it the momentum is m (g . a) t to rounding."""
     state = final_state(monkeypatch)
@@ -124,6 +147,106 @@ def test_a_block_slides_on_its_rail_by_the_gravity_along_it(monkeypatch):
     assert impulse @ axis == pytest.approx(0.0, abs=1e-12 * np.abs(impulse).max())
     across = gravity - (gravity @ axis) * axis
     assert impulse == pytest.approx(momentum - (momentum @ axis) * axis - model.mass.sum() * across * t, rel=1e-9)
+
+
+RAIL = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
+CART = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
+SLIDE = {"name": "P", "body": "cart", "nodes": "zmin", "other": "rail", "other_nodes": "zmax"}
+
+
+def cart(spin=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), duration=5e-4, **change):
+    """A block on three lines of nodes of a bar that turns about the same point; both strain as finite."""
+    kind = {"material": SOFT, "kinematics": "finite", "angular_velocity": spin}
+    return mca.Scene(
+        name="cart",
+        bodies=(
+            mca.Body(name="rail", geometry=RAIL, **kind),
+            mca.Body(name="cart", geometry=CART, velocity=velocity, **kind),
+        ),
+        joints=(mca.Prismatic(**{**SLIDE, "axis": (1.0, 0.0, 0.0), **change}),),
+        impact=mca.ImpactPhase(duration=duration, output_interval=1e-5),
+    )
+
+
+def test_a_cart_slides_along_its_rail_without_a_force(monkeypatch):
+    """It crosses five cells of the rail at 50 m/s, and bends nothing."""
+    state = final_state(monkeypatch)
+    result = mca.run(cart(velocity=(50.0, 0.0, 0.0), duration=1e-3), precision="float64")
+    start, t = state["model"].node_start["cart"], result.summary["simulated_time"] + result.summary["dt"]
+    assert state["u"][:start] == pytest.approx(0.0, abs=1e-15)
+    assert state["u"][start:] == pytest.approx(
+        np.broadcast_to([50.0 * t, 0.0, 0.0], state["u"][start:].shape), rel=1e-9
+    )
+    assert result.summary["joint_impulse"]["P"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+
+
+def test_a_cart_on_a_turning_rail_keeps_momentum_and_energy(monkeypatch):
+    """Momentum and angular momentum of both bodies to rounding; the cart is driven outwards as far as a rigid one."""
+    state = final_state(monkeypatch)
+    omega, duration = 150.0, 3e-3
+    result = mca.run(cart(spin=(0.0, 0.0, omega), duration=duration), precision="float64")
+    model, v = state["model"], state["v"]
+    x, m, start = model.X + state["u"], model.mass, model.node_start["cart"]
+    assert m @ v == pytest.approx(m @ model.V, abs=1e-12 * np.abs(m @ np.abs(model.V)).max())
+    before, after = m @ np.cross(model.X, model.V), m @ np.cross(x, v)
+    assert after == pytest.approx(before, abs=1e-11 * np.abs(before).max())
+    assert result.summary["energy_error"] < 1e-3
+    ends = x[(model.joint_first[model.joint_slides[:, 1:] - [0, 1]])]
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    for (first, begin, _), end, line in zip(model.joint_slides, ends, along, strict=True):
+        offset = x[model.joint_first[first:begin]] - end[0]
+        off = offset - np.outer(offset @ line, line)
+        assert np.abs(off[:, 1:]).max() < 3e-4  # the rail bends by so much
+    assert moved(x, m, start) - moved(model.X, m, start) == pytest.approx(slid(model, start, omega, duration), rel=0.02)
+
+
+def moved(x, m, start):
+    """Distance between the centres of mass of the two bodies along x, y [m]."""
+    rail, cart = (m[part] @ x[part] / m[part].sum() for part in (slice(start), slice(start, None)))
+    return float(np.linalg.norm((cart - rail)[:2]))
+
+
+def slid(model, start, omega, duration):
+    """How far a rigid cart slides on a rigid rail that turns freely, s'' = s w^2 with (I + mu s^2) w constant [m]."""
+    from scipy.integrate import solve_ivp
+
+    m, x = model.mass, model.X
+    parts = slice(start), slice(start, None)
+    centres = [m[part] @ x[part] / m[part].sum() for part in parts]
+    inertia = sum(m[part] @ ((x[part] - c)[:, :2] ** 2).sum(axis=1) for part, c in zip(parts, centres, strict=True))
+    reduced = m[parts[0]].sum() * m[parts[1]].sum() / m.sum()
+    s = centres[1][0] - centres[0][0]
+    spin = (inertia + reduced * s**2) * omega
+    path = solve_ivp(
+        lambda _, y: [y[1], y[0] * (spin / (inertia + reduced * y[0] ** 2)) ** 2], (0.0, duration), [s, 0.0], rtol=1e-9
+    )
+    return abs(path.y[0, -1]) - abs(s)
+
+
+def test_carts_of_a_batch_slide_as_each_does_alone():
+    scenes = [cart(spin=(0.0, 0.0, omega), duration=2e-4) for omega in (100.0, 150.0)]
+    for scene, result in zip(scenes, mca.run_batch(scenes), strict=True):
+        impulse = mca.run(scene).summary["joint_impulse"]["P"]
+        assert max(map(abs, impulse)) > 1e-6
+        assert result.summary["joint_impulse"]["P"] == pytest.approx(impulse, rel=1e-6, abs=1e-12)
+
+
+def test_a_model_file_holds_each_kind(tmp_path):
+    joints = (
+        mca.Weld(**WELD, other="b", other_nodes="xmin"),
+        mca.Spherical(name="S", body="a", at=(0.0, 0.0, 0.0)),
+        mca.Prismatic(name="P", body="b", nodes="xmax", axis=(0.0, 1.0, 0.0)),
+    )
+    scene = mca.Scene(**{**vars(two(joints[0])), "joints": joints})
+    model_file.save(tmp_path / "two.mca", scene, mca.mesh(scene))
+    assert model_file.load(tmp_path / "two.mca").scene.joints == joints
+
+
+def test_a_slide_without_rails_is_refused():
+    with pytest.raises(mca.RequestError, match=r"Prismatic P.nodes = 'zmin': 0 of these nodes are on lines of zmax of"):
+        mca.run(cart(axis=(0.0, 0.0, 1.0)))
+    with pytest.raises(mca.RequestError, match=r"Prismatic P.other_nodes = None: name a node set of the other body"):
+        cart(other_nodes=None)
 
 
 def two(joint, **change):

@@ -16,13 +16,13 @@ from warp_mca.scene.materials import Elastic, J2Bilinear
 from warp_mca.solve import early_launch as module
 from warp_mca.solve.early_launch import overlap
 
-KERNELS = Path(node.__file__).parent
+KERNELS = Path(node.__file__).parents[1]
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
 TWO = (("mixed", False), ("float64", True))
 LAWS = {False: Elastic.law, True: J2Bilinear.law}
 VARIANTS = {
     "integrate": [node.integrate_kernel(p, not m, True, m, m, m) for p, m in TWO],
-    "advance_bound": [constraint.bound_kernel(p, m, m) for p, m in TWO],
+    "advance_bound": [constraint.bound_kernel(p, m, m, m) for p, m in TWO],
     "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
     "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],

@@ -94,6 +94,8 @@ def test_a_block_rebounds_as_the_law_has_it(registered: None):
     assert result.summary["F_n_max"] == pytest.approx(2.5 * fall / deepest, rel=2e-3)
     duration = 2.0 * deepest / SPEED * quad(lambda x: 1.0 / math.sqrt(1.0 - x**2.5), 0.0, 1.0)[0]
     assert result.summary["contact_duration"] == pytest.approx(duration, rel=0.01)
+    closing = result["closing_speed"][np.isfinite(result["closing_speed"])]
+    assert closing[2] == pytest.approx(SPEED, rel=0.01) and closing[-3] == pytest.approx(-SPEED, rel=0.01)
     assert result["E_contact"].max() == pytest.approx(fall, rel=2e-3)
     assert result["E_contact"][-1] == 0.0
     assert result.F_n.sum() * 1e-6 == pytest.approx(2.0 * mass * SPEED, rel=2e-3)
@@ -121,6 +123,8 @@ def test_a_linear_law_gives_the_forces_of_the_penalty(registered: None, mu: floa
     own = mca.run(replace_contact(scene, law=Again()), precision="float64")
     assert own.F_n == pytest.approx(known.F_n, rel=1e-9, abs=1e-9 * known.F_n.max())
     assert own["E_contact"] == pytest.approx(known["E_contact"], rel=1e-9, abs=1e-9 * known["E_contact"].max())
+    closing = known["closing_speed"]
+    assert own["closing_speed"] == pytest.approx(closing, rel=1e-6, abs=1e-6 * np.nanmax(np.abs(closing)), nan_ok=True)
     assert own.summary["energy"]["contact_loss"] == pytest.approx(known.summary["energy"]["contact_loss"], rel=1e-3)
 
 

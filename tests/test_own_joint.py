@@ -10,7 +10,8 @@ from test_joint import BAR, HEAVY, SOFT, final_state
 
 import warp_mca as mca
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.joints import JOINTS, Joint, Side, Ties, coincident
+from warp_mca.scene.joints import JOINTS, Joint
+from warp_mca.scene.ties import Side, Ties, coincident
 
 NORMAL = np.array([0.0, 0.8, 0.6])
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.rotation import turn
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
-from warp_mca.scene.joints import Joint, Side
+from warp_mca.scene.joints import Joint
+from warp_mca.scene.ties import Rails, Side
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,10 +79,22 @@ def _side(parts: Assembly, body: str) -> Side:
     return Side(body, mesh, parts.X[start : start + len(mesh.points)], turn(parts.scene.body(body).rotation))
 
 
-def _tied_pairs(parts: Assembly, joint: Joint) -> tuple[Index, Index, Array]:
-    """Nodes of a joint's pairs in the model's numbering, and the projector on the directions that it ties."""
+@dataclass(frozen=True)
+class _Tied:
+    """A joint's pairs in the model's numbering, as in `Model`; `slides` counts from the joint's first pair."""
+
+    first: Index
+    second: Index
+    tied: Array
+    slides: Index
+
+
+def _tied_pairs(parts: Assembly, joint: Joint) -> _Tied:
+    """What a joint ties."""
     side = _side(parts, joint.body)
     ties = joint.ties(side, None if joint.other is None else _side(parts, joint.other))
+    if isinstance(ties, Rails):
+        return _on_rails(parts, joint, ties)
     a = ties.first + parts.node_start[joint.body]
     b = np.full(len(a), GROUND, dtype=np.int32)
     if joint.other is not None:
@@ -98,7 +111,19 @@ def _tied_pairs(parts: Assembly, joint: Joint) -> tuple[Index, Index, Array]:
     if not (np.allclose(tied, tied.T) and np.allclose(tied @ tied, tied)):
         remedy = "its ties must give an orthogonal projector, as n n^T or I - a a^T of unit vectors"
         raise bad_value(f"{joint.title}.ties", tied.tolist(), remedy)
-    return a, b, tied
+    return _Tied(a, b, np.broadcast_to(tied, (len(a), 3, 3)), np.zeros((0, 3), np.int32))
+
+
+def _on_rails(parts: Assembly, joint: Joint, ties: Rails) -> _Tied:
+    """Sliders and nodes of each rail as pairs with the ground that are tied in no direction."""
+    assert joint.other is not None
+    nodes, slides, count = [], [], 0
+    for slider, rail in zip(ties.sliders, ties.rails, strict=True):
+        nodes += [slider + parts.node_start[joint.body], rail + parts.node_start[joint.other]]
+        slides.append((count, count + len(slider), count + len(slider) + len(rail)))
+        count = slides[-1][-1]
+    ground = np.full(count, GROUND, dtype=np.int32)
+    return _Tied(np.concatenate(nodes), ground, np.zeros((count, 3, 3)), np.array(slides, dtype=np.int32))
 
 
 def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, ...]]:
@@ -107,18 +132,18 @@ def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, 
     Raises:
         RequestError: a joint finds no nodes, its pairs do not coincide, or a node is tied twice.
     """
-    first, second, tied, joints = [], [], [], []
+    found, joints, start = [], [], 0
+    slides = [np.zeros((0, 3), np.int32)]
     for joint in parts.scene.joints:
-        a, b, projector = _tied_pairs(parts, joint)
-        start = sum(len(item) for item in first)
-        joints.append(JointPairs(name=joint.name, start=start, end=start + len(a)))
-        first.append(a)
-        second.append(b)
-        tied.append(np.broadcast_to(projector, (len(a), 3, 3)))
+        found.append(_tied_pairs(parts, joint))
+        slides.append(found[-1].slides + np.int32(start))
+        joints.append(JointPairs(name=joint.name, start=start, end=start + len(found[-1].first)))
+        start = joints[-1].end
     pairs = {
-        "joint_first": np.concatenate([np.zeros(0, np.int32), *first]).astype(np.int32),
-        "joint_second": np.concatenate([np.zeros(0, np.int32), *second]).astype(np.int32),
-        "joint_tied": np.concatenate([np.zeros((0, 3, 3)), *tied]),
+        "joint_first": np.concatenate([np.zeros(0, np.int32), *(item.first for item in found)]).astype(np.int32),
+        "joint_second": np.concatenate([np.zeros(0, np.int32), *(item.second for item in found)]).astype(np.int32),
+        "joint_tied": np.concatenate([np.zeros((0, 3, 3)), *(item.tied for item in found)]),
+        "joint_slides": np.concatenate(slides).astype(np.int32),
     }
     nodes = _nodes_of(pairs)
     if len(np.unique(nodes)) < len(nodes):

@@ -49,6 +49,7 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_first=shifted("joint_first", nodes),
         joint_second=shifted("joint_second", nodes),
         joint_tied=np.concatenate([model.joint_tied for model in models]),
+        joint_slides=shifted("joint_slides", pairs),
         hinges=tuple(
             replace(hinge, start=hinge.start + int(start), end=hinge.end + int(start))
             for model, start in zip(models, pairs, strict=False)

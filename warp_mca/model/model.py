@@ -47,6 +47,8 @@ class Model:
         joint_first, joint_second: tied nodes, shape (pair_count,), int32; GROUND has no second node.
         joint_tied: orthogonal projector on the directions in which pairs move as one [-], shape (pair_count, 3, 3),
             float64.
+        joint_slides: of each rail the first of its sliders, the first of its own nodes and the end of these in
+            `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
         hinges: the joints that own the pairs.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
@@ -75,6 +77,7 @@ class Model:
     joint_first: Index
     joint_second: Index
     joint_tied: Array
+    joint_slides: Index
     hinges: tuple[JointPairs, ...]
     passes: tuple[ContactPass, ...]
     contact_axes: Array

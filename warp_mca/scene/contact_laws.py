@@ -10,8 +10,6 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from warp_mca.kernels.contact.laws import LINEAR
-
 
 @dataclass(frozen=True, kw_only=True)
 class ContactLaw(ABC):
@@ -37,7 +35,7 @@ class ContactLaw(ABC):
 class Penalty(ContactLaw):
     """The linear spring, F_n = k g."""
 
-    law = LINEAR
+    law = "warp_mca.kernels.contact.penalty"
 
     def stiffening(self, depth: float) -> float:
         """1 at any depth."""

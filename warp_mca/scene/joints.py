@@ -9,69 +9,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from types import NoneType
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
-
-if TYPE_CHECKING:
-    from warp_mca.geometry.mesh import Mesh
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
-
-COINCIDENT = 1e-6  # of the extent of a joint's first body: nodes no further apart count as coincident
-
-
-@dataclass(frozen=True)
-class Side:
-    """What a joint knows of one of its bodies.
-
-    Attributes:
-        body: its name.
-        mesh: in the body's own frame.
-        X: positions of its nodes at the start of the impact phase [m], shape (node_count, 3), float64.
-        frame: rotation matrix from the body's frame to the scene's [-], shape (3, 3), float64.
-    """
-
-    body: str
-    mesh: Mesh
-    X: Array
-    frame: Array
-
-    @property
-    def tolerance(self) -> float:
-        """Distance within which nodes coincide [m]."""
-        return COINCIDENT * float(np.ptp(self.mesh.points, axis=0).max())
-
-    def on_axis(self, at: Vec3, axis: Vec3) -> Index:
-        """Nodes on an axis through `at` [m], in the order along it; both in the body's frame."""
-        direction = np.asarray(axis) / np.linalg.norm(axis)
-        offset = self.mesh.points - np.asarray(at)
-        along = offset @ direction
-        away = np.linalg.norm(offset - along[:, None] * direction, axis=1)
-        nodes = np.flatnonzero(away <= self.tolerance)
-        return nodes[np.argsort(along[nodes])].astype(np.int32)
-
-
-@dataclass(frozen=True)
-class Ties:
-    """Pairs of nodes that stand at the same place and move as one, in all directions or in some.
-
-    Attributes:
-        first: nodes of the joint's body, in the numbering of its mesh, shape (pair_count,), int32.
-        second: nodes of the other body that they are tied to, likewise; None for the ground.
-        tied: orthogonal projector on the directions in which they move as one [-], shape (3, 3), float64, in the
-            scene's frame; None for all directions. The directions stay fixed in space.
-    """
-
-    first: Index
-    second: Index | None = None
-    tied: Array | None = None
+from warp_mca.scene.ties import Index, Rails, Side, Ties, coincident, rails_along
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,8 +48,8 @@ class Joint(ABC):
         return f"{type(self).__name__} {self.name}"
 
     @abstractmethod
-    def ties(self, first: Side, second: Side | None) -> Ties:
-        """Pairs that the joint ties; `second` is None for the ground.
+    def ties(self, first: Side, second: Side | None) -> Ties | Rails:
+        """Pairs that the joint ties, or nodes on rails; `second` is None for the ground.
 
         Raises:
             RequestError: the bodies have no such nodes.
@@ -162,9 +107,7 @@ class Weld(Joint):
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.texts(self.title, nodes=self.nodes)
-        if (self.other_nodes is None) != (self.other is None):
-            remedy = "name a node set of the other body" if self.other else "leave it out, the ground has no nodes"
-            raise bad_value(f"{self.title}.other_nodes", self.other_nodes, remedy)
+        _check_sets(self, self.other_nodes)
 
     def ties(self, first: Side, second: Side | None) -> Ties:
         """Each node of the set, with the one of the other set at its place."""
@@ -172,8 +115,7 @@ class Weld(Joint):
         if second is not None:
             assert self.other_nodes is not None
             a, b = coincident(first, a, second, second.mesh.nodes(self.other_nodes))
-        offset = first.X[a] - first.X[a].mean(axis=0) if len(a) else np.zeros((1, 3))
-        if np.linalg.matrix_rank(offset, tol=first.tolerance) < 2:
+        if _on_a_line(first, a):
             where = f" coincide with nodes of {self.other_nodes} of {self.other}" if second else ""
             what = f"{len(a)} of these nodes{where}, and a weld needs three that are not on a line"
             raise bad_value(f"{self.title}.nodes", self.nodes, f"{what}; name sets that meet, of equal meshes")
@@ -213,31 +155,41 @@ class Spherical(Joint):
 
 @dataclass(frozen=True, kw_only=True)
 class Prismatic(Joint):
-    """The nodes of a set slide along a direction that is fixed in space, each by itself.
+    """The nodes of a set slide along a direction that is fixed in space, or along lines of nodes of the other body.
+
+    Each node slides by itself. On another body, its rail is the line of nodes, parallel to the axis at the start, that
+    the node is on; rails bend and turn with the body that they belong to.
 
     Attributes:
-        nodes: node set of `body`.
+        nodes: node set of `body`; relative to another body, those that are on none of its lines stay free.
+        other_nodes: node set of `other` that holds the rails; None for the ground.
         axis: direction of the slide in the frame of `body` at the start [-].
     """
 
     nodes: str
     axis: Vec3
+    other_nodes: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.texts(self.title, nodes=self.nodes)
         validate.vectors(self.title, axis=self.axis)
         _check_direction(f"{self.title}.axis", self.axis)
-        if self.other is not None:
-            remedy = (
-                "leave it out: a body slides along a direction of the ground; nodes that slide on a body leave its own"
-            )
-            raise bad_value(f"{self.title}.other", self.other, remedy)
+        _check_sets(self, self.other_nodes)
 
-    def ties(self, first: Side, second: Side | None) -> Ties:
+    def ties(self, first: Side, second: Side | None) -> Ties | Rails:
         """The nodes of the set, across the axis."""
-        axis = first.frame @ np.asarray(self.axis) / np.linalg.norm(self.axis)
-        return Ties(first.mesh.nodes(self.nodes), tied=np.eye(3) - np.outer(axis, axis))
+        a, axis = first.mesh.nodes(self.nodes), first.frame @ np.asarray(self.axis) / np.linalg.norm(self.axis)
+        if second is None:
+            return Ties(a, tied=np.eye(3) - np.outer(axis, axis))
+        assert self.other_nodes is not None
+        rails = rails_along(first, a, second, second.mesh.nodes(self.other_nodes), axis)
+        sliders = np.concatenate([np.zeros(0, np.int32), *rails.sliders])
+        if _on_a_line(first, sliders):
+            where = f"are on lines of {self.other_nodes} of {self.other} along the axis"
+            what = f"{len(sliders)} of these nodes {where}, and a slide needs three that are not on one line"
+            raise bad_value(f"{self.title}.nodes", self.nodes, what)
+        return rails
 
 
 def _check_direction(field: str, value: Vec3) -> None:
@@ -245,13 +197,16 @@ def _check_direction(field: str, value: Vec3) -> None:
         raise bad_value(field, value, "give a direction other than zero")
 
 
-def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:
-    """Nodes among `a` of one body that stand where some of `b` of the other do, and those."""
-    from scipy.spatial import KDTree
+def _check_sets(joint: Joint, other_nodes: str | None) -> None:
+    if (other_nodes is None) != (joint.other is None):
+        remedy = "name a node set of the other body" if joint.other else "leave it out, the ground has no nodes"
+        raise bad_value(f"{joint.title}.other_nodes", other_nodes, remedy)
 
-    away, place = KDTree(second.X[b]).query(first.X[a])
-    met = away <= first.tolerance
-    return a[met], b[np.asarray(place)[met]]
+
+def _on_a_line(side: Side, nodes: Index) -> bool:
+    """Whether nodes are on one line, at one point or none."""
+    offset = side.X[nodes] - side.X[nodes].mean(axis=0) if len(nodes) else np.zeros((1, 3))
+    return bool(np.linalg.matrix_rank(offset, tol=side.tolerance) < 2)
 
 
 JOINTS: dict[str, type[Joint]] = {kind.__name__: kind for kind in (Revolute, Weld, Spherical, Prismatic)}

@@ -39,6 +39,7 @@ class BondStage:
     Attributes:
         count: tied pairs and driven nodes.
         partial: whether some pairs are tied in some directions only.
+        rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
         bonds: pairs, driven nodes and their tables.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
         at_rest: the same of a model without joints and driven axes.
@@ -69,6 +70,7 @@ class BondStage:
         self.bonds.second = wp.array(model.joint_second, dtype=wp.int32)
         self.partial = bool((model.joint_tied != np.eye(3)).any())
         self.bonds.tied = wp.array(model.joint_tied if self.partial else model.joint_tied[:0], dtype=wp.mat33d)
+        self.rails = wp.array(model.joint_slides, dtype=wp.vec3i)
         self.bonds.node = wp.array(nodes, dtype=wp.int32)
         self.bonds.begin, self.bonds.end = wp.array(begin, dtype=wp.vec3i), wp.array(end, dtype=wp.vec3i)
         self.bonds.times = wp.array(model.table_time, dtype=wp.float64)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM
-from warp_mca.kernels.nodes import constraint, node
+from warp_mca.kernels.nodes import constraint, node, slide
 from warp_mca.solve.contact_stage import per_scene
 from warp_mca.solve.threads import NODES, Split, whole
 
@@ -59,6 +59,13 @@ class NodeStage:
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
         wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+    def slide(self, step: Step) -> None:
+        """Put sliders back on their rails, once all their nodes have moved as free ones."""
+        state, bonds = step.state, self.bonds
+        inputs = [self.work.X, self.work.mass, bonds.bonds.first, bonds.rails, self.dt]
+        outputs = [state.u, state.v, state.speed_square, state.constraints.impulse]
+        wp.launch(slide.slide, len(bonds.rails), inputs=inputs, outputs=outputs)
 
     def integrate(
         self,

@@ -25,6 +25,7 @@ from warp_mca.elements.stage import gather_lists
 from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.search import FLAGS
 from warp_mca.kernels.hardware import subnormals
+from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
@@ -142,7 +143,8 @@ class Solver:
         ]
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
         advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.bonds.count else []
-        advance.append(Stage("nodes", self.nodes.advance))
+        advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.bonds.rails) else []
+        advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
             Stage("motion sums", lambda s: self.records.sum_motion(s, self.bonds, self.dt), only_records=True),
             Stage("frames: velocity", self._after_step, only_records=True),
@@ -217,6 +219,7 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
         sums = self.records.kernels()
+        sums += [slide.slide] if len(self.bonds.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]

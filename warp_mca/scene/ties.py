@@ -1,0 +1,108 @@
+"""Owns what a joint gives the solver: pairs of tied nodes, or nodes on rails; and what it knows of its bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.scene.bodies import Vec3
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+COINCIDENT = 1e-6  # of the extent of a joint's first body: nodes no further apart count as coincident
+
+
+@dataclass(frozen=True)
+class Side:
+    """What a joint knows of one of its bodies.
+
+    Attributes:
+        body: its name.
+        mesh: in the body's own frame.
+        X: positions of its nodes at the start of the impact phase [m], shape (node_count, 3), float64.
+        frame: rotation matrix from the body's frame to the scene's [-], shape (3, 3), float64.
+    """
+
+    body: str
+    mesh: Mesh
+    X: Array
+    frame: Array
+
+    @property
+    def tolerance(self) -> float:
+        """Distance within which nodes coincide [m]."""
+        return COINCIDENT * float(np.ptp(self.mesh.points, axis=0).max())
+
+    def on_axis(self, at: Vec3, axis: Vec3) -> Index:
+        """Nodes on an axis through `at` [m], in the order along it; both in the body's frame."""
+        direction = np.asarray(axis) / np.linalg.norm(axis)
+        offset = self.mesh.points - np.asarray(at)
+        along = offset @ direction
+        away = np.linalg.norm(offset - along[:, None] * direction, axis=1)
+        nodes = np.flatnonzero(away <= self.tolerance)
+        return nodes[np.argsort(along[nodes])].astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Pairs of nodes that stand at the same place and move as one, in all directions or in some.
+
+    Attributes:
+        first: nodes of the joint's body, in the numbering of its mesh, shape (pair_count,), int32.
+        second: nodes of the other body that they are tied to, likewise; None for the ground.
+        tied: orthogonal projector on the directions in which they move as one [-], shape (3, 3), float64, in the
+            scene's frame; None for all directions. The directions stay fixed in space.
+    """
+
+    first: Index
+    second: Index | None = None
+    tied: Array | None = None
+
+
+@dataclass(frozen=True)
+class Rails:
+    """Nodes that slide along lines of nodes of the other body, which may bend and turn.
+
+    Attributes:
+        sliders: nodes of the joint's body on each rail, in the numbering of its mesh, int32.
+        rails: nodes of the other body that make up each rail, in the order along it, two at least, int32. Beyond its
+            ends a rail goes on straight.
+    """
+
+    sliders: tuple[Index, ...]
+    rails: tuple[Index, ...]
+
+
+def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:
+    """Nodes among `a` of one body that stand where some of `b` of the other do, and those."""
+    from scipy.spatial import KDTree
+
+    away, place = KDTree(second.X[b]).query(first.X[a])
+    met = away <= first.tolerance
+    return a[met], b[np.asarray(place)[met]]
+
+
+def rails_along(first: Side, a: Index, second: Side, b: Index, axis: Array) -> Rails:
+    """Lines of the nodes `b` of a body along a unit vector, with the nodes among `a` of the other one on each."""
+    from scipy.spatial import KDTree
+
+    def across(X: Array) -> Array:
+        return X - np.outer(X @ axis, axis)
+
+    found: dict[tuple[int, ...], list[int]] = {}
+    lines = KDTree(across(second.X[b])).query_ball_point(across(first.X[a]), first.tolerance)
+    for node, line in zip(a.tolist(), lines, strict=True):
+        if len(line) > 1:
+            found.setdefault(tuple(sorted(line)), []).append(node)
+    rails = [b[list(line)] for line in found]
+    return Rails(
+        sliders=tuple(np.array(nodes, dtype=np.int32) for nodes in found.values()),
+        rails=tuple(rail[np.argsort(second.X[rail] @ axis)].astype(np.int32) for rail in rails),
+    )
