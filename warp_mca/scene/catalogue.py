@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module, util
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType, NoneType, SimpleNamespace
 from typing import TYPE_CHECKING, get_args, get_type_hints
 
 from warp_mca.base import validate
@@ -203,6 +203,8 @@ def _parameters(builder: Callable[..., Scene], module: ModuleType, scene: str) -
         if argument.default is inspect.Parameter.empty:
             raise bad_value("scene", scene, f"give parameter {name} of build() a default")
         kind, *metadata = get_args(hints.get(name)) or (hints.get(name, type(argument.default)),)
+        if argument.default is None:  # a value that may be left out, as in float | None
+            kind = next((item for item in get_args(kind) if item is not NoneType), kind)
         if not (isinstance(kind, type) and kind in KIND_WORDS):
             raise bad_value("scene", scene, f"parameter {name} of build() must be a float, an int, a str or a bool")
         param = next((item for item in metadata if isinstance(item, Param)), Param())

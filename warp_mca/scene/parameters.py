@@ -70,6 +70,8 @@ class Parameter:
         Raises:
             RequestError: it is neither.
         """
+        if self.default is None and (value is None or value == "none"):
+            return None
         try:
             result = _converted(value, self.kind)
         except (TypeError, ValueError, OverflowError):
@@ -82,7 +84,8 @@ class Parameter:
         unit = f" [{self.param.unit}]" if self.param.unit != "-" else ""
         if self.param.choices:
             return f"choose {self.param.range}"
-        return f"give {KIND_WORDS[self.kind]}{unit}" + (f", {self.param.range}" if self.param.range else "")
+        none = ", or none" if self.default is None else ""
+        return f"give {KIND_WORDS[self.kind]}{unit}" + (f", {self.param.range}" if self.param.range else "") + none
 
 
 def _converted(value: object, kind: type) -> object:
