@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,13 +70,13 @@ def body_motion(
     placement = _best_pose(points, masses, positions)
     held = np.zeros(points.shape, dtype=bool) if held is None else held
     for _ in range(MAX_ITERATIONS):
-        motion = _Motions(placement.place(points)[0], placement.origin, masses, held)
+        motion = Motions(placement.place(points)[0], placement.origin, masses, held)
         step = motion.fit(positions - motion.shape)[0]
         rotation = turn(step[3:]) @ placement.rotation
         placement = replace(placement, origin=placement.origin + step[:3], rotation=rotation)
         if max(np.abs(step[:3]).max() / motion.radius, np.abs(step[3:]).max()) <= 4.0 * np.finfo(np.float64).eps:
             break
-    motion = _Motions(placement.place(points)[0], placement.origin, masses, held)
+    motion = Motions(placement.place(points)[0], placement.origin, masses, held)
     z, forced, free = motion.fit(velocities)
     placement = replace(placement, velocity=z[:3], angular_velocity=z[3:])
     V = placement.place(points)[1]
@@ -98,7 +99,7 @@ def _best_pose(points: Array, masses: Array, positions: Array) -> Placement:
     return Placement(pivot=pivot, origin=origin, rotation=u @ mirror @ vt, velocity=none, angular_velocity=none)
 
 
-class _Motions:
+class Motions:
     """Small rigid motions J of a shape about a centre, and those among them that held axes leave free.
 
     Attributes:
@@ -126,12 +127,22 @@ class _Motions:
 
     def fit(self, field: Array) -> tuple[Array, Array, Array]:
         """Translation and rotation z that fit a nodal field best, the part z_p of it that held axes force, and N."""
-        rows = np.concatenate([self._J[self._held], np.zeros((6, 6))])  # so that all of the null space is found
-        u, size, vt = np.linalg.svd(rows, full_matrices=False)
-        rank = int((size > HELD * size[0]).sum()) if size[0] > 0.0 else 0
+        (u, size, vt), rank = self._held_motions
         known = np.concatenate([field[self._held], np.zeros(6)])
         forced, free = vt[:rank].T @ (u[:, :rank].T @ known / size[:rank]), vt[rank:].T
         mass = np.einsum("ncz,n,ncy->zy", self._J, self._masses, self._J, optimize=True)
         needed = self.momenta(field - self._J @ forced)
         z = forced + free @ np.linalg.solve(free.T @ mass @ free, free.T @ needed)
         return z * self._units, forced * self._units, free
+
+    def free(self) -> Array:
+        """J N, shape (node_count, 3, free_count): the nodal fields of the motions that held axes leave free."""
+        (_, _, vt), rank = self._held_motions
+        return self._J @ vt[rank:].T
+
+    @cached_property
+    def _held_motions(self) -> tuple[tuple[Array, Array, Array], int]:
+        """Singular value decomposition of A, and its rank."""
+        rows = np.concatenate([self._J[self._held], np.zeros((6, 6))])  # so that all of the null space is found
+        u, size, vt = np.linalg.svd(rows, full_matrices=False)
+        return (u, size, vt), int((size > HELD * size[0]).sum()) if size[0] > 0.0 else 0

@@ -1,0 +1,214 @@
+"""Owns the shape that a body keeps: the static equilibrium of its internal forces with its plastic strain.
+
+Newton's method on f(u) = 0 in the space of displacements that leave the rigid motions out. Each linear step K p = f is
+solved by conjugate gradients without a matrix: K p = (f(u) - f(u + h p)) / h. The preconditioner is the diagonal of K,
+estimated from products with random signs (Bekas, Kokiopoulou and Saad, Applied Numerical Mathematics 57, 2007), the
+same for the three axes of a node. Each iteration j releases the energy a_j r_j . z_j / 2, and the sum over the last d
+iterations is what was still free to leave before them (Strakos and Tichy, ETNA 13, 2002): the measure of convergence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import GuardError
+from warp_mca.rigid.body_motion import Motions
+from warp_mca.rigid.chain import Array
+
+Forces = Callable[[Array], Array]
+
+TOLERANCE = 1e-6  # share of the elastic energy that may still be free to leave
+PROBES = 12  # products with random signs for the diagonal
+DIFFERENCE = 1e-8  # largest displacement of a difference quotient, over the body's radius of inertia
+LEAST_DELAY = 50  # iterations that tell what is still free to leave
+MAX_NEWTON = 20
+MAX_ITERATIONS = 20_000  # of conjugate gradients, in each linear step
+MAX_HALVINGS = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equilibrium:
+    """The shape that a body keeps.
+
+    Attributes:
+        u: nodal displacements, with the rigid motion of the start [m], shape (node_count, 3), float64.
+        released: elastic energy that left on the way, by the trapezoidal rule over the steps [J].
+        remaining: elastic energy that is still free to leave, by the last linear step [J].
+        evaluations: of the forces.
+    """
+
+    u: Array
+    released: float
+    remaining: float
+    evaluations: int
+
+
+def equilibrium(
+    forces: Forces,
+    u: Array,
+    points: Array,
+    masses: Array,
+    *,
+    elastic_energy: float,
+    held: NDArray[np.bool_] | None = None,
+    name: str = "body",
+) -> Equilibrium:
+    """Relax the displacements of one body until its internal forces balance.
+
+    Rigid motions are left out by projection: the mean position and rotation of the nodes, weighted with mass, stay.
+
+    Args:
+        forces: internal nodal forces [N] of displacements [m], both shape (node_count, 3), float64, from the plastic
+            history at the start, which it must not change. Elements may yield on the way: from that history in one
+            step, so the history of the shape found is that of its displacements, evaluated once.
+        u: displacements at the start [m], shape (node_count, 3), float64.
+        points: node positions without displacement [m], shape (node_count, 3), float64.
+        masses: lumped nodal masses [kg], shape (node_count,), float64.
+        elastic_energy: against which the remaining energy is small [J]: that of the body at the start, or of the scene.
+        held: axes of nodes that keep their displacement and may take forces, shape (node_count, 3), bool.
+        name: of the body, for messages.
+
+    Raises:
+        GuardError: forces are not finite, or the search does not converge.
+    """
+    search = _Search(forces, u, points, masses, held, name)
+    u, residual = u.copy(), search.residual(u)
+    released, drop, delay = 0.0, np.inf, LEAST_DELAY
+    for _ in range(MAX_NEWTON):
+        if not residual.any():
+            return Equilibrium(u=u, released=released, remaining=0.0, evaluations=search.evaluations)
+        step, drop, iterations = search.linear_step(u, residual, 0.1 * TOLERANCE * elastic_energy, delay)
+        delay = max(delay, iterations // 2)
+        before, force = u, residual
+        u, residual = search.apply(u, residual, step)
+        released += float((0.5 * (force + residual) * (u - before)).sum())
+        if drop <= TOLERANCE * elastic_energy:
+            return Equilibrium(u=u, released=released, remaining=drop, evaluations=search.evaluations)
+    raise GuardError(
+        f"the shape of {name} without vibration was not found: after {MAX_NEWTON} steps {drop:.3g} J of "
+        f"{elastic_energy:.3g} J were still free to leave; its elements may be close to yielding or buckling at rest"
+    )
+
+
+class _Search:
+    """The search for one body.
+
+    Attributes:
+        evaluations: of the forces so far.
+    """
+
+    def __init__(
+        self,
+        forces: Forces,
+        u: Array,
+        points: Array,
+        masses: Array,
+        held: NDArray[np.bool_] | None,
+        name: str,
+    ) -> None:
+        self._forces, self._masses, self._name = forces, masses[:, None], name
+        self._loose = np.ones(u.shape) if held is None else (~held).astype(np.float64)
+        shape = points + u
+        none = np.zeros(u.shape, dtype=bool)
+        motions = Motions(shape, masses @ shape / masses.sum(), masses, none if held is None else held)
+        self._span, self._rigid = DIFFERENCE * motions.radius, motions.free()
+        self._gram = np.linalg.inv(np.einsum("nck,n,ncl->kl", self._rigid, masses, self._rigid, optimize=True))
+        self.evaluations, self._diagonal = 0, None
+
+    def residual(self, u: Array) -> Array:
+        """Forces that deform [N]: without those on held axes, and without net force and moment on free motions.
+
+        Raises:
+            GuardError: they are not finite.
+        """
+        self.evaluations += 1
+        force = self._loose * self._forces(u)
+        if not np.isfinite(force).all():
+            raise GuardError(f"the internal forces of {self._name} became infinite while its shape at rest was sought")
+        net = self._gram @ np.einsum("nck,nc->k", self._rigid, force)
+        return force - self._loose * self._masses * (self._rigid @ net)
+
+    def linear_step(self, u: Array, residual: Array, enough: float, delay: int) -> tuple[Array, float, int]:
+        """Solve K p = f by conjugate gradients, until the last `delay` iterations released no more than `enough` [J].
+
+        Returns:
+            The step p [m], the energy that it releases [J] and the number of iterations.
+
+        Raises:
+            GuardError: the body has no stiffness against some displacement, or the iterations do not end.
+        """
+        step, r, start = np.zeros_like(u), residual, residual
+        z = self._precondition(u, start, r)
+        p, rz, drops = z, float((r * z).sum()), []
+        for _ in range(MAX_ITERATIONS):
+            Kp = self._stiffness(u, start, p)
+            curvature = float((p * Kp).sum())
+            if curvature <= 0.0:
+                break
+            a = rz / curvature
+            step, r = step + a * p, r - a * Kp
+            drops.append(0.5 * a * rz)
+            if len(drops) >= delay and sum(drops[-delay:]) <= max(enough, 1e-4 * sum(drops)):
+                return step, sum(drops), len(drops)
+            z = self._precondition(u, start, r)
+            before, rz = rz, float((r * z).sum())
+            p = z + (rz / before) * p
+        if len(drops) < MAX_ITERATIONS:
+            raise self._failure("it has no stiffness against some displacement")
+        raise self._failure(f"a linear step takes more than {MAX_ITERATIONS} iterations")
+
+    def apply(self, u: Array, residual: Array, step: Array) -> tuple[Array, Array]:
+        """The displacements after the step, halved until it makes the residual smaller, and the residual then.
+
+        Raises:
+            GuardError: no part of the step does.
+        """
+        before = self._size(residual)
+        for _ in range(MAX_HALVINGS):
+            after = self.residual(u + step)
+            if self._size(after) < before:
+                return u + step, after
+            step = 0.5 * step
+        raise self._failure("no part of the last step makes its forces smaller")
+
+    def _size(self, residual: Array) -> float:
+        """The residual's square over the diagonal of K [J]."""
+        assert self._diagonal is not None
+        return float((residual**2 / self._diagonal).sum())
+
+    def _stiffness(self, u: Array, start: Array, p: Array) -> Array:
+        """K p [N]."""
+        h = self._span / np.abs(p).max()
+        return (start - self.residual(u + h * p)) / h
+
+    def _precondition(self, u: Array, start: Array, r: Array) -> Array:
+        """Diagonal of K to the power -1 times r, without rigid motions [m]."""
+        if self._diagonal is None:
+            self._diagonal = self._estimate_diagonal(u, start)
+        z = r / self._diagonal
+        rigid = self._gram @ np.einsum("nck,nc->k", self._rigid, self._masses * z)
+        return z - self._loose * (self._rigid @ rigid)
+
+    def _estimate_diagonal(self, u: Array, start: Array) -> Array:
+        """Diagonal of K, mean of a node's axes [N/m], shape (node_count, 1), float64.
+
+        Raises:
+            GuardError: most of it is 0.
+        """
+        rng, total = np.random.default_rng(0), np.zeros(len(u))
+        for _ in range(PROBES):
+            signs = self._loose * rng.choice([-1.0, 1.0], u.shape)
+            total += (signs * self._stiffness(u, start, signs)).sum(axis=1)
+        axes = self._loose.sum(axis=1)
+        diagonal = total / (PROBES * np.maximum(axes, 1.0))
+        typical = float(np.median(np.abs(diagonal[axes > 0.0])))
+        if typical == 0.0:
+            raise self._failure("it has no stiffness")
+        return np.maximum(diagonal, 1e-2 * typical)[:, None]
+
+    def _failure(self, reason: str) -> GuardError:
+        return GuardError(f"the shape of {self._name} without vibration was not found: {reason}")
