@@ -7,7 +7,7 @@ from typing import Annotated
 
 import warp_mca as mca
 from warp_mca import Param
-from warp_mca.scenes import two_link
+from warp_mca.scenes._arm import arm
 
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
@@ -61,7 +61,7 @@ def build(
 ) -> mca.Scene:
     """The rod OA of aluminium, and a plate of the same that slides freely along x."""
     metal = mca.J2Bilinear(E=E, nu=nu, rho=rho, sigma_y=sigma_y, E_t=E_t, beta=beta)
-    return two_link.arm(
+    return arm(
         "single_link",
         ("OA",),
         theta=(math.radians(theta),),

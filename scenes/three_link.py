@@ -7,7 +7,7 @@ from typing import Annotated
 
 import warp_mca as mca
 from warp_mca import Param
-from warp_mca.scenes import two_link
+from warp_mca.scenes._arm import arm
 
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
@@ -68,7 +68,7 @@ def build(
     """Rods OA, AB and BC of aluminium, and a plate of the same that slides freely along x."""
     metal = mca.J2Bilinear(E=E, nu=nu, rho=rho, sigma_y=sigma_y, E_t=E_t, beta=beta)
     rod = {"section": section, "ring": ring, "axial": axial}
-    return two_link.arm(
+    return arm(
         "three_link",
         ("OA", "AB", "BC"),
         theta=(math.radians(theta_OA), math.radians(theta_AB), math.radians(theta_BC)),
