@@ -11,7 +11,7 @@ from typing import Annotated
 
 import warp_mca as mca
 from warp_mca import Param
-from warp_mca.base.errors import bad_value
+from warp_mca.scenes._arm import arm
 
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
@@ -42,29 +42,6 @@ PRESETS: dict[str, dict[str, object]] = {
         "plate_extension": 28,
     },
 }
-
-
-def _approach_angle(length: float, radius: float, H: float, gravity: float, theta: tuple[float, float]) -> float:
-    """Angle of the lower link at contact [rad], by the slender-rod chain: where the tip's mesh must be fine."""
-    from warp_mca.rigid.chain import Chain, slender_link
-    from warp_mca.rigid.swing import swing
-
-    if 2.0 * length <= H:
-        raise bad_value("H", H, f"the tip reaches {2.0 * length:g} m below O and never touches the plate; lower H")
-    links = (
-        slender_link("OA", (length, 0.0), mass=1.0, hinge_out=(length, 0.0)),
-        slender_link("AB", (length, 0.0), mass=1.0),
-    )
-    chain = Chain(links=links, origin=(0.0, 0.0), gravity=(0.0, -gravity))
-    centre = length - radius
-
-    def gap(_t: float, angle) -> float:
-        return H - length * math.cos(angle[0]) - centre * math.cos(angle[1]) - radius
-
-    angle = round(float(swing(chain, theta, (0.0, 0.0), gap, t_max=5.0).theta[1]), 3)
-    if abs(angle) > math.radians(60.0):
-        raise bad_value("H", H, f"AB would strike at {math.degrees(angle):.0f} deg, beyond the tip's fine end; raise H")
-    return angle
 
 
 def _paths(length: float, radius: float) -> tuple[mca.Path, ...]:
@@ -151,18 +128,6 @@ def build(
             return mca.J2Bilinear(E=E, nu=nu, rho=rho, sigma_y=sigma_y, E_t=E_t, beta=beta)
         return mca.Elastic(E=E, nu=nu, rho=rho)
 
-    upper = mca.Rod(radius=radius, length=length, tip="flat", section=section, ring=ring, axial=axial_OA)
-    lower = mca.Rod(
-        radius=radius,
-        length=length,
-        section=section,
-        ring=ring,
-        axial=axial_AB,
-        axial_ratio=axial_ratio,
-        focus_angle=_approach_angle(length, radius, H, gravity, theta),
-        focus_size=focus_size,
-        focus_layers=focus_layers,
-    )
     plate = mca.Plate(
         length=plate_length,
         width=plate_width,
@@ -173,43 +138,32 @@ def build(
         layers=plate_layers,
         extension=plate_extension,
     )
-    rod, tip = aluminium(E_body, E_t_body), aluminium(E_tip, E_t_tip)
-    tip_centre = (length - radius, 0.0, 0.0)
-    top = mca.Surface(body="plate", nodes="top")
-    return mca.Scene(
-        name="two_link",
-        bodies=(
-            mca.Body(name="OA", geometry=upper, material=rod),
-            mca.Body(name="AB", geometry=lower, material={"body": rod, "tip": tip}),
-            mca.Body(
-                name="plate",
-                geometry=plate,
-                material=aluminium(E_plate, E_t_plate),
-                position=(0.0, -H, 0.0),
-                velocity=(v_plate, 0.0, 0.0),
-            ),
+    return arm(
+        "two_link",
+        ("OA", "AB"),
+        theta=theta,
+        length=length,
+        radius=radius,
+        H=H,
+        gravity=gravity,
+        rods=(
+            {"section": section, "ring": ring, "axial": axial_OA},
+            {"section": section, "ring": ring, "axial": axial_AB, "axial_ratio": axial_ratio},
         ),
-        joints=(
-            mca.Revolute(name="O", body="OA", at=(0.0, 0.0, 0.0), nodes=joint_nodes),  # pyright: ignore[reportArgumentType]
-            mca.Revolute(name="A", body="OA", at=(length, 0.0, 0.0), other="AB", nodes=joint_nodes),  # pyright: ignore[reportArgumentType]
-        ),
-        contacts=(
-            mca.Contact(slave=mca.Surface(body="AB", nodes="tip"), master=top, mu=mu, penalty=penalty, two_way=two_way),
-        ),
-        fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
-        paths=_paths(length, radius),
-        gravity=(0.0, -gravity, 0.0),
-        rigid=mca.RigidPhase(
-            theta=theta,
-            theta_dot=(0.0, 0.0),
-            tip=mca.Tip(body="AB", centre=tip_centre, radius=radius),
-            target=top,
-            inertia=rigid_inertia,  # pyright: ignore[reportArgumentType]
-        ),
+        focus={"focus_size": focus_size, "focus_layers": focus_layers},
+        materials={
+            "body": aluminium(E_body, E_t_body),
+            "tip": aluminium(E_tip, E_t_tip),
+            "plate": aluminium(E_plate, E_t_plate),
+        },
+        plate=plate,
+        v_plate=v_plate,
+        contact={"mu": mu, "penalty": penalty, "two_way": two_way},
+        joint_nodes=joint_nodes,
+        rigid_inertia=rigid_inertia,
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval, time_step_scale=time_step_scale),
+        paths=_paths(length, radius),
         t_end=t_end,
-        tip=mca.Point(body="AB", at=tip_centre),
-        target=mca.Point(body="plate", at=(0.0, 0.0, 0.0)),
     )
 
 

@@ -330,12 +330,9 @@ def _of_all(
     steps = sum(summary["n_steps"] for summary in summaries)
     fe, elements = cycle.clock.wall["fe"], summaries[0]["n_elements"] if summaries else 0
     pairs = [
-        {**pair.summary(np.arange(2.0)), "intervals": _pair_spans(summaries, offsets, k)}
+        _pair(pair, [summary["contacts_by_pair"][k] for summary in summaries], offsets)
         for k, pair in enumerate(contacts)
     ]
-    for k, pair in enumerate(pairs):
-        impulses = [summary["contacts_by_pair"][k]["impulse"] for summary in summaries]
-        pair["impulse"] = np.sum(impulses, axis=0).tolist() if impulses else [0.0, 0.0, 0.0]
     joints = [summary["joint_impulse"] for summary in summaries]
     found: dict[str, Any] = {
         "phases": story.phases,
@@ -376,12 +373,18 @@ def _shifted(summaries: Sequence[Mapping[str, Any]], offsets: Sequence[float], k
             yield [first + offset, second if key == "F_n_peaks" else second + offset]
 
 
-def _pair_spans(summaries: Sequence[Mapping[str, Any]], offsets: Sequence[float], k: int) -> list[list[float]]:
-    return [
-        [start + offset, end + offset]
-        for summary, offset in zip(summaries, offsets, strict=True)
-        for start, end in summary["contacts_by_pair"][k]["intervals"]
-    ]
+def _pair(pair: ContactHistory, found: Sequence[Mapping[str, Any]], offsets: Sequence[float]) -> dict[str, Any]:
+    """What the summary says of a contact, from what it says of it in each impact."""
+    forces = [item["F_max"] for item in found] or [[0.0, 0.0, 0.0]]
+    spans = [(offset, span) for item, offset in zip(found, offsets, strict=True) for span in item["intervals"]]
+    return {
+        "name": pair.name,
+        "intervals": [[start + offset, end + offset] for offset, (start, end) in spans],
+        "contact_open_at_end": bool(found) and found[-1]["contact_open_at_end"],
+        "F_max": max(forces, key=lambda force: float(np.linalg.norm(force))),
+        "impulse": np.sum([[0.0, 0.0, 0.0], *(item["impulse"] for item in found)], axis=0).tolist(),
+        "normal": None if pair.normal is None else pair.normal.tolist(),
+    }
 
 
 __all__ = ["Part", "cycle_result"]

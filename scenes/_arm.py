@@ -1,0 +1,138 @@
+"""Builds the arms of `single_link`, `two_link` and `three_link`: rods hinged in a row over a plate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import warp_mca as mca
+from warp_mca.base.errors import bad_value
+
+Angles = tuple[float, ...]
+
+
+def _approach_angle(
+    names: Sequence[str], length: float, radius: float, H: float, gravity: float, theta: Angles
+) -> float:
+    """Angle of the last link at contact [rad], by the slender-rod chain: where the tip's mesh must be fine."""
+    from warp_mca.rigid.chain import Chain, slender_link
+    from warp_mca.rigid.swing import swing
+
+    count, last = len(names), names[-1]
+    if count * length <= H:
+        raise bad_value("H", H, f"the tip reaches {count * length:g} m below O and never touches the plate; lower H")
+    links = tuple(
+        slender_link(name, (length, 0.0), mass=1.0, hinge_out=(0.0, 0.0) if name == last else (length, 0.0))
+        for name in names
+    )
+    chain = Chain(links=links, origin=(0.0, 0.0), gravity=(0.0, -gravity))
+    centre = length - radius
+
+    def gap(_t: float, angle) -> float:
+        height = H
+        for k in range(count - 1):
+            height -= length * math.cos(angle[k])
+        return height - centre * math.cos(angle[-1]) - radius
+
+    angle = round(float(swing(chain, theta, [0.0] * count, gap, t_max=5.0).theta[-1]), 3)
+    if abs(angle) > math.radians(60.0):
+        remedy = f"{last} would strike at {math.degrees(angle):.0f} deg, beyond the tip's fine end; raise H"
+        raise bad_value("H", H, remedy)
+    return angle
+
+
+def _bodies(
+    links: Sequence[str],
+    rods: Sequence[Mapping[str, Any]],
+    materials: Mapping[str, mca.Elastic],
+    plate: mca.Body,
+) -> tuple[mca.Body, ...]:
+    """The rods, the last one with its tip, and the plate."""
+    *inner, last = (
+        mca.Body(name=link, geometry=mca.Rod(**mesh), material=materials["body"])
+        for link, mesh in zip(links, rods, strict=True)
+    )
+    tip = replace(last, material={"body": materials["body"], "tip": materials["tip"]})
+    return (*inner, tip, plate)
+
+
+def arm(
+    name: str,
+    links: Sequence[str],
+    *,
+    theta: Angles,
+    length: float,
+    radius: float,
+    H: float,
+    gravity: float,
+    rods: Sequence[Mapping[str, Any]],
+    focus: Mapping[str, Any],
+    materials: Mapping[str, mca.Elastic],
+    plate: mca.Plate,
+    v_plate: float,
+    contact: Mapping[str, Any],
+    joint_nodes: str,
+    rigid_inertia: str,
+    impact: mca.ImpactPhase,
+    paths: tuple[mca.Path, ...] = (),
+    t_end: float | None = None,
+) -> mca.Scene:
+    """Equal rods, hinged in a row from O at the origin, whose hemispherical tip will strike a plate H below O.
+
+    Args:
+        name: of the scene.
+        links: names of the rods' bodies, from O outwards; the first letter of each names its inbound hinge.
+        theta: initial angles [rad].
+        length, radius: of each rod [m].
+        H: height of O above the plate [m].
+        gravity: acceleration, along -y [m/s^2].
+        rods: mesh parameters of each rod, of `mca.Rod`.
+        focus: mesh parameters of the fine patch on the tip, without its angle.
+        materials: of the rods' cylinders, the tip and the plate, under "body", "tip" and "plate".
+        plate: with its origin in the middle of the top.
+        v_plate: initial velocity of the plate along x [m/s].
+        contact: parameters of the contact of tip and plate.
+        joint_nodes, rigid_inertia: as `mca.Revolute` and `mca.RigidPhase` take them.
+        impact: the impact phase.
+        paths: lines along which stress is recorded.
+        t_end: as in `mca.Scene`.
+    """
+    last, tip_centre = links[-1], (length - radius, 0.0, 0.0)
+    top = mca.Surface(body="plate", nodes="top")
+    ground = mca.Body(
+        name="plate",
+        geometry=plate,
+        material=materials["plate"],
+        position=(0.0, -H, 0.0),
+        velocity=(v_plate, 0.0, 0.0),
+    )
+    angle = _approach_angle(links, length, radius, H, gravity, theta)
+    shapes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
+    shapes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
+    hinges: list[dict[str, Any]] = [{"name": "O", "body": links[0], "at": (0.0, 0.0, 0.0)}]
+    hinges += [
+        {"name": outer[0], "body": link, "at": (length, 0.0, 0.0), "other": outer} for link, outer in pairwise(links)
+    ]
+    return mca.Scene(
+        name=name,
+        bodies=_bodies(links, shapes, materials, ground),
+        joints=tuple(mca.Revolute(**hinge, nodes=joint_nodes) for hinge in hinges),  # pyright: ignore[reportArgumentType]
+        contacts=(mca.Contact(slave=mca.Surface(body=last, nodes="tip"), master=top, **contact),),
+        fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
+        paths=paths,
+        gravity=(0.0, -gravity, 0.0),
+        rigid=mca.RigidPhase(
+            theta=theta,
+            theta_dot=(0.0,) * len(links),
+            tip=mca.Tip(body=last, centre=tip_centre, radius=radius),
+            target=top,
+            inertia=rigid_inertia,  # pyright: ignore[reportArgumentType]
+        ),
+        impact=impact,
+        t_end=t_end,
+        tip=mca.Point(body=last, at=tip_centre),
+        target=mca.Point(body="plate", at=(0.0, 0.0, 0.0)),
+    )

@@ -1,0 +1,109 @@
+"""One rod falls about a hinge and strikes a plate with its hemispherical tip: the smallest chain of the rigid phase."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import warp_mca as mca
+from warp_mca import Param
+from warp_mca.scenes._arm import arm
+
+PRESETS: dict[str, dict[str, object]] = {
+    "quick": {},
+    "fine": {
+        "section": 12,
+        "ring": 4,
+        "axial": 38,
+        "focus_size": 0.33e-3,
+        "focus_layers": 7,
+        "plate_core": 18,
+        "plate_core_depth": 5,
+        "plate_layers": 12,
+        "plate_extension": 20,
+    },
+}
+
+
+def build(
+    *,
+    mu: Annotated[float, Param("coefficient of friction", low=0.0, high=10.0)] = 0.47,
+    H: Annotated[float, Param("height of the hinge above the plate", unit="m", low=0.0, exclusive=True)] = 0.15,
+    gravity: Annotated[float, Param("acceleration of gravity", unit="m/s^2", low=0.0, exclusive=True)] = 9.8,
+    theta: Annotated[
+        float, Param("initial angle of the rod from the downward vertical", unit="deg", low=-180.0, high=180.0)
+    ] = 90.0,
+    length: Annotated[float, Param("length of the rod", unit="m", low=0.0, exclusive=True)] = 0.21,
+    radius: Annotated[float, Param("radius of rod and tip", unit="m", low=0.0, exclusive=True)] = 0.013,
+    rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 2700.0,
+    nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.27,
+    E: Annotated[float, Param("Young's modulus", unit="Pa", low=0.0, exclusive=True)] = 70e9,
+    E_t: Annotated[float, Param("tangent modulus", unit="Pa", low=0.0)] = 27e9,
+    sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
+    beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
+    rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "mesh",
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
+    t_end: Annotated[
+        float | None, Param("end of a run through all impacts, from the release", unit="s", low=0.0, exclusive=True)
+    ] = None,
+    duration: Annotated[float, Param("simulated time after contact", unit="s", low=0.0, exclusive=True)] = 0.6e-3,
+    output_interval: Annotated[
+        float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)
+    ] = 1e-6,
+    section: Annotated[int, Param("cells along each side of the rod's core, even", low=2)] = 4,
+    ring: Annotated[int, Param("cells from the rod's core to its surface", low=1)] = 2,
+    axial: Annotated[int, Param("cells along the cylinder of the rod", low=1)] = 14,
+    focus_size: Annotated[
+        float, Param("cell size at the contact, on the tip and on the plate", unit="m", low=0.0, exclusive=True)
+    ] = 0.6e-3,
+    focus_layers: Annotated[int, Param("cells from the fine patch of the tip to its coarse mesh", low=1)] = 4,
+    plate_core: Annotated[int, Param("fine cells of the plate along x and along z, even", low=2)] = 6,
+    plate_core_depth: Annotated[int, Param("fine cells of the plate downwards", low=1)] = 3,
+    plate_layers: Annotated[int, Param("cells from the plate's fine core to its local box", low=1)] = 6,
+    plate_extension: Annotated[int, Param("cells along x from the local box to each end", low=1)] = 4,
+) -> mca.Scene:
+    """The rod OA of aluminium, and a plate of the same that slides freely along x."""
+    metal = mca.J2Bilinear(E=E, nu=nu, rho=rho, sigma_y=sigma_y, E_t=E_t, beta=beta)
+    return arm(
+        "single_link",
+        ("OA",),
+        theta=(math.radians(theta),),
+        length=length,
+        radius=radius,
+        H=H,
+        gravity=gravity,
+        rods=({"section": section, "ring": ring, "axial": axial},),
+        focus={"focus_size": focus_size, "focus_layers": focus_layers},
+        materials={"body": metal, "tip": metal, "plate": metal},
+        plate=mca.Plate(
+            length=0.4,
+            width=0.1,
+            height=0.05,
+            core=(plate_core, plate_core),
+            core_depth=plate_core_depth,
+            core_size=focus_size,
+            layers=plate_layers,
+            extension=plate_extension,
+        ),
+        v_plate=0.0,
+        contact={"mu": mu, "penalty": penalty},
+        joint_nodes="axis",
+        rigid_inertia=rigid_inertia,
+        t_end=t_end,
+        impact=mca.ImpactPhase(duration=duration, output_interval=output_interval),
+    )
+
+
+def check(result: mca.Result) -> list[str]:
+    """What a default run must show: theta_dot^2 = 3 g cos(theta) / length at contact, and one impact."""
+    found = []
+    summary = result.summary
+    cosine = (0.15 - 0.013) / (0.21 - 0.013)
+    rate = math.sqrt(3.0 * 9.8 * cosine / 0.21)
+    if abs(summary["theta"][0] - math.acos(cosine)) > 1e-9:
+        found.append(f"contact at {summary['theta'][0]:.6f} rad instead of {math.acos(cosine):.6f} rad")
+    if abs(-summary["theta_dot"][0] / rate - 1.0) > 0.02:
+        found.append(f"angular velocity {summary['theta_dot'][0]:.4g} rad/s is not within 2 % of {-rate:.4g} rad/s")
+    if len(summary["contacts"]) != 1:
+        found.append(f"expected one contact, found {summary['contacts']}")
+    return found

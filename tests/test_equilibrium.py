@@ -1,0 +1,193 @@
+"""Owns the tests of the shape that a body keeps: springback in closed form, rigid motion, held axes, refusals."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import warp as wp
+from scipy.spatial.transform import Rotation
+
+import warp_mca as mca
+from warp_mca.base.errors import GuardError
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.model import build_model, nodal_masses
+from warp_mca.rigid.equilibrium import equilibrium
+from warp_mca.solve.solver import Solver
+
+E, SIGMA_Y, E_T = 70e9, 110e6, 27e9
+
+
+def metal(nu: float, beta: float = 0.0) -> mca.J2Bilinear:
+    return mca.J2Bilinear(E=E, nu=nu, rho=2700.0, sigma_y=SIGMA_Y, E_t=E_T, beta=beta)
+
+
+class Body:
+    """One body on the solver in float64, whose forces leave its plastic history alone."""
+
+    def __init__(self, geometry: mca.Box | mca.Rod, material: mca.Elastic, kinematics: str = "corotational") -> None:
+        body = mca.Body(name="bar", geometry=geometry, material=material, kinematics=kinematics)
+        scene = mca.Scene(name="test", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6))
+        meshes = mca.mesh(scene)
+        self.mesh: Mesh = meshes["bar"]
+        self.masses, self.points = nodal_masses(scene, meshes)["bar"], self.mesh.points
+        model = build_model(scene, meshes, {"bar": self.points}, {"bar": np.zeros_like(self.points)})
+        self.solver = Solver(model, device="cpu", precision="float64", dt=1e-9)
+
+    def yielding(self, u: np.ndarray) -> np.ndarray:
+        """Forces of displacements [N]; elements yield and keep their plastic strain."""
+        self.solver.u.assign(u)
+        with wp.ScopedDevice("cpu"):
+            self.solver._forces()
+        force, total = self.solver.force.numpy(), np.zeros_like(u)
+        for stage in self.solver.elements:
+            np.add.at(total, stage.slot_node, force[stage.slot : stage.slot + len(stage.slot_node)])
+        return total
+
+    def forces(self, u: np.ndarray) -> np.ndarray:
+        """Forces of displacements [N] from the plastic strain that there is."""
+        arrays = [array for stage in self.solver.elements for array in (stage.history, stage.yielded)]
+        kept = [wp.clone(array) for array in arrays]
+        total = self.yielding(u)
+        for array, before in zip(arrays, kept, strict=True):
+            wp.copy(array, before)
+        return total
+
+    def energy(self, u: np.ndarray) -> float:
+        """Elastic energy [J]."""
+        self.forces(u)
+        with wp.ScopedDevice("cpu"):
+            for stage in self.solver.elements:
+                stage.energies(self.solver.X, self.solver.law, self.solver.u, self.solver.energy)
+        return float(self.solver.energy.numpy()[[0, 4]].sum())
+
+    def relax(self, u: np.ndarray, **given):
+        given = {"elastic_energy": self.energy(u), **given}
+        return equilibrium(self.forces, u, self.points, self.masses, **given)
+
+    def gradient(self, u: np.ndarray) -> np.ndarray:
+        """Mean displacement gradient, by least squares."""
+        arms = self.points - self.points.mean(axis=0)
+        return np.linalg.lstsq(arms, u - u.mean(axis=0), rcond=None)[0].T
+
+
+BAR = mca.Box(size=(0.04, 0.01, 0.01), divisions=(4, 2, 2))
+
+
+@pytest.mark.parametrize("e", [0.004, 0.01])
+@pytest.mark.parametrize("kinematics", ["corotational", "finite"])
+def test_a_stretched_bar_keeps_its_plastic_strain_exactly(kinematics: str, e: float):
+    """Isochoric stretch e: dp = (3 G e - sigma_y) / (3 G + H). Without load no stress is left, and the strain is dp; or
+    sigma_y / H where the back stress H dp was greater than the yield stress, so that it yielded on the way back."""
+    law = metal(0.3)
+    body = Body(BAR, law, kinematics)
+    u = body.points * (np.expm1([e, -e / 2, -e / 2]) if kinematics == "finite" else [e, -e / 2, -e / 2])
+    body.yielding(u)
+    start = body.energy(u)
+    found = body.relax(u)
+    G, H = law.shear_modulus, law.hardening_modulus
+    dp = (3.0 * G * e - SIGMA_Y) / (3.0 * G + H)
+    left = min(dp, SIGMA_Y / H)
+    assert (left < dp) == (e > 0.005)
+    kept = np.array([left, -left / 2, -left / 2])
+    kept = np.expm1(kept) if kinematics == "finite" else kept
+    np.testing.assert_allclose(body.gradient(found.u), np.diag(kept), atol=1e-4 * (e - left))
+    body.yielding(found.u)
+    assert body.energy(found.u) < 1e-6 * start and found.remaining < 1e-6 * start
+    if left == dp:
+        assert found.released == pytest.approx(start, rel=0.01)
+
+
+def bending_moment(curvature: float, height: float, law: mca.J2Bilinear) -> float:
+    """M over the width [N] where a strain kappa y along x, and no other, was applied, Poisson's ratio 0.
+
+    Deviatoric stress 4 G eps / 3 along x until 2 G eps = sigma_y, then 2 q / 3 with q = sigma_y + H dp and
+    dp = (2 G eps - sigma_y) / (3 G + H), plus K eps; integrated over 0 <= y <= height / 2, twice.
+    """
+    G, H, K, c = law.shear_modulus, law.hardening_modulus, law.bulk_modulus, 0.5 * height
+    first = min(SIGMA_Y / (2.0 * G * curvature), c)  # where it yields
+    elastic = (K + 4.0 * G / 3.0) * curvature * first**3 / 3.0
+    slope = K * curvature + 2.0 / 3.0 * H * 2.0 * G * curvature / (3.0 * G + H)
+    level = 2.0 / 3.0 * SIGMA_Y * (1.0 - H / (3.0 * G + H))
+    plastic = slope * (c**3 - first**3) / 3.0 + level * (c**2 - first**2) / 2.0
+    return 2.0 * (elastic + plastic)
+
+
+def test_a_bent_beam_springs_back_by_its_moment_over_its_stiffness():
+    """Poisson's ratio 0: other stresses relax by themselves, and the curvature falls by M / (E I)."""
+    height, length, law, curvature = 0.01, 0.06, metal(0.0, beta=1.0), 0.8
+    body = Body(mca.Box(size=(length, height, 0.005), divisions=(48, 8, 1)), law)
+    x, y = body.points[:, 0] - 0.5 * length, body.points[:, 1] - 0.5 * height
+    u = np.column_stack([-curvature * x * y, 0.5 * curvature * x**2, 0.0 * x])
+    body.yielding(u)
+    found = body.relax(u)
+    inner = (np.abs(x) < 1.5 * height) & (np.abs(y) < 1e-9)
+    after = 2.0 * np.polyfit(x[inner], found.u[inner, 1], 2)[0]
+    springback = bending_moment(curvature, height, law) / (E * height**3 / 12.0)
+    assert 0.2 * curvature < springback < 0.8 * curvature  # both parts show
+    assert curvature - after == pytest.approx(springback, rel=0.01)
+
+
+def test_vibration_leaves_and_rigid_motion_stays():
+    """A bar that never yielded, far from its place, turned and shaking: what is left is its rigid shape."""
+    body = Body(BAR, mca.Elastic(E=E, nu=0.3, rho=2700.0))
+    turn = Rotation.from_rotvec([0.4, -0.9, 1.3]).as_matrix()
+    x, y, z = ((body.points - 0.02) / 0.04).T
+    shake = 4e-5 * np.column_stack([x * y, np.sin(2.0 * x) + z * y, x * z])
+    u = (body.points + shake) @ turn.T + [0.3, -0.2, 0.1] - body.points
+    found = body.relax(u)
+    shape = body.points + found.u
+    before = body.points + u
+    np.testing.assert_allclose(body.masses @ shape, body.masses @ before, rtol=1e-13)
+    arms = shape - body.masses @ shape / body.masses.sum()
+    assert np.abs(body.masses @ np.cross(arms, before - shape)).max() < 1e-4 * body.masses @ np.abs(
+        arms * (before - shape)
+    ).sum(axis=1)
+    lengths = [np.linalg.norm(points - points[0], axis=1) for points in (shape, body.points)]
+    np.testing.assert_allclose(*lengths, atol=1e-3 * np.abs(shake).max())
+    assert body.energy(found.u) < 1e-6 * body.energy(u)
+
+
+def test_held_axes_keep_their_displacement():
+    body = Body(BAR, mca.Elastic(E=E, nu=0.3, rho=2700.0))
+    foot = body.points[:, 1] == 0.0
+    held = np.zeros(body.points.shape, dtype=bool)
+    held[foot, 1:] = True
+    u = 1e-5 * np.random.default_rng(1).uniform(-1.0, 1.0, body.points.shape) + [0.01, 0.0, 0.0]
+    u[foot, 1:] = 0.0
+    found = body.relax(u, held=held)
+    assert not found.u[foot, 1:].any()
+    np.testing.assert_allclose(found.u[:, 0], body.masses @ u[:, 0] / body.masses.sum(), atol=1e-8)
+    assert body.energy(found.u) < 1e-6 * body.energy(u)
+
+
+@pytest.mark.parametrize("finest", [1e-3, 2e-4])
+def test_iterations_on_a_graded_rod_stay_in_the_hundreds(finest: float):
+    rod = mca.Rod(radius=0.013, length=0.21, section=2, ring=2, axial=8, focus_size=finest, focus_layers=3)
+    body = Body(rod, mca.Elastic(E=E, nu=0.27, rho=2700.0))
+    x, y, _ = body.points.T
+    near = np.exp(-(((body.points - body.points[x.argmax()]) / 2e-3) ** 2).sum(axis=1))
+    u = np.column_stack([-8e-4 * x * y - 2e-6 * near, 4e-4 * x**2, 0.0 * x])
+    found = body.relax(u)
+    assert found.evaluations < 1000
+    assert body.energy(found.u) < 1e-6 * body.energy(u)
+
+
+def test_a_body_at_rest_stays_as_it_is():
+    body = Body(BAR, mca.Elastic(E=E, nu=0.3, rho=2700.0))
+    found = body.relax(np.zeros_like(body.points), elastic_energy=0.0)
+    assert not found.u.any() and found.evaluations == 1
+
+
+@pytest.mark.parametrize(
+    ("forces", "message"),
+    [
+        (lambda u: u * np.nan, "internal forces of bar became infinite"),
+        (lambda u: 1e3 * u, "shape of bar without vibration was not found: .*no stiffness"),
+        (lambda u: -1e3 * np.sign(u), "shape of bar without vibration was not found: .*no stiffness"),
+    ],
+)
+def test_a_search_that_fails_says_why(forces: Callable[[np.ndarray], np.ndarray], message: str):
+    points = BAR.build().points
+    u = np.random.default_rng(0).normal(size=points.shape) * 1e-5
+    with pytest.raises(GuardError, match=message):
+        equilibrium(forces, u, points, np.ones(len(points)), elastic_energy=1e-6, name="bar")
