@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels.contact import contact, search, sides, spring
+from warp_mca.kernels.contact import contact, edges, nearest, search, sides, spring
 from warp_mca.model.layout import offsets
 from warp_mca.model.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.solve.extremes import NormalForce
@@ -128,15 +128,19 @@ class ContactStage:
         self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
         self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
         self.face = wp.array(self._join("face"), dtype=wp.int32)
-        self.face_stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
         self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         if self.sides > 1:
-            self.slave_face = wp.array(self._join("slave_face"), dtype=wp.int32)
-            self.around_slave = self._rows("slave_face", "slave_offset", "face_of_slave")
-        self.count = wp.zeros(lists, dtype=wp.int32)
-        self.candidate = wp.zeros((lists, LIST_LENGTH), dtype=wp.int32)
+            self.slave_faces = edges.SlaveFaces()
+            self.slave_faces.face = wp.array(self._join("slave_face"), dtype=wp.int32)
+            rows = self._rows("slave_face", "slave_offset", "face_of_slave")
+            self.slave_faces.offset, self.slave_faces.face_of_slave = rows
+        self.surface = nearest.Master()
+        self.surface.face = self.face
+        self.surface.stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
+        self.surface.count = wp.zeros(lists, dtype=wp.int32)
+        self.surface.candidate = wp.zeros((lists, LIST_LENGTH), dtype=wp.int32)
         self.face_count = wp.zeros(len(self.face), dtype=wp.int32)
         self.face_slave = wp.zeros((len(self.face), max(item.room for item in self.items)), dtype=wp.int32)
         self.u_search = wp.zeros(model.node_count, dtype=wp.vec3d)
@@ -179,7 +183,7 @@ class ContactStage:
             self.find,
             len(self.slave),
             inputs=[self.bvh.id, *slaves, self.side, self.slave_scene, self.origin],
-            outputs=[self.count, self.candidate, self.face_count, self.face_slave, self.u_search, flag],
+            outputs=[self.surface.count, self.surface.candidate, self.face_count, self.face_slave, self.u_search, flag],
         )
         wp.launch(search.sort_lists, len(self.face), inputs=[self.face_count], outputs=[self.face_slave])
         wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[self.u_search])
@@ -210,8 +214,8 @@ class ContactStage:
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         if self.sides > 1:
-            slaves = [self.slave, self.slave_face, *self.around_slave, self.stiffness]
-        inputs = [X, u, v, self.u_search, *slaves, self.face_stiffness, self.face, self.count, self.candidate]
+            slaves = [self.slave, self.slave_faces, self.stiffness]
+        inputs = [X, u, v, self.u_search, *slaves, self.surface]
         inputs += [self.slave_scene, self.mu, self.margin, sums.per_newton, dt, self.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [u, self.u_search, self.master, self.face_offset, self.face_of_node, self.face]
