@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
-from warp_mca.kernels.elements.hex8_elastic import elastic_function, stress_functions
+from warp_mca.kernels.elements.hex8_small import small_strain_function, stress_functions
 from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
 from warp_mca.kernels.elements.patch import (
     POINT,
@@ -163,7 +163,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
     @wp.func
     def force_of_edge(S: mat33, pressure: R, b: vec3):
-        return add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b, pressure * b)
+        return add_traction(S, b, pressure * b)
 
     @wp.func
     def history_of_points(eps0: mat33, p0: R, eps1: mat33, p1: R):
@@ -195,7 +195,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     load_points, load_displacements, load_corners = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
-    elastic_forces = elastic_function(precision)
+    elastic_forces = small_strain_function(precision, "")
     add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
     to_point_lines, to_corners, lane_sum, lane_max = lane_functions(precision)
     shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
@@ -317,7 +317,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
                 if not flows:
                     ul = local_displacement(Xl, ul, W)
                     G = R(scale) * law[m, 1]
-                    f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G)
+                    f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
                     keep_forces(forces, lane, f)
                     keep_strain(e, strain_square(largest, G), extreme_out)
                     if wp.static(plastic):

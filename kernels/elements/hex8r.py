@@ -13,9 +13,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.fused import NOTHING, fused
-from warp_mca.kernels.elements.hexahedron import history_functions, load_function, store_function, stress_function
+from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.kinematics import kinematics
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
+from warp_mca.kernels.elements.point_records import history_functions, stress_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions

@@ -31,7 +31,7 @@ class ElementStage:
         conn, material: as in `Block`.
         yielded: not 0 where an element has yielded, shape (element_count,), int32; empty where elastic.
         history: plastic strain and equivalent plastic strain of each point, in the order of
-            `kernels.elements.hexahedron.history_functions`, then what the element keeps more; empty where elastic.
+            `kernels.elements.point_records.history_functions`, then what the element keeps more; empty where elastic.
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step so far [-], from
             0 on, shape (2, element_count), in the scalars of the precision.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
