@@ -228,7 +228,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_modulus_low": Mutation(
         "hourglass strains of hex8r along an edge take the modulus G in place of 2 G / (1 - nu)",
-        "kernels/elements/hex8r.py",
+        "kernels/elements/hourglass.py",
         "plane = third * R(2.0) * G / (one - nu)",
         "plane = third * G",
         element="hex8r",
@@ -291,7 +291,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_feels_strain": Mutation(
         "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
-        "kernels/elements/hex8r.py",
+        "kernels/elements/hourglass.py",
         "left = add_product(u[3 + m], H, -x[3 + m])",
         "left = u[3 + m]",
         element="hex8r",
