@@ -92,7 +92,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    add_traction, symmetric_gradient, invariant = stress_functions(precision)
+    add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
     functions = law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     pair = wp.types.vector(2 * HISTORY_SIZE, R)
@@ -120,13 +120,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
         shear = G / det
         direct = shear + shear
         mean = R(THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
-        xx = direct * (sums[0, 0] - mean)
-        yy = direct * (sums[1, 1] - mean)
-        zz = direct * (sums[2, 2] - mean)
-        xy = shear * sums[0, 1]
-        yz = shear * sums[1, 2]
-        xz = shear * sums[0, 2]
-        elastic = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+        elastic = deviator(direct, shear, mean, sums[0, 0], sums[1, 1], sums[2, 2], sums[0, 1], sums[1, 2], sums[0, 2])
         p_xx = history[first]
         p_yy = history[first + 1]
         p_xy = history[first + 2]
@@ -134,7 +128,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
         p_xz = history[first + 4]
         eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
         S, eps_new, p_new = return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
-        return S, eps_new, p_new, invariant(xx, yy, xy, yz, xz)
+        return S, eps_new, p_new, invariant(elastic)
 
     @wp.func
     def force_of_edge(S: mat33, pressure: R, b: vec3):

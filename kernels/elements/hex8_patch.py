@@ -43,14 +43,15 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def elastic_function(precision: str, plastic: bool) -> Any:
-    """The function that computes an element as if it were elastic, and says whether it begins to yield."""
+def element_function(precision: str, law_name: str) -> Any:
+    """The function that computes the element of a thread as if it were elastic, and lists it where it yields."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
-    _, local_displacement = frame_functions(precision)
+    plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
+    element_rotation, local_displacement = frame_functions(precision)
     element_forces = small_strain_function(precision, "")
     _, keep_forces, _ = sum_functions(precision)
-    keep_strain, _, strain_square = keep_functions(R)
+    keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.func
@@ -67,6 +68,7 @@ def elastic_function(precision: str, plastic: bool) -> Any:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
+        """Whether the element begins to yield; its forces do not hold then."""
         G = R(scale) * law[m, 1]
         local = local_displacement(Xl, ul, W)
         f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
@@ -79,7 +81,32 @@ def elastic_function(precision: str, plastic: bool) -> Any:
                 yielded_out[e] = 1
         return yields
 
-    return elastic_element
+    @wp.func
+    def compute_element(
+        Xl: mat83,
+        ul: mat83,
+        e: int,
+        m: int,
+        lane: int,
+        law: wp.array2d(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        listed_out: wp.array(dtype=wp.int32),
+        force_out: wp.array(dtype=R),
+    ):
+        W, J = element_rotation(Xl, ul)
+        keep_volume(e, R(1.0) - J, extreme_out)
+        flows = bool(False)
+        if wp.static(plastic):
+            flows = yielded_out[e] != 0
+        if not flows:
+            flows = elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
+        if wp.static(plastic):
+            if flows:
+                list_element(W, lane, listed_out, force_out)
+
+    return compute_element
 
 
 @cache
@@ -99,10 +126,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)
     clear_nowhere, _, sum_patch = sum_functions(precision)
-    element_rotation, _ = frame_functions(precision)
-    elastic_element = elastic_function(precision, plastic)
-    list_element, flow_listed = flow_functions(precision, law_name)
-    _, keep_volume, _ = keep_functions(R)
+    compute_element, (_, flow_listed) = element_function(precision, law_name), flow_functions(precision, law_name)
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(
@@ -153,16 +177,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
             if wp.static(early):
                 copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                W, J = element_rotation(Xl, ul)
-                keep_volume(e, R(1.0) - J, extreme_out)
-                flows = bool(False)
-                if wp.static(plastic):
-                    flows = yielded_out[e] != 0
-                if not flows:
-                    flows = elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, forces)
-                if wp.static(plastic):
-                    if flows:
-                        list_element(W, lane, listed, forces)
+                compute_element(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces)
             wait_for_copies()
             barrier()
             if wp.static(plastic):

@@ -21,10 +21,11 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def stress_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions of symmetric tensors: S b + c; six sums of products l b, as strains xx, yy, zz, xy, yz, xz; J2.
+def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+    """Functions of symmetric tensors.
 
-    J2 = S : S / 2 of a traceless S needs no zz.
+    (S b + c; six sums of products l b, as strains xx, yy, zz, xy, yz, xz; the deviatoric stress of strains, whose shear
+    components are doubled; the invariant J2 = S : S / 2 of a traceless S, which needs no zz.)
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -50,10 +51,21 @@ def stress_functions(precision: str) -> tuple[Any, Any, Any]:
         return xx, yy, zz, xy, yz, xz
 
     @wp.func
-    def invariant(xx: R, yy: R, xy: R, yz: R, xz: R):
-        return xx * (xx + yy) + (yy * yy + (xy * xy + (yz * yz + xz * xz)))
+    def deviator(direct: R, shear: R, mean: R, xx: R, yy: R, zz: R, xy: R, yz: R, xz: R):
+        d_xx = direct * (xx - mean)
+        d_yy = direct * (yy - mean)
+        d_zz = direct * (zz - mean)
+        d_xy = shear * xy
+        d_yz = shear * yz
+        d_xz = shear * xz
+        return mat33(d_xx, d_xy, d_xz, d_xy, d_yy, d_yz, d_xz, d_yz, d_zz)
 
-    return add_traction, symmetric_gradient, invariant
+    @wp.func
+    def invariant(S: mat33):
+        shear = S[0, 1] * S[0, 1] + (S[1, 2] * S[1, 2] + S[0, 2] * S[0, 2])
+        return S[0, 0] * (S[0, 0] + S[1, 1]) + (S[1, 1] * S[1, 1] + shear)
+
+    return add_traction, symmetric_gradient, deviator, invariant
 
 
 @cache
@@ -108,7 +120,7 @@ def small_strain_function(precision: str, law_name: str) -> Any:
     gauss_lines = gauss_line_function(precision, scaled=False)
     _, to_lines = line_functions(precision)
     edge_to_node = node_force_function(precision)
-    add_traction, symmetric_gradient, invariant = stress_functions(precision)
+    add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
     plastic, flow_at = bool(law_name), flow_function(precision, law_name)
 
     @wp.func
@@ -151,14 +163,8 @@ def small_strain_function(precision: str, law_name: str) -> Any:
             shear = G / det
             direct = shear + shear
             mean = R(THIRD) * trace
-            xx = direct * (xx - mean)
-            yy = direct * (yy - mean)
-            zz = direct * (zz - mean)
-            xy = shear * xy
-            yz = shear * yz
-            xz = shear * xz
-            largest = wp.max(largest, invariant(xx, yy, xy, yz, xz))
-            S = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+            S = deviator(direct, shear, mean, xx, yy, zz, xy, yz, xz)
+            largest = wp.max(largest, invariant(S))
             if wp.static(plastic):
                 S, flag_new = flow_at(S, G, g, e, m, flag, flag_new, law, history_out)
             Sx[jx] = add_traction(S, b0, Sx[jx])
