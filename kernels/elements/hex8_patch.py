@@ -111,7 +111,7 @@ def element_function(precision: str, law_name: str) -> Any:
 
 @cache
 def force_kernel(precision: str, law_name: str) -> Any:
-    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law.
+    """Kernel: the forces of each patch on its nodes and, where there is a law, the plastic history.
 
     flowing_out has the number of elements of each patch that took the return map, shape (patch_count,).
     """
@@ -154,7 +154,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         listed = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
-        near = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        kept_points = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
         pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
@@ -162,20 +162,20 @@ def force_kernel(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             if lane == 0:
                 listed[0] = 0
-        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, near, pool)
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, kept_points, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
-            Xl = load_points(near, pool, corners, first, exponent_of(head))
+            Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
             ul = load_displacements(pool, corners, first)
-            coming = ring[(k + 1) % wp.static(HEADS)]
+            next_head = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
             if wp.static(early):
-                copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
+                copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 compute_element(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces)
             wait_for_copies()
@@ -183,16 +183,18 @@ def force_kernel(precision: str, law_name: str) -> Any:
             if wp.static(plastic):
                 if lane == 0:
                     flowing_out[head[3]] = listed[0]
-                flow_listed(near, pool, first, head, lane, patches, law, listed, history_out, extreme_out, forces)
+                flow_listed(
+                    kept_points, pool, first, head, lane, patches, law, listed, history_out, extreme_out, forces
+                )
             if wp.static(not early):
-                copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
-            corners = corners_of(patches, coming, lane)
-            copy_ahead(points, patches, block, stride, k, lane, first, ring, near)
+                copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
+            corners = corners_of(patches, next_head, lane)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, kept_points)
             sum_patch(forces, places, head, lane, slot, force_out)
             if wp.static(not early):
                 wait_for_copies()
                 barrier()
-            head = coming
+            head = next_head
             k += 1
 
     return begins_early(hex8_patch_force)
