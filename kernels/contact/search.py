@@ -16,8 +16,10 @@ FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
 
 @cache
 def bounds_kernel(each: bool) -> Any:
-    """Kernel: box of each face, deepened inwards by the face's size and widened by the margin; relative to `origin`,
-    so that float32 bounds stay fine. Clears the counts of the lists that `find_candidates` fills."""
+    """Kernel: bounding box of each face, extended inwards by the size of the face and by the margin on all sides.
+
+    Boxes are relative to `origin`, so that float32 is fine enough. Clears the counts that `find_candidates` raises.
+    """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique" if each else None)
@@ -59,8 +61,8 @@ def bounds_kernel(each: bool) -> Any:
 def candidates_kernel(each: bool, sides: int) -> Any:
     """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
 
-    With `each`, faces are grouped by scene, and a slave looks among those of its own. With more `sides` of the master,
-    a slave has a list for each of them, and goes by the number of that list.
+    With `each`, faces are grouped by scene, and a slave looks only among the faces of its scene. Where a master has
+    several sides, a slave has one list for each side, and the faces list the number of that list in place of the slave.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
@@ -120,11 +122,11 @@ def candidates_kernel(each: bool, sides: int) -> Any:
 
 @cache
 def clear_kernel(each: bool, sides: int) -> Any:
-    """Kernel: slave nodes whose nearest face has them in front of it hold no depth at the start.
+    """Kernel: set the depth at the start to 0 for slave nodes in front of their nearest face.
 
-    With more `sides` of the master, a node that its nearest face has behind it holds none in the other sides. The lists
-    do not tell: of a body that is thinner than its faces are long they may hold the far side alone. Faces are looked
-    for as far away as their boxes are deep.
+    Where a master has several sides, a node behind its nearest face keeps a depth in the side of that face alone. The
+    candidate lists cannot be used: in a body thinner than its faces are long they may hold only the far side. So this
+    looks for faces as far away as the boxes of faces are deep.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
     of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)

@@ -7,14 +7,15 @@ import warp as wp
 
 from warp_mca.kernels.elements.hexahedron import (
     edge_functions,
-    frame_functions,
+    framed_function,
+    gauss_line_function,
     gradient_function,
-    history_functions,
-    load_function,
+    lines_of_point,
     node_force_function,
     store_function,
 )
 from warp_mca.kernels.elements.kinematics import kinematics
+from warp_mca.kernels.elements.point_records import history_functions
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.extremes import keep_functions
@@ -23,14 +24,35 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
+def pressure_function(precision: str, finite: bool) -> Any:
+    """The function that gives the one pressure of an element [Pa], from its mean dilatation."""
+    t = scalars(precision)
+    R, mat43 = t.real, t.mat43
+    point_gradient, k = gradient_function(precision), kinematics(precision, finite)
+    dilation_of, pressure_of = k.dilation, k.pressure
+
+    @wp.func
+    def element_pressure(gx: mat43, gy: mat43, gz: mat43, lx: mat43, ly: mat43, lz: mat43, K: R):
+        volume = R(0.0)
+        dilation = R(0.0)
+        for g in range(8):
+            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
+            volume += det
+            dilation += dilation_of(grad) * det
+        return pressure_of(K, dilation / volume)
+
+    return element_pressure
+
+
+@cache
 def finite_force_kernel(precision: str, law_name: str) -> Any:
     """The force kernel at finite strain: volumes first, because the pressure's direction varies within an element."""
     t = scalars(precision)
     R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
-    half_edges, to_gauss = edge_functions(precision)
-    element_rotation, local_displacement = frame_functions(precision, True)
+    _, to_gauss = edge_functions(precision)
+    gauss_lines = gauss_line_function(precision, scaled=True)
+    load_in_frame = framed_function(precision, True)
     edge_to_node = node_force_function(precision)
-    load_element = load_function(precision)
     store_force = store_function(precision)
     keep_strain, keep_volume, _ = keep_functions(R)
     point_gradient = gradient_function(precision)
@@ -38,7 +60,7 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, True)
-    dilation_of, deviator, nominal, pressure_of = k.dilation, k.deviator, k.nominal, k.pressure
+    deviator, nominal, element_pressure = k.deviator, k.nominal, pressure_function(precision, True)
 
     @wp.kernel(enable_backward=False, module="unique")
     def hex8_finite_force(
@@ -55,25 +77,12 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
-        Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W, J = element_rotation(Xl, ul)
-        ul = local_displacement(Xl, ul, W)
-        gx = to_gauss(half_edges(Xl, 0))
-        gy = to_gauss(half_edges(Xl, 1))
-        gz = to_gauss(half_edges(Xl, 2))
-        lx = to_gauss(half_edges(ul, 0))
-        ly = to_gauss(half_edges(ul, 1))
-        lz = to_gauss(half_edges(ul, 2))
+        Xl, ul, W, J = load_in_frame(X, u, conn, e)
+        gx, gy, gz = gauss_lines(Xl)
+        lx, ly, lz = gauss_lines(ul)
         m = material[e]
         G = law[m, 1]
-        volume = R(0.0)
-        dilation = R(0.0)
-        for g in range(8):
-            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
-            volume += det
-            dilation += dilation_of(grad) * det
-        pressure = pressure_of(law[m, 0], dilation / volume)
+        pressure = element_pressure(gx, gy, gz, lx, ly, lz, law[m, 0])
         flag = int(0)
         if wp.static(plastic):
             flag = yielded_out[e]
@@ -83,13 +92,8 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
         Sy = mat43()
         Sz = mat43()
         for g in range(8):
-            i = g & 1
-            j = (g >> 1) & 1
-            k = g >> 2
-            jx = j + 2 * k
-            jy = i + 2 * k
-            jz = i + 2 * j
-            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
+            jx, jy, jz = lines_of_point(g)
+            _det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             strain, N, d = deviator(grad)
             largest = wp.max(largest, wp.ddot(strain, strain))
             S = (R(2.0) * G) * strain

@@ -1,8 +1,7 @@
 """Owns the force kernel of `hex8` on a GPU, at small strain: one thread for each element, four where it yields.
 
 Elements that have not yielded need neither history nor registers for it: a thread computes one as if it were elastic.
-Those that have, or that turn out to yield now, are listed; then four lanes take each of them, two Gauss points apiece,
-and exchange what the points of an element share.
+Elements that have, or that begin to yield now, are listed; then `hex8_lanes` computes them, four lanes for each.
 """
 
 from functools import cache
@@ -10,9 +9,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.fused import fused
-from warp_mca.kernels.elements.hex8_elastic import elastic_function, stress_functions
-from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE, frame_functions
+from warp_mca.kernels.elements.hex8_lanes import flow_functions
+from warp_mca.kernels.elements.hex8_small import small_strain_function
+from warp_mca.kernels.elements.hexahedron import LINE_SCALE, frame_functions
 from warp_mca.kernels.elements.patch import (
     POINT,
     RESIDENT,
@@ -26,21 +25,17 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
 from warp_mca.kernels.hardware.overlap import begins_early
-from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,
     HEADS,
-    ROW,
     barrier,
     head_ring,
     list_pool,
-    row_functions,
     shared_functions,
     slot_pools,
     wait_for_copies,
-    warp_barrier,
 )
-from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import keep_functions
 from warp_mca.model.patches import PATCH, SLOTS
 
@@ -48,143 +43,80 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
-    """Functions over the four lanes of an element, whose bits 0 and 1 are xi and eta of corners and Gauss points.
-
-    A lane has the lower and the upper of both. (Corner values -> edge vectors on the Gauss lines through the lane's
-    points, as `line_functions` has them, along zeta one for both; edge forces at the points -> corner forces, the
-    transpose; sum and greatest of a scalar.)
-    """
+def element_function(precision: str, law_name: str) -> Any:
+    """The function that computes the element of a thread as if it were elastic, and lists it where it yields."""
     t = scalars(precision)
-    R, vec3 = t.real, t.vec3
-    _, exchange = shared_functions(precision)
-
-    @wp.func
-    def other(x: vec3, mask: int):
-        return vec3(exchange(x[0], mask), exchange(x[1], mask), exchange(x[2], mask))
-
-    @wp.func
-    def to_point_lines(lower: vec3, upper: vec3, xi: R, eta: R):
-        r = R(LINE_RATIO)
-        x0 = other(lower, 1)  # across xi
-        x1 = other(upper, 1)
-        y0 = other(lower, 2)  # across eta
-        y1 = other(upper, 2)
-        z0 = other(x0, 2)  # across both
-        z1 = other(x1, 2)
-        # first the differences of corners, which lose nothing to rounding, then their means
-        a0 = xi * ((lower - x0) + r * (y0 - z0))
-        a1 = xi * ((upper - x1) + r * (y1 - z1))
-        b0 = eta * ((lower - y0) + r * (x0 - z0))
-        b1 = eta * ((upper - y1) + r * (x1 - z1))
-        c = (upper - lower) + r * (y1 - y0) + r * ((x1 - x0) + r * (z1 - z0))
-        return a0 + r * a1, a1 + r * a0, b0 + r * b1, b1 + r * b0, c
-
-    @wp.func
-    def to_corners(Fx0: vec3, Fx1: vec3, Fy0: vec3, Fy1: vec3, Fz: vec3, xi: R, eta: R):
-        r = R(LINE_RATIO)
-        x0 = -xi * (Fx0 + other(Fx0, 1))  # forces pull the ends of an edge together
-        x1 = -xi * (Fx1 + other(Fx1, 1))
-        y0 = eta * (Fy0 + r * other(Fy0, 1))
-        y1 = eta * (Fy1 + r * other(Fy1, 1))
-        z = Fz + r * other(Fz, 1)
-        # each lane sends what its partner, on the other side, adds
-        s0 = (x0 - y0) + other(r * x0 + y0, 2)
-        s1 = (x1 - y1) + other(r * x1 + y1, 2)
-        z = z + r * other(z, 2)
-        return (s0 + r * s1) + z, (s1 + r * s0) - z
-
-    @wp.func
-    def lane_sum(value: R):
-        value += exchange(value, 1)
-        return value + exchange(value, 2)
-
-    @wp.func
-    def lane_max(value: R):
-        value = wp.max(value, exchange(value, 1))
-        return wp.max(value, exchange(value, 2))
-
-    return to_point_lines, to_corners, lane_sum, lane_max
-
-
-@cache
-def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
-    """Functions of one Gauss point.
-
-    (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
-    stress and plastic strain of a point, and J2 of the stress that it would have without; the history of two points;
-    forces of the edges.)
-    """
-    t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
-    add_traction, symmetric_gradient, invariant = stress_functions(precision)
-    functions = law_functions(law_name, precision)
-    read_parameters, return_map = functions.parameters, functions.return_map
-    pair = wp.types.vector(2 * HISTORY_SIZE, R)
+    R, mat33, mat83 = t.real, t.mat33, t.mat83
+    plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
+    element_rotation, local_displacement = frame_functions(precision)
+    element_forces = small_strain_function(precision, "")
+    _, keep_forces, _ = sum_functions(precision)
+    keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
     @wp.func
-    def shape_of_point(gx: vec3, gy: vec3, gz: vec3, lx: vec3, ly: vec3, lz: vec3):
-        b0 = wp.cross(gy, gz)
-        b1 = wp.cross(gz, gx)
-        b2 = wp.cross(gx, gy)
-        xx, yy, zz, xy, yz, xz = symmetric_gradient(lx, ly, lz, b0, b1, b2)
-        return b0, b1, b2, wp.dot(gx, b0), mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-
-    @wp.func
-    def stress_of_point(
-        sums: mat33,
-        det: R,
-        law: wp.array2d(dtype=R),
+    def elastic_element(
+        Xl: mat83,
+        ul: mat83,
+        W: mat33,
+        e: int,
         m: int,
-        history: pair,
-        first: int,
+        lane: int,
+        law: wp.array2d(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=R),
     ):
-        """Direct `sums` are strains times det, the others twice that; the history of the point begins at `first`."""
+        """Whether the element begins to yield; its forces do not hold then."""
         G = R(scale) * law[m, 1]
-        shear = G / det
-        direct = shear + shear
-        mean = R(THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
-        xx = direct * (sums[0, 0] - mean)
-        yy = direct * (sums[1, 1] - mean)
-        zz = direct * (sums[2, 2] - mean)
-        xy = shear * sums[0, 1]
-        yz = shear * sums[1, 2]
-        xz = shear * sums[0, 2]
-        elastic = mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-        p_xx = history[first]
-        p_yy = history[first + 1]
-        p_xy = history[first + 2]
-        p_yz = history[first + 3]
-        p_xz = history[first + 4]
-        eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
-        S, eps_new, p_new = return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
-        return S, eps_new, p_new, invariant(xx, yy, xy, yz, xz)
+        local = local_displacement(Xl, ul, W)
+        f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
+        keep_forces(force_out, lane, f)
+        keep_strain(e, strain_square(largest, G), extreme_out)
+        yields = bool(False)
+        if wp.static(plastic):
+            if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
+                yields = bool(True)
+                yielded_out[e] = 1
+        return yields
 
     @wp.func
-    def force_of_edge(S: mat33, pressure: R, b: vec3):
-        return add_traction(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2], b, pressure * b)
+    def compute_element(
+        Xl: mat83,
+        ul: mat83,
+        e: int,
+        m: int,
+        lane: int,
+        law: wp.array2d(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        listed_out: wp.array(dtype=wp.int32),
+        force_out: wp.array(dtype=R),
+    ):
+        W, J = element_rotation(Xl, ul)
+        keep_volume(e, R(1.0) - J, extreme_out)
+        flows = bool(False)
+        if wp.static(plastic):
+            flows = yielded_out[e] != 0
+        if not flows:
+            flows = elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
+        if wp.static(plastic):
+            if flows:
+                list_element(W, lane, listed_out, force_out)
 
-    @wp.func
-    def history_of_points(eps0: mat33, p0: R, eps1: mat33, p1: R):
-        # fmt: off
-        return pair(
-            eps0[0, 0], eps0[1, 1], eps0[0, 1], eps0[1, 2], eps0[0, 2], p0,
-            eps1[0, 0], eps1[1, 1], eps1[0, 1], eps1[1, 2], eps1[0, 2], p1,
-        )
-        # fmt: on
-
-    return shape_of_point, stress_of_point, history_of_points, force_of_edge
+    return compute_element
 
 
 @cache
 def force_kernel(precision: str, law_name: str) -> Any:
-    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law.
+    """Kernel: the forces of each patch on its nodes and, where there is a law, the plastic history.
 
     flowing_out has the number of elements of each patch that took the return map, shape (patch_count,).
     """
     t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
@@ -192,73 +124,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
     # otherwise lanes of elements that yield still need the nodes of this patch where those of the next would go
     early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
-    load_points, load_displacements, load_corners = load_functions(precision)
-    clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
-    element_rotation, local_displacement = frame_functions(precision)
-    elastic_forces = elastic_function(precision)
-    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
-    to_point_lines, to_corners, lane_sum, lane_max = lane_functions(precision)
-    shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
-    size, last = HISTORY_SIZE, HISTORY_SIZE - 1
-    read_row, write_row = row_functions(precision, 2 * size)
-    keep_strain, keep_volume, strain_square = keep_functions(R)
-    scale = LINE_SCALE**3
-
-    @wp.func
-    def flow(
-        points: wp.array(dtype=point),
-        pool: wp.array(dtype=wp.vec3d),
-        first: int,
-        exponent: int,
-        patches: Patches,
-        e: int,
-        law: wp.array2d(dtype=R),
-        thread: int,
-        q: int,
-        valid: bool,
-        history_out: wp.array2d(dtype=R),
-        extreme_out: wp.array2d(dtype=R),
-        force_out: wp.array(dtype=R),
-    ):
-        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
-        a = q ^ (q >> 1)  # corners run around the faces
-        x0, d0, x1, d1 = load_corners(points, pool, patches, e, a, first, exponent)
-        m = material_of(patches.corner[0, e], patches.corner[1, e])
-        W = mat33()
-        for k in range(9):
-            W[k // 3, k % 3] = force_out[k * wp.static(ROW) + thread]
-        warp_barrier()
-        history = read_row(history_out, 2 * size * q, e)
-        xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
-        eta = wp.where(q > 1, R(1.0), R(-1.0))
-        gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
-        lx0, lx1, ly0, ly1, lz = to_point_lines(add_transposed(d0, W, x0 + d0), add_transposed(d1, W, x1 + d1), xi, eta)
-        b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
-        b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
-        pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
-        S0, eps0, p0, trial0 = stress_of_point(sums0, det0, law, m, history, 0)
-        S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
-        largest = lane_max(wp.max(trial0, trial1))
-        if valid and q == 0:
-            keep_strain(e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
-        if valid and (p0 > history[last] or p1 > history[size + last]):
-            write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
-        Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
-        f0, f1 = to_corners(
-            force_of_edge(S0, pressure, b00),
-            force_of_edge(S1, pressure, b10),
-            force_of_edge(S0, pressure, b01),
-            force_of_edge(S1, pressure, b11),
-            Fz,
-            xi,
-            eta,
-        )
-        f0 = add_product(f0, W, f0)
-        f1 = add_product(f1, W, f1)
-        if valid:
-            for i in range(3):
-                force_out[(3 * a + i) * wp.static(ROW) + thread] = f0[i]
-                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = f1[i]
+    load_points, load_displacements, _ = load_functions(precision)
+    clear_nowhere, _, sum_patch = sum_functions(precision)
+    compute_element, (_, flow_listed) = element_function(precision, law_name), flow_functions(precision, law_name)
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(
@@ -285,79 +153,48 @@ def force_kernel(precision: str, law_name: str) -> Any:
         lane = wp.tid() & wp.static(PATCH - 1)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
-        todo = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
-        near = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        listed = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
+        kept_points = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
         pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
         if wp.static(plastic):
             if lane == 0:
-                todo[0] = 0
-        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, near, pool)
+                listed[0] = 0
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, kept_points, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
-            Xl = load_points(near, pool, corners, first, exponent_of(head))
+            Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
             ul = load_displacements(pool, corners, first)
-            coming = ring[(k + 1) % wp.static(HEADS)]
+            next_head = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
             if wp.static(early):
-                copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
+                copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                W, J = element_rotation(Xl, ul)
-                keep_volume(e, R(1.0) - J, extreme_out)
-                flows = bool(False)
-                if wp.static(plastic):
-                    flows = yielded_out[e] != 0
-                if not flows:
-                    ul = local_displacement(Xl, ul, W)
-                    G = R(scale) * law[m, 1]
-                    f, largest = elastic_forces(Xl, ul, W, R(scale) * law[m, 0], G)
-                    keep_forces(forces, lane, f)
-                    keep_strain(e, strain_square(largest, G), extreme_out)
-                    if wp.static(plastic):
-                        if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
-                            flows = bool(True)
-                            yielded_out[e] = 1
-                if wp.static(plastic):
-                    if flows:
-                        todo[1 + wp.atomic_add(todo, 0, 1)] = lane
-                        for i in range(9):
-                            forces[i * wp.static(ROW) + lane] = W[i // 3, i % 3]
+                compute_element(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces)
             wait_for_copies()
             barrier()
             if wp.static(plastic):
-                listed = todo[0]
                 if lane == 0:
-                    flowing_out[head[3]] = listed
-                for turn in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
-                    item = (turn * wp.static(PATCH) + lane) >> 2
-                    thread = todo[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
-                    mine = from_start(head[0] + thread)
-                    valid = item < listed
-                    grid = exponent_of(head)
-                    q = lane & 3
-                    flow(
-                        near, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, forces
-                    )
-                if listed > 0:
-                    barrier()
-                    if lane == 0:
-                        todo[0] = 0
+                    flowing_out[head[3]] = listed[0]
+                flow_listed(
+                    kept_points, pool, first, head, lane, patches, law, listed, history_out, extreme_out, forces
+                )
             if wp.static(not early):
-                copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
-            corners = corners_of(patches, coming, lane)
-            copy_ahead(points, patches, block, stride, k, lane, first, ring, near)
+                copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
+            corners = corners_of(patches, next_head, lane)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, kept_points)
             sum_patch(forces, places, head, lane, slot, force_out)
             if wp.static(not early):
                 wait_for_copies()
                 barrier()
-            head = coming
+            head = next_head
             k += 1
 
     return begins_early(hex8_patch_force)

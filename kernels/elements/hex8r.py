@@ -1,10 +1,9 @@
 """Owns the one-point hexahedron with assumed-strain hourglass stiffness.
 
 Gradients are means over the element, so that it passes the patch test: Flanagan and Belytschko, Int. J. Numer. Meth.
-Engng 17 (1981) 679. The hourglass modes carry the elastic energy of a brick of the element's mean edges without its
-parasitic shear: Belytschko and Bindeman, Comput. Meth. Appl. Mech. Engng 105 (1993) 225; bending is then right with
-one element over the height. Where the element yields, its hourglass strains flow with its plastic multiplier, as the
-points of the full element would about their mean.
+Engng 17 (1981) 679. `hourglass` describes the stiffness of the hourglass modes; with it, bending is right with one
+element over the height. Where the element yields, its hourglass strains flow with its plastic multiplier, as the points
+of the full element would about their mean.
 """
 
 from functools import cache
@@ -12,108 +11,20 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.fused import NOTHING, fused
-from warp_mca.kernels.elements.hexahedron import history_functions, load_function, store_function, stress_function
+from warp_mca.kernels.elements.fused import fused
+from warp_mca.kernels.elements.hexahedron import load_function, store_function
+from warp_mca.kernels.elements.hourglass import DISSIPATED, amplitude_functions, hourglass_functions
+from warp_mca.kernels.elements.hourglass import VECTORS as HOURGLASS_VECTORS
 from warp_mca.kernels.elements.kinematics import kinematics
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
+from warp_mca.kernels.elements.point_records import history_functions, stress_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
+from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-# Rows of the history beside those of the plastic strain: plastic hourglass amplitudes, and the energy they took [J].
-VECTORS = 4  # of amplitudes
-_AMPLITUDES = HISTORY_SIZE
-_DISSIPATED = _AMPLITUDES + 3 * VECTORS
-HISTORY_ROWS = _DISSIPATED + 1
-
-
-@cache
-def hourglass_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (hourglass amplitudes; generalised forces and energy)."""
-    t = scalars(precision)
-    R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
-    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
-
-    @wp.func
-    def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
-        """What the mean displacement gradient H leaves of the sums over patterns, one row for each, in frame W.
-
-        Eight times the amplitudes of docs/theory.md; forces are conjugate to these.
-        """
-        q = mat43()
-        for m in range(4):
-            left = add_product(u[3 + m], H, -x[3 + m])
-            q[m] = add_transposed(left, W, left)
-        return q
-
-    @wp.func
-    def hourglass(q: mat43, x: mat73, volume: R, K: R, G: R):
-        """Forces conjugate to the amplitudes q, one row for each pattern, and the energy.
-
-        The brick has the element's mean edges, along x[k] and |x[k]| / 4 long.
-        """
-        one = R(1.0)
-        nu = (R(3.0) * K - R(2.0) * G) / (R(6.0) * K + R(2.0) * G)
-        third = volume / R(3.0)
-        plane = third * R(2.0) * G / (one - nu)
-        E = third * R(2.0) / R(3.0) * G * (one + nu)
-        length = vec3(wp.length(x[0]), wp.length(x[1]), wp.length(x[2]))
-        inverse = vec3(one / length[0], one / length[1], one / length[2])
-        y = mat33()
-        for k in range(3):
-            y[k] = (inverse[k] * inverse[k]) * x[k]
-        F = mat43()
-        along = vec3(R(NOTHING))
-        energy = R(NOTHING)
-        for k in range(3):  # strains that vary along edge k, in the plane of the two others
-            i = (k + 1) % 3
-            j = (k + 2) % 3
-            # pattern number m varies along the two edges other than m
-            ei = wp.dot(q[j], y[i])
-            ej = wp.dot(q[i], y[j])
-            ij = length[i] * inverse[j]
-            ji = length[j] * inverse[i]
-            shear = ji * wp.dot(q[j], y[j]) + ij * wp.dot(q[i], y[i])
-            last = wp.dot(q[3], y[k])
-            si = plane * (ei + nu * ej)
-            sj = plane * (ej + nu * ei)
-            sij = third * G * shear
-            F[j] = F[j] + si * y[i]
-            F[i] = F[i] + sj * y[j]
-            along[j] = along[j] + ji * sij
-            along[i] = along[i] + ij * sij
-            F[3] = F[3] + (E * last) * y[k]
-            energy += R(0.5) * (si * ei + sj * ej + sij * shear + E * last * last)
-        for k in range(3):
-            F[k] = F[k] + along[k] * y[k]
-        return F, energy
-
-    return amplitudes, hourglass
-
-
-@cache
-def amplitude_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that read and write the plastic hourglass amplitudes of an element."""
-    t = scalars(precision)
-    R, mat43 = t.real, t.mat43
-
-    @wp.func
-    def read_amplitudes(history: wp.array2d(dtype=R), e: int):
-        q = mat43()
-        for m in range(4):
-            for i in range(3):
-                q[m, i] = history[wp.static(_AMPLITUDES) + 3 * m + i, e]
-        return q
-
-    @wp.func
-    def write_amplitudes(history_out: wp.array2d(dtype=R), e: int, q: mat43):
-        for m in range(4):
-            for i in range(3):
-                history_out[wp.static(_AMPLITUDES) + 3 * m + i, e] = q[m, i]
-
-    return read_amplitudes, write_amplitudes
+VECTORS = HOURGLASS_VECTORS  # plastic hourglass amplitudes, which turn with the element
 
 
 @cache
@@ -188,7 +99,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):
             if kept < R(1.0):
-                row = wp.static(_DISSIPATED)
+                row = wp.static(DISSIPATED)
                 # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
                 history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
             Q = kept * Q
@@ -298,7 +209,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
                 dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
-                dissipated += history[wp.static(_DISSIPATED), e]
+                dissipated += history[wp.static(DISSIPATED), e]
         q = amplitudes(x, du, H_world, W)
         if wp.static(plastic):
             q_p = mat43()

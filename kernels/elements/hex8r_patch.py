@@ -38,7 +38,7 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def force_kernel(precision: str, law_name: str) -> Any:
-    """Kernel: forces of each patch on its nodes, and the plastic history where there is a law."""
+    """Kernel: the forces of each patch on its nodes and, where there is a law, the plastic history."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
@@ -75,35 +75,35 @@ def force_kernel(precision: str, law_name: str) -> Any:
         lane = wp.tid() & wp.static(PATCH - 1)
         block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
-        near = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        kept_points = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
         pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
         places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
         ring = wp.array(ptr=head_ring(), shape=(HEADS,), dtype=wp.vec4i)
         clear_nowhere(forces, lane)
-        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, near, pool)
+        head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, kept_points, pool)
         k = int(0)
         while element_count(head) > 0:
             e = from_start(head[0] + lane)
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
-            x = load_patterns(near, pool, corners, first, exponent_of(head))
+            x = load_patterns(kept_points, pool, corners, first, exponent_of(head))
             du = to_patterns(load_displacements(pool, corners, first))
-            coming = ring[(k + 1) % wp.static(HEADS)]
+            next_head = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
-            copy_nodes(X, u, near, coming, lane, wp.static(slots) - first, pool)
+            copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 b, volume, W, H, J, q = shape_and_strain(x, du)
                 P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out, extreme_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
                 keep_volume(e, R(1.0) - J, extreme_out)
-            corners = corners_of(patches, coming, lane)
+            corners = corners_of(patches, next_head, lane)
             wait_for_copies()
             barrier()
-            copy_ahead(points, patches, block, stride, k, lane, first, ring, near)
+            copy_ahead(points, patches, block, stride, k, lane, first, ring, kept_points)
             sum_patch(forces, places, head, lane, slot, force_out)
-            head = coming
+            head = next_head
             k += 1
 
     return begins_early(hex8r_patch_force)

@@ -1,4 +1,4 @@
-"""Owns what hexahedra share: edge vectors, their interpolation to Gauss points, frames, loads and plastic history.
+"""Owns what hexahedra share: edge vectors, their interpolation to Gauss points, frames, and loads of nodes.
 
 Gradients come from edge vectors interpolated along one direction at a time and the cofactors of the Jacobian; forces
 go back by the transposed pass (sum factorisation).
@@ -12,7 +12,6 @@ import warp as wp
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.rotation import nearest_rotation
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.laws import HISTORY_SIZE
 
 wp.set_module_options({"enable_backward": False})
 
@@ -117,6 +116,31 @@ def line_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
+def gauss_line_function(precision: str, scaled: bool) -> Any:
+    """The function that gives the edge vectors of the three directions on the Gauss lines.
+
+    `scaled` as `edge_functions` has them, otherwise as `line_functions` does.
+    """
+    along, interpolated = edge_functions(precision) if scaled else line_functions(precision)
+    mat83 = scalars(precision).mat83
+
+    @wp.func
+    def gauss_lines(x: mat83):
+        return interpolated(along(x, 0)), interpolated(along(x, 1)), interpolated(along(x, 2))
+
+    return gauss_lines
+
+
+@wp.func
+def lines_of_point(g: int):
+    """Gauss lines along xi, eta and zeta that pass through Gauss point g = i + 2 j + 4 k."""
+    i = g & 1
+    j = (g >> 1) & 1
+    k = g >> 2
+    return j + 2 * k, i + 2 * k, i + 2 * j
+
+
+@cache
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
     """Functions that take an element to its rotated frame.
 
@@ -158,18 +182,13 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
 
 @cache
 def gradient_function(precision: str) -> Any:
-    """The function that gives Jacobian determinant and displacement gradient at Gauss point g = i + 2 j + 4 k."""
+    """The function that gives the Jacobian determinant and the displacement gradient at Gauss point g."""
     t = scalars(precision)
     mat43 = t.mat43
 
     @wp.func
     def point_gradient(gx: mat43, gy: mat43, gz: mat43, lx: mat43, ly: mat43, lz: mat43, g: int):
-        i = g & 1
-        j = (g >> 1) & 1
-        k = g >> 2
-        jx = j + 2 * k
-        jy = i + 2 * k
-        jz = i + 2 * j
+        jx, jy, jz = lines_of_point(g)
         b0 = wp.cross(gy[jy], gz[jz])
         b1 = wp.cross(gz[jz], gx[jx])
         b2 = wp.cross(gx[jx], gy[jy])
@@ -240,51 +259,18 @@ def load_function(precision: str) -> Any:
 
 
 @cache
-def history_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that read and write the plastic history of one integration point.
-
-    Points g and g + 4, which differ along zeta, lie side by side: a lane of `kernels.elements.hex8_patch` takes both.
-    """
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
+def framed_function(precision: str, finite: bool = False) -> Any:
+    """The function (X, u, conn, e) -> (corners, local displacements, frame W, ratio of volumes J at the centre)."""
+    load_element = load_function(precision)
+    element_rotation, local_displacement = frame_functions(precision, finite)
 
     @wp.func
-    def read_plastic_strain(history: wp.array2d(dtype=R), point: int, e: int):
-        k = (2 * (point & 3) + (point >> 2)) * wp.static(HISTORY_SIZE)
-        xx = history[k, e]
-        yy = history[k + 1, e]
-        xy = history[k + 2, e]
-        yz = history[k + 3, e]
-        xz = history[k + 4, e]
-        return mat33(xx, xy, xz, xy, yy, yz, xz, yz, -xx - yy), history[k + 5, e]
+    def load_in_frame(
+        X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int
+    ):
+        Xl = load_element(X, conn, e)
+        ul = load_element(u, conn, e)
+        W, J = element_rotation(Xl, ul)
+        return Xl, local_displacement(Xl, ul, W), W, J
 
-    @wp.func
-    def write_plastic_strain(history_out: wp.array2d(dtype=R), point: int, e: int, eps_p: mat33, p: R):
-        k = (2 * (point & 3) + (point >> 2)) * wp.static(HISTORY_SIZE)
-        history_out[k, e] = eps_p[0, 0]
-        history_out[k + 1, e] = eps_p[1, 1]
-        history_out[k + 2, e] = eps_p[0, 1]
-        history_out[k + 3, e] = eps_p[1, 2]
-        history_out[k + 4, e] = eps_p[0, 2]
-        history_out[k + 5, e] = p
-
-    return read_plastic_strain, write_plastic_strain
-
-
-@cache
-def stress_function(precision: str) -> Any:
-    """The function that writes a stress tensor and a plastic strain in rows xx, yy, zz, xy, yz, xz, p."""
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-
-    @wp.func
-    def write_stress(stress_out: wp.array2d(dtype=wp.float32), slot: int, sigma: mat33, p: R):
-        stress_out[0, slot] = wp.float32(sigma[0, 0])
-        stress_out[1, slot] = wp.float32(sigma[1, 1])
-        stress_out[2, slot] = wp.float32(sigma[2, 2])
-        stress_out[3, slot] = wp.float32(sigma[0, 1])
-        stress_out[4, slot] = wp.float32(sigma[1, 2])
-        stress_out[5, slot] = wp.float32(sigma[0, 2])
-        stress_out[6, slot] = wp.float32(p)
-
-    return write_stress
+    return load_in_frame

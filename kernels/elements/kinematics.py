@@ -32,8 +32,8 @@ def eigen_function(precision: str) -> Any:
     R, vec3, mat33 = t.real, t.vec3, t.mat33
 
     @wp.func
-    def turn(p: R, q: R, pq: R):
-        """Cosine, sine and tangent of the rotation that takes the entry pq of a 2 x 2 matrix away."""
+    def jacobi_rotation(p: R, q: R, pq: R):
+        """Cosine, sine and tangent of the rotation that makes the entry pq of a symmetric 2 x 2 matrix zero."""
         one = R(1.0)
         twice = R(2.0) * pq
         size = wp.abs(q - p) + wp.sqrt((q - p) * (q - p) + twice * twice)
@@ -54,7 +54,7 @@ def eigen_function(precision: str) -> Any:
         n1 = vec3(R(0.0), R(1.0), R(0.0))
         n2 = vec3(R(0.0), R(0.0), R(1.0))
         for _ in range(wp.static(SWEEPS)):
-            c, s, t = turn(xx, yy, xy)
+            c, s, t = jacobi_rotation(xx, yy, xy)
             xx = xx - t * xy
             yy = yy + t * xy
             xy = R(0.0)
@@ -64,7 +64,7 @@ def eigen_function(precision: str) -> Any:
             n = n0
             n0 = c * n - s * n1
             n1 = s * n + c * n1
-            c, s, t = turn(xx, zz, xz)
+            c, s, t = jacobi_rotation(xx, zz, xz)
             xx = xx - t * xz
             zz = zz + t * xz
             xz = R(0.0)
@@ -74,7 +74,7 @@ def eigen_function(precision: str) -> Any:
             n = n0
             n0 = c * n - s * n2
             n2 = s * n + c * n2
-            c, s, t = turn(yy, zz, yz)
+            c, s, t = jacobi_rotation(yy, zz, yz)
             yy = yy - t * yz
             zz = zz + t * yz
             yz = R(0.0)

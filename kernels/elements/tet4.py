@@ -11,9 +11,9 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
-from warp_mca.kernels.elements.hexahedron import history_functions, stress_function
 from warp_mca.kernels.elements.kinematics import kinematics
 from warp_mca.kernels.elements.patterns import mean_frame
+from warp_mca.kernels.elements.point_records import history_functions, stress_function
 from warp_mca.kernels.hardware.overlap import begins_early, wait_for_previous
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.laws import law_functions

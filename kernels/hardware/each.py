@@ -1,4 +1,4 @@
-"""Owns values that a lone scene passes as scalars and the scenes of a batch as arrays, one entry for each scene."""
+"""Owns kernel arguments that are scalars for one scene, and arrays with one entry for each scene for a batch."""
 
 from typing import Any
 

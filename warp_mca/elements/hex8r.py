@@ -95,6 +95,6 @@ class Hex8r:
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
         from warp_mca.elements.patch_stage import hexahedral_stage
-        from warp_mca.kernels.elements import hex8r, hex8r_patch
+        from warp_mca.kernels.elements import hex8r, hex8r_patch, hourglass
 
-        return hexahedral_stage(block, X, precision, hex8r, hex8r_patch, points=1, rows=hex8r.HISTORY_ROWS)
+        return hexahedral_stage(block, X, precision, hex8r, hex8r_patch, points=1, rows=hourglass.HISTORY_ROWS)

@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels.contact import contact, search, sides, spring
+from warp_mca.kernels.contact import contact, edges, nearest, search, sides, spring
 from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.model.layout import offsets
@@ -170,8 +170,10 @@ class ContactStage:
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         if self.sides > 1:
-            self.slave_face = wp.array(self._join("slave_face"), dtype=wp.int32)
-            self.around_slave = self._rows("slave_face", "slave_offset", "face_of_slave")
+            self.slave_faces = edges.SlaveFaces()
+            self.slave_faces.face = wp.array(self._join("slave_face"), dtype=wp.int32)
+            rows = self._rows("slave_face", "slave_offset", "face_of_slave")
+            self.slave_faces.offset, self.slave_faces.face_of_slave = rows
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.bvh: Any = None
@@ -239,13 +241,20 @@ class ContactStage:
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         if self.sides > 1:
-            slaves = [self.slave, self.slave_face, *self.around_slave, self.stiffness]
-        inputs = [*nodes, own.u_search, *slaves, self.face_stiffness, self.face, own.count, own.candidate]
+            slaves = [self.slave, self.slave_faces, self.stiffness]
+        inputs = [*nodes, own.u_search, *slaves, self._master(own)]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [own.face_count, own.face_slave, self.master_scene, self.margin, own.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
+
+    def _master(self, own: ContactState) -> Any:
+        """The master's faces with what the latest search listed."""
+        found = nearest.Master()
+        found.face, found.stiffness = self.face, self.face_stiffness
+        found.count, found.candidate = own.count, own.candidate
+        return found
 
     def rest_at(self, state: State, depth: NDArray[np.float64]) -> None:
         """Let springs be free of force at these depths [m], shape (spring_count,)."""

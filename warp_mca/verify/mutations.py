@@ -36,7 +36,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "pressure_halved": Mutation(
         "the pressure of an element is halved",
-        "kernels/elements/hex8_elastic.py",
+        "kernels/elements/hex8_small.py",
         "Fz = to_lines(Sz + pressure * Bz)\n        return edge_to_node(Fx, Fy, Fz, W)",
         "half = R(0.5) * pressure\n"
         "        Fx = to_lines(Sx + half * Bx)\n"
@@ -94,7 +94,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "elastic_shear_soft": Mutation(
         "an elastic element's deviatoric stress is 1.99 G e in place of 2 G e",
-        "kernels/elements/hex8_elastic.py",
+        "kernels/elements/hex8_small.py",
         "shear = G / det",
         "shear = R(0.995) * G / det",
     ),
@@ -190,7 +190,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "pressure_varies_within_elements": Mutation(
         "each integration point adds a tenth of its own pressure to that of the element",
-        "kernels/elements/hex8_elastic.py",
+        "kernels/elements/hex8_small.py",
         "shear = G / det\n            direct = shear + shear\n",
         "shear = G / det\n            trace -= R(0.15) * K / G * trace\n            direct = shear + shear\n",
     ),
@@ -228,7 +228,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_modulus_low": Mutation(
         "hourglass strains of hex8r along an edge take the modulus G in place of 2 G / (1 - nu)",
-        "kernels/elements/hex8r.py",
+        "kernels/elements/hourglass.py",
         "plane = third * R(2.0) * G / (one - nu)",
         "plane = third * G",
         element="hex8r",
@@ -291,7 +291,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_feels_strain": Mutation(
         "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
-        "kernels/elements/hex8r.py",
+        "kernels/elements/hourglass.py",
         "left = add_product(u[3 + m], H, -x[3 + m])",
         "left = u[3 + m]",
         element="hex8r",

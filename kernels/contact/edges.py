@@ -1,0 +1,66 @@
+"""Owns the geometry of a master's edges: which faces meet at the edge of a solid, and which of them a node faces."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class SlaveFaces:
+    """Faces of the slave surface around each slave node, as compressed rows.
+
+    Attributes:
+        face: nodes, shape (face_count, 4), int32; a triangle has its last node twice.
+        offset: first entry of each slave node in face_of_slave, shape (slave_count + 1,), int32.
+        face_of_slave: faces around the slave nodes, one after the other, int32.
+    """
+
+    face: wp.array2d(dtype=wp.int32)
+    offset: wp.array(dtype=wp.int32)
+    face_of_slave: wp.array(dtype=wp.int32)
+
+
+@wp.func
+def middle(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int):
+    """Mean of the corners of face f [m]."""
+    total = wp.vec3d()
+    for c in range(4):
+        total += X[face[f, c]] + u[face[f, c]]
+    return wp.float64(0.25) * total
+
+
+@wp.func
+def area_vector(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int):
+    """Vector along the normal of face f at its middle, whose length is twice the area of the face [m^2]."""
+    across = X[face[f, 2]] + u[face[f, 2]] - X[face[f, 0]] - u[face[f, 0]]
+    return wp.cross(across, X[face[f, 3]] + u[face[f, 3]] - X[face[f, 1]] - u[face[f, 1]])
+
+
+@wp.func
+def is_edge(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    g: int,
+    normal: wp.vec3d,
+) -> bool:
+    """Whether faces f and g share a node and meet at the edge of a solid, not in a fold; `normal` is that of g."""
+    shared = bool(False)
+    for a in range(4):
+        for b in range(4):
+            if face[f, a] == face[g, b]:
+                shared = bool(True)
+    return shared and wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
+
+
+@wp.func
+def opposition(
+    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), slave_faces: SlaveFaces, s: int, normal: wp.vec3d
+) -> wp.float64:
+    """Largest cosine between a reversed normal of the faces around slave node s and a normal of any length."""
+    most = wp.float64(-1.0)
+    for j in range(slave_faces.offset[s], slave_faces.offset[s + 1]):
+        own = area_vector(X, u, slave_faces.face, slave_faces.face_of_slave[j])
+        most = wp.max(most, -wp.dot(wp.normalize(own), wp.normalize(normal)))
+    return most

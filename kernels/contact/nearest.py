@@ -1,0 +1,145 @@
+"""Owns the choice of the candidate face that a slave node penetrates, and the conditions under which they touch."""
+
+import warp as wp
+
+from warp_mca.kernels.contact.projection import interpolate, project_on_face
+from warp_mca.kernels.contact.spring import FAR
+
+wp.set_module_options({"enable_backward": False})
+
+# Lengths, as fractions of the edges of a face
+_FOLD = 0.01  # how much deeper a node may be at once in a neighbour that rises, past the edge between them
+_SLACK = 1e-4  # by how much more than its motion in a step the depth of a node may grow
+_ABOVE = 0.04  # a node that arrives beside a face, but nearer than this above another one, passes by
+
+_RIM = 1e-4  # fraction of half an edge by which a node may lie off a face and still count as above it
+_OPPOSED = -0.9  # least cosine between a node's last contact force and the normal of the face that presses it next
+
+
+@wp.struct
+class Master:
+    """Faces of a master surface, and those near each spring of its slave nodes.
+
+    Attributes:
+        face: nodes, shape (face_count, 4), int32; a triangle has its last node twice.
+        stiffness: penalty stiffness of each face [N/m], shape (face_count,), float64.
+        count: number of candidate faces of each spring, shape (spring_count,), int32.
+        candidate: those faces, shape (spring_count, LIST_LENGTH), int32.
+    """
+
+    face: wp.array2d(dtype=wp.int32)
+    stiffness: wp.array(dtype=wp.float64)
+    count: wp.array(dtype=wp.int32)
+    candidate: wp.array2d(dtype=wp.int32)
+
+
+@wp.struct
+class Nearest:
+    """The face that may press a node, and where the node lies.
+
+    Attributes:
+        face: its number, or -1 if there is none; then only front and front_face have a meaning.
+        gap: distance along the normal, negative behind the face [m].
+        normal: unit normal of the face at the projected point.
+        at: natural coordinates of that point, as `weights_at` takes them.
+        beside: whether that point lies off the face, though within the reach of its edges.
+        area: a quarter of the area of the face [m^2].
+        front: distance to the nearest face that has the node in front of it, or FAR [m].
+        front_face: that face, or -1.
+    """
+
+    face: wp.int32
+    gap: wp.float64
+    normal: wp.vec3d
+    at: wp.vec2d
+    beside: wp.bool
+    area: wp.float64
+    front: wp.float64
+    front_face: wp.int32
+
+
+@wp.func
+def master_velocity(
+    v: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int, weight: wp.vec4d
+) -> wp.vec3d:
+    """Velocity [m/s] of the point of face f at these shape functions."""
+    return interpolate(weight, v[face[f, 0]], v[face[f, 1]], v[face[f, 2]], v[face[f, 3]])
+
+
+@wp.func
+def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.float64, edge: wp.float64) -> bool:
+    """Whether a node can have come to this depth in a face since the last step.
+
+    Depth grows from zero, in a step by no more than the node moves along the normal. A node in front of one face at
+    the edge of a solid may lie behind the next face, which stands across, by up to a whole face: it does not touch.
+
+    Args:
+        depth: behind the face [m].
+        held: depth before this step, as `Spring` has it [m].
+        front: distance to the nearest face that has the node in front of it [m].
+        moved: along the face's normal in this step, relative to the face [m].
+        edge: length of the face's edges [m].
+    """
+    slack = wp.float64(_SLACK) * edge
+    if depth < front and held > wp.float64(0.0):  # inside already, and maybe past a fold since
+        slack = held + wp.float64(_FOLD) * edge
+    return depth <= held + wp.float64(2.0) * wp.abs(moved) + slack
+
+
+@wp.func
+def is_beside(at: wp.vec2d, triangle: bool, rim: wp.float64) -> bool:
+    """Whether the point at these natural coordinates lies off the face by more than `rim` half edges."""
+    if triangle:
+        return wp.min(at[0], wp.min(at[1], wp.float64(1.0) - at[0] - at[1])) < wp.float64(-0.5) * rim
+    return wp.max(wp.abs(at[0]), wp.abs(at[1])) > wp.float64(1.0) + rim
+
+
+@wp.func
+def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float64) -> bool:
+    """Whether a node that arrives beside a face flies above another one instead; arguments as of `reachable`."""
+    return beside and held == wp.float64(0.0) and front < wp.float64(_ABOVE) * edge
+
+
+@wp.func
+def nearest_face(
+    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, s: int, x: wp.vec3d, along: wp.vec3f
+) -> Nearest:
+    """Among the candidates of spring s, the face that may press a node at x, whose last contact force was `along`.
+
+    Choose the shallowest penetrated face; of faces that the node lies beside, the deepest, and only if it lies above
+    none: a concave fold needs that. Ties go to the lower number. Skip faces whose normal opposes the last contact
+    force: they are the far side of a thin body.
+    """
+    f = master.candidate[s, 0]  # read before the count is known: memory answers late
+    best = Nearest()
+    best.face = -1
+    best.front = wp.float64(FAR)
+    best.front_face = -1
+    for c in range(master.count[s]):
+        inside, at, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
+        if inside:
+            area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
+            normal = (wp.float64(1.0) / area) * area_normal
+            gap = wp.dot(away, normal)
+            cosine = wp.dot(wp.vec3f(normal), along)  # times the size of the force
+            kept = cosine >= 0.0 or cosine * cosine < wp.static(_OPPOSED**2) * wp.dot(along, along)
+            if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
+                beside = is_beside(at, triangle, wp.float64(_RIM))
+                better = (gap > best.gap) != beside
+                if beside != best.beside:
+                    better = best.beside
+                elif gap == best.gap:
+                    better = f < best.face  # whatever the order of the search
+                if better or best.face < 0:
+                    best.face = f
+                    best.gap = gap
+                    best.normal = normal
+                    best.at = at
+                    best.beside = beside
+                    best.area = area
+            elif gap >= wp.float64(0.0):
+                if gap < best.front:
+                    best.front_face = f
+                best.front = wp.min(best.front, gap)
+        f = master.candidate[s, wp.min(c + 1, master.candidate.shape[1] - 1)]
+    return best

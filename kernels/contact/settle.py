@@ -1,0 +1,119 @@
+"""Owns how a slave node is pressed on the face that was found for it, and how it is released where there is none."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.nearest import Nearest, master_velocity
+from warp_mca.kernels.contact.projection import weights_at
+from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
+from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, open_function, rest_function, spring_function
+from warp_mca.kernels.records.extremes import add_normal_force
+
+wp.set_module_options({"enable_backward": False})
+
+_SHARP = 0.7  # cosine between successive normals below which a node turned a sharp edge
+
+
+@wp.struct
+class Touch:
+    """How a node meets the nearest face in this step.
+
+    Attributes:
+        touches: whether the face presses it.
+        weight: shape functions of the face at the projected point.
+        du: motion of the node relative to the face [m].
+        held: depth before this step, as `Spring` has it [m].
+        along: contact force of the last step, of any length; float32.
+        own: penalty stiffness of the node [N/m].
+        limit: penalty stiffness of the face [N/m].
+    """
+
+    touches: wp.bool
+    weight: wp.vec4d
+    du: wp.vec3d
+    held: wp.float64
+    along: wp.vec3f
+    own: wp.float64
+    limit: wp.float64
+
+
+@wp.func
+def meet(
+    v: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    i: int,
+    near: Nearest,
+    dt: wp.float64,
+    held: wp.float64,
+    along: wp.vec3f,
+) -> Touch:
+    """How node i meets the nearest face; whether the face presses it is still open."""
+    touch = Touch()
+    touch.weight = weights_at(near.at, face[near.face, 2] == face[near.face, 3])
+    touch.du = dt * (v[i] - master_velocity(v, face, near.face, touch.weight))
+    touch.held = held
+    touch.along = along
+    return touch
+
+
+@cache
+def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, Any]:
+    """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
+    press = spring_function(friction, law)
+    open_contact = open_function(friction)
+    gap_from_rest = rest_function(stress_free)
+
+    @wp.func
+    def settle(
+        s: int,
+        scene: int,
+        near: Nearest,
+        touch: Touch,
+        mu: wp.float64,
+        per_newton: wp.float64,
+        spring: Spring,
+        normal_force_out: wp.array(dtype=wp.int64),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        """Force on the node [N]."""
+        # a spring with neither gap nor normal has no force, and is released as an open one
+        gap_kept = wp.where(touch.touches, near.gap, wp.float64(0.0))
+        normal_kept = wp.where(touch.touches, near.normal, wp.vec3d())
+        gap_pressed = gap_from_rest(s, gap_kept, spring)
+        k_old = wp.where(spring.face[s] < 0, wp.min(touch.own, touch.limit), spring.stiffness[s])
+        stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)
+        force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, spring)
+        spring.stiffness[s] = stiffness
+        add_normal_force(scene, F_n, per_newton, normal_force_out)
+        spring.face[s] = wp.where(touch.touches, near.face, -1)
+        spring.weight[s] = touch.weight
+        spring.held[s] = wp.where(touch.touches or near.front < wp.float64(FAR), -gap_kept, touch.held)
+        if gap_pressed * gap_pressed > near.area:
+            flag_out[scene, TOO_DEEP] = 1
+        cosine = wp.dot(wp.vec3f(normal_kept), touch.along)  # times the size of the force
+        sharp = cosine * cosine < wp.static(_SHARP**2) * wp.dot(touch.along, touch.along)
+        if touch.touches and (cosine < 0.0 or sharp):
+            flag_out[scene, TURNED] = 1
+        return force
+
+    @wp.func
+    def let_go(
+        s: int,
+        i: int,
+        v: wp.array(dtype=wp.vec3d),
+        face: wp.array2d(dtype=wp.int32),
+        dt: wp.float64,
+        front: wp.float64,
+        held: wp.float64,
+        spring: Spring,
+    ):
+        if spring.face[s] >= 0:
+            du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
+            open_contact(s, du, spring.stiffness[s], spring)
+            gap_from_rest(s, wp.float64(0.0), spring)
+        if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(FAR)):
+            spring.held[s] = wp.float64(0.0)
+
+    return settle, let_go

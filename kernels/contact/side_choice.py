@@ -1,0 +1,283 @@
+"""Owns which sides of a master press a slave node, where the sides meet at sharp edges."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
+from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
+
+wp.set_module_options({"enable_backward": False})
+
+_ROUNDING = 1e-6  # fraction of an edge by which a node may be behind a side before it penetrates that
+_OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
+
+
+@wp.struct
+class NodeSprings:
+    """What the springs of a slave node, one for each side, hold before a step.
+
+    Attributes:
+        begin: number of the first of them.
+        pressed: sum of their normal forces on the node [N].
+        holding: whether a side presses the node.
+        released: greatest depth at which a side released the node [m].
+        active: whether a spring has candidate faces, or a depth.
+        listed: number of springs that have candidate faces.
+        last_listed: the last of those, or -1.
+    """
+
+    begin: wp.int32
+    pressed: wp.vec3d
+    holding: wp.bool
+    released: wp.float64
+    active: wp.bool
+    listed: wp.int32
+    last_listed: wp.int32
+
+
+@wp.struct
+class Choice:
+    """The side that begins to press a node in this step, as far as the sides have been looked at.
+
+    Attributes:
+        newcomer: its spring, or -1.
+        leaver: the spring that it replaces at an edge, or -1.
+        face: the face of the newcomer where no side pressed the node before, or -1.
+        normal: the normal of that face.
+        depth: depth behind that face before the step [m].
+        approach: motion of the node into that face in this step [m].
+    """
+
+    newcomer: wp.int32
+    leaver: wp.int32
+    face: wp.int32
+    normal: wp.vec3d
+    depth: wp.float64
+    approach: wp.float64
+
+
+@wp.func
+def first_choice(node: NodeSprings) -> Choice:
+    """The choice before any side has been looked at: where a single side has candidates, it needs no comparison."""
+    choice = Choice()
+    choice.newcomer = wp.where(node.listed > 1, -1, node.last_listed)
+    choice.leaver = -1
+    choice.face = -1
+    choice.depth = wp.float64(FAR)
+    return choice
+
+
+@wp.func
+def belongs_to_other_side(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    master: Master,
+    slave_faces: SlaveFaces,
+    s: int,
+    near: Nearest,
+    other: int,
+) -> bool:
+    """Whether slave node s meets face `other`, in front of which it is, rather than the nearest face across an edge."""
+    across = area_vector(X, u, master.face, other)
+    found = bool(False)
+    if is_edge(X, u, master.face, near.face, other, across):
+        mine = opposition(X, u, slave_faces, s, near.normal)
+        its = opposition(X, u, slave_faces, s, across)
+        if mine < wp.float64(_OPPOSES) or (near.beside and mine < its + wp.float64(_OPPOSES)):
+            found = bool(True)
+    return found
+
+
+@wp.func
+def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float64, approach: wp.float64) -> bool:
+    """Whether the node can have come to its depth in the nearest face, from this side or from one that released it.
+
+    `fold` is the distance to the nearest face in front of the node, or 0 for a side that did not press it before.
+    """
+    edge = wp.float64(2.0) * wp.sqrt(near.area)
+    found = reachable(-near.gap, held, fold, approach, edge)
+    if node.released > wp.float64(0.0) and not node.holding:  # it may have slid over an edge
+        found = found or reachable(-near.gap, node.released, wp.float64(0.0), approach, edge)
+    return found
+
+
+@cache
+def pressure_function(friction: bool) -> Any:
+    """The function that gives the normal force of a spring on its node [N]."""
+
+    @wp.func
+    def pressure(e: int, spring: Spring):
+        force = spring.force[e]
+        if wp.static(friction):
+            force -= spring.tangential[e]
+        return force
+
+    return pressure
+
+
+@cache
+def springs_function(friction: bool, sides: int) -> Any:
+    """The function that gathers what the springs of slave node s hold."""
+    pressure = pressure_function(friction)
+
+    @wp.func
+    def springs_of_node(s: int, count: wp.array(dtype=wp.int32), spring: Spring) -> NodeSprings:
+        node = NodeSprings()
+        node.begin = wp.static(sides) * s
+        node.last_listed = -1
+        for e in range(node.begin, node.begin + wp.static(sides)):
+            held = spring.held[e]
+            if spring.face[e] >= 0:
+                node.pressed = node.pressed + pressure(e, spring)
+                node.holding = bool(True)
+            elif held < wp.float64(ANY_DEPTH):
+                node.released = wp.max(node.released, held)
+            if count[e] > 0:
+                node.listed = node.listed + 1
+                node.last_listed = e
+            node.active = node.active or count[e] > 0 or held > wp.float64(0.0)
+        return node
+
+    return springs_of_node
+
+
+@cache
+def front_functions(sides: int) -> tuple[Any, Any]:
+    """The functions of the faces that have a node in front of them.
+
+    front_faces: of each side the nearest such face; distances [m], numbers, and the least distance. FAR where only one
+    side has candidates. may_press: whether the nearest face can press the node, given those of the other sides.
+    """
+    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
+
+    @wp.func
+    def front_faces(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        node: NodeSprings,
+        x: wp.vec3d,
+        along: wp.vec3f,
+    ):
+        gaps = Gaps()
+        faces = Faces()
+        front = wp.float64(FAR)
+        for p in range(wp.static(sides)):
+            gaps[p] = wp.float64(FAR)
+        if node.listed > 1:
+            for e in range(node.begin, node.begin + wp.static(sides)):
+                near = nearest_face(X, u, master, e, x, along)
+                gaps[e - node.begin] = near.front
+                faces[e - node.begin] = near.front_face
+                front = wp.min(front, near.front)
+        return gaps, faces, front
+
+    @wp.func
+    def may_press(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slave_faces: SlaveFaces,
+        s: int,
+        near: Nearest,
+        held: wp.float64,
+        fold: wp.float64,
+        approach: wp.float64,
+        node: NodeSprings,
+        front_gap: Gaps,
+        front_face: Faces,
+    ) -> bool:
+        edge = wp.float64(2.0) * wp.sqrt(near.area)
+        found = in_reach(near, node, held, fold, approach)
+        for p in range(wp.static(sides)):
+            if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
+                if belongs_to_other_side(X, u, master, slave_faces, s, near, front_face[p]):
+                    found = bool(False)
+        return found
+
+    return front_faces, may_press
+
+
+@cache
+def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
+    """The functions (choose: the choice after one more side; confirm: whether a side presses the node, given it)."""
+    pressure = pressure_function(friction)
+
+    @wp.func
+    def keeper(
+        X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, f: int, begin: int, spring: Spring
+    ):
+        """Spring of a side that presses the node and meets face f at the edge of a solid, or -1."""
+        found = int(-1)
+        for e in range(begin, begin + wp.static(sides)):
+            if spring.face[e] >= 0:  # Warp evaluates both sides of `and`
+                if is_edge(X, u, master.face, f, spring.face[e], pressure(e, spring)):
+                    found = e
+        return found
+
+    @wp.func
+    def choose(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slave_faces: SlaveFaces,
+        s: int,
+        e: int,
+        near: Nearest,
+        approach: wp.float64,
+        touches: bool,
+        node: NodeSprings,
+        choice: Choice,
+        spring: Spring,
+    ) -> Choice:
+        """A free node goes to the side that it was least behind before the step; ties go to the fastest approach."""
+        chosen = choice
+        edge = wp.float64(2.0) * wp.sqrt(near.area)
+        before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
+        if not node.holding:
+            faster = before == choice.depth and approach > choice.approach
+            if touches and (before < choice.depth or faster):
+                chosen.depth = before
+                chosen.approach = approach
+                chosen.newcomer = e
+                chosen.face = near.face
+                chosen.normal = near.normal
+        elif spring.face[e] < 0:
+            other = keeper(X, u, master, near.face, node.begin, spring)
+            if other >= 0:
+                better = opposition(X, u, slave_faces, s, near.normal)
+                better -= opposition(X, u, slave_faces, s, pressure(other, spring))
+                if better > wp.float64(-_OPPOSES) and -near.gap <= spring.held[other] and not near.beside:
+                    chosen.newcomer = e
+                    chosen.leaver = other
+        return chosen
+
+    @wp.func
+    def confirm(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        e: int,
+        near: Nearest,
+        touches: bool,
+        node: NodeSprings,
+        choice: Choice,
+        spring: Spring,
+    ) -> bool:
+        presses = touches
+        if e == choice.newcomer:
+            presses = presses or choice.leaver >= 0
+        elif e == choice.leaver:
+            presses = bool(False)
+        elif spring.face[e] < 0:
+            if keeper(X, u, master, near.face, node.begin, spring) >= 0:
+                presses = bool(False)
+            if choice.face >= 0:
+                if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
+                    presses = bool(False)
+        return presses
+
+    return choose, confirm

@@ -1,0 +1,259 @@
+"""Owns how four lanes of a GPU compute an element of `hex8` that yields, two Gauss points apiece.
+
+They exchange what the points of an element share.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.fused import fused
+from warp_mca.kernels.elements.hex8_small import stress_functions
+from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
+from warp_mca.kernels.elements.patch import POINT, Patches, exponent_of, from_start
+from warp_mca.kernels.elements.patch_element import load_functions, material_of
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
+from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
+from warp_mca.kernels.records.extremes import keep_functions
+from warp_mca.model.patches import PATCH
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+    """Functions over the four lanes of an element, whose bits 0 and 1 are xi and eta of corners and Gauss points.
+
+    A lane has the lower and the upper of both. (Corner values -> edge vectors on the Gauss lines through the lane's
+    points, as `line_functions` has them, along zeta one for both; edge forces at the points -> corner forces, the
+    transpose; sum and greatest of a scalar.)
+    """
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    _, exchange = shared_functions(precision)
+
+    @wp.func
+    def other(x: vec3, mask: int):
+        return vec3(exchange(x[0], mask), exchange(x[1], mask), exchange(x[2], mask))
+
+    @wp.func
+    def to_point_lines(lower: vec3, upper: vec3, xi: R, eta: R):
+        r = R(LINE_RATIO)
+        x0 = other(lower, 1)  # across xi
+        x1 = other(upper, 1)
+        y0 = other(lower, 2)  # across eta
+        y1 = other(upper, 2)
+        z0 = other(x0, 2)  # across both
+        z1 = other(x1, 2)
+        # first the differences of corners, which lose nothing to rounding, then their means
+        a0 = xi * ((lower - x0) + r * (y0 - z0))
+        a1 = xi * ((upper - x1) + r * (y1 - z1))
+        b0 = eta * ((lower - y0) + r * (x0 - z0))
+        b1 = eta * ((upper - y1) + r * (x1 - z1))
+        c = (upper - lower) + r * (y1 - y0) + r * ((x1 - x0) + r * (z1 - z0))
+        return a0 + r * a1, a1 + r * a0, b0 + r * b1, b1 + r * b0, c
+
+    @wp.func
+    def to_corners(Fx0: vec3, Fx1: vec3, Fy0: vec3, Fy1: vec3, Fz: vec3, xi: R, eta: R):
+        r = R(LINE_RATIO)
+        x0 = -xi * (Fx0 + other(Fx0, 1))  # forces pull the ends of an edge together
+        x1 = -xi * (Fx1 + other(Fx1, 1))
+        y0 = eta * (Fy0 + r * other(Fy0, 1))
+        y1 = eta * (Fy1 + r * other(Fy1, 1))
+        z = Fz + r * other(Fz, 1)
+        # each lane sends what its partner, on the other side, adds
+        s0 = (x0 - y0) + other(r * x0 + y0, 2)
+        s1 = (x1 - y1) + other(r * x1 + y1, 2)
+        z = z + r * other(z, 2)
+        return (s0 + r * s1) + z, (s1 + r * s0) - z
+
+    @wp.func
+    def lane_sum(value: R):
+        value += exchange(value, 1)
+        return value + exchange(value, 2)
+
+    @wp.func
+    def lane_max(value: R):
+        value = wp.max(value, exchange(value, 1))
+        return wp.max(value, exchange(value, 2))
+
+    return to_point_lines, to_corners, lane_sum, lane_max
+
+
+@cache
+def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
+    """Functions of one Gauss point.
+
+    (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
+    stress and plastic strain of a point, and J2 of the stress that it would have without; the history of two points;
+    forces of the edges.)
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
+    functions = law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
+    pair = wp.types.vector(2 * HISTORY_SIZE, R)
+    scale = LINE_SCALE**3
+
+    @wp.func
+    def shape_of_point(gx: vec3, gy: vec3, gz: vec3, lx: vec3, ly: vec3, lz: vec3):
+        b0 = wp.cross(gy, gz)
+        b1 = wp.cross(gz, gx)
+        b2 = wp.cross(gx, gy)
+        xx, yy, zz, xy, yz, xz = symmetric_gradient(lx, ly, lz, b0, b1, b2)
+        return b0, b1, b2, wp.dot(gx, b0), mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+
+    @wp.func
+    def stress_of_point(
+        sums: mat33,
+        det: R,
+        law: wp.array2d(dtype=R),
+        m: int,
+        history: pair,
+        first: int,
+    ):
+        """Direct `sums` are strains times det, the others twice that; the history of the point begins at `first`."""
+        G = R(scale) * law[m, 1]
+        shear = G / det
+        direct = shear + shear
+        mean = R(THIRD) * (sums[0, 0] + sums[1, 1] + sums[2, 2])
+        elastic = deviator(direct, shear, mean, sums[0, 0], sums[1, 1], sums[2, 2], sums[0, 1], sums[1, 2], sums[0, 2])
+        p_xx = history[first]
+        p_yy = history[first + 1]
+        p_xy = history[first + 2]
+        p_yz = history[first + 3]
+        p_xz = history[first + 4]
+        eps_p = mat33(p_xx, p_xy, p_xz, p_xy, p_yy, p_yz, p_xz, p_yz, -p_xx - p_yy)
+        S, eps_new, p_new = return_map(elastic, eps_p, history[first + 5], G, read_parameters(law, m, R(scale)))
+        return S, eps_new, p_new, invariant(elastic)
+
+    @wp.func
+    def force_of_edge(S: mat33, pressure: R, b: vec3):
+        return add_traction(S, b, pressure * b)
+
+    @wp.func
+    def history_of_points(eps0: mat33, p0: R, eps1: mat33, p1: R):
+        # fmt: off
+        return pair(
+            eps0[0, 0], eps0[1, 1], eps0[0, 1], eps0[1, 2], eps0[0, 2], p0,
+            eps1[0, 0], eps1[1, 1], eps1[0, 1], eps1[1, 2], eps1[0, 2], p1,
+        )
+        # fmt: on
+
+    return shape_of_point, stress_of_point, history_of_points, force_of_edge
+
+
+@cache
+def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
+    """The functions (list the element of a thread; compute the listed elements of a patch, four lanes for each).
+
+    A list has its length first, shape (PATCH + 1,).
+    """
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    point = POINT[precision]
+    _, _, load_corners = load_functions(precision)
+    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
+    to_point_lines, to_corners, lane_sum, lane_max = lane_functions(precision)
+    shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
+    size, last = HISTORY_SIZE, HISTORY_SIZE - 1
+    read_row, write_row = row_functions(precision, 2 * size)
+    keep_strain, _, strain_square = keep_functions(R)
+    scale = LINE_SCALE**3
+
+    @wp.func
+    def flow(
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        first: int,
+        exponent: int,
+        patches: Patches,
+        e: int,
+        law: wp.array2d(dtype=R),
+        thread: int,
+        q: int,
+        valid: bool,
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=R),
+    ):
+        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
+        a = q ^ (q >> 1)  # corners run around the faces
+        x0, d0, x1, d1 = load_corners(points, pool, patches, e, a, first, exponent)
+        m = material_of(patches.corner[0, e], patches.corner[1, e])
+        W = mat33()
+        for k in range(9):
+            W[k // 3, k % 3] = force_out[k * wp.static(ROW) + thread]
+        warp_barrier()
+        history = read_row(history_out, 2 * size * q, e)
+        xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
+        eta = wp.where(q > 1, R(1.0), R(-1.0))
+        gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
+        lx0, lx1, ly0, ly1, lz = to_point_lines(add_transposed(d0, W, x0 + d0), add_transposed(d1, W, x1 + d1), xi, eta)
+        b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
+        b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
+        pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
+        S0, eps0, p0, trial0 = stress_of_point(sums0, det0, law, m, history, 0)
+        S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
+        largest = lane_max(wp.max(trial0, trial1))
+        if valid and q == 0:
+            keep_strain(e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
+        if valid and (p0 > history[last] or p1 > history[size + last]):
+            write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
+        Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
+        f0, f1 = to_corners(
+            force_of_edge(S0, pressure, b00),
+            force_of_edge(S1, pressure, b10),
+            force_of_edge(S0, pressure, b01),
+            force_of_edge(S1, pressure, b11),
+            Fz,
+            xi,
+            eta,
+        )
+        f0 = add_product(f0, W, f0)
+        f1 = add_product(f1, W, f1)
+        if valid:
+            for i in range(3):
+                force_out[(3 * a + i) * wp.static(ROW) + thread] = f0[i]
+                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = f1[i]
+
+    @wp.func
+    def list_element(W: mat33, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
+        """List the element of a thread, and keep its rotation where its forces will be."""
+        listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
+        for i in range(9):
+            force_out[i * wp.static(ROW) + thread] = W[i // 3, i % 3]
+
+    @wp.func
+    def flow_listed(
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        first: int,
+        head: wp.vec4i,
+        lane: int,
+        patches: Patches,
+        law: wp.array2d(dtype=R),
+        listed_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=R),
+    ):
+        """Compute the listed elements, then clear the list."""
+        listed = listed_out[0]
+        for batch in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
+            item = (batch * wp.static(PATCH) + lane) >> 2
+            thread = listed_out[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
+            mine = from_start(head[0] + thread)
+            valid = item < listed
+            grid = exponent_of(head)
+            q = lane & 3
+            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
+        if listed > 0:
+            barrier()
+            if lane == 0:
+                listed_out[0] = 0
+
+    return list_element, flow_listed

@@ -1,0 +1,185 @@
+"""Owns the forces of `hex8` at small strain: the loop over its Gauss points, elastic or with a return map."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.fused import NOTHING
+from warp_mca.kernels.elements.hexahedron import (
+    LINE_SCALE,
+    gauss_line_function,
+    line_functions,
+    lines_of_point,
+    node_force_function,
+)
+from warp_mca.kernels.elements.point_records import history_functions
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.materials.laws import law_functions
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+    """Functions of symmetric tensors.
+
+    (S b + c; six sums of products l b, as strains xx, yy, zz, xy, yz, xz; the deviatoric stress of strains, whose shear
+    components are doubled; the invariant J2 = S : S / 2 of a traceless S, which needs no zz.)
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+
+    @wp.func
+    def add_traction(S: mat33, b: vec3, c: vec3):
+        # nested so that every product fuses with a sum
+        return vec3(
+            S[0, 0] * b[0] + (S[0, 1] * b[1] + (S[0, 2] * b[2] + c[0])),
+            S[0, 1] * b[0] + (S[1, 1] * b[1] + (S[1, 2] * b[2] + c[1])),
+            S[0, 2] * b[0] + (S[1, 2] * b[1] + (S[2, 2] * b[2] + c[2])),
+        )
+
+    @wp.func
+    def symmetric_gradient(l0: vec3, l1: vec3, l2: vec3, b0: vec3, b1: vec3, b2: vec3):
+        """Direct components, and twice the shear ones, of the sum of l b."""
+        xx = l0[0] * b0[0] + l1[0] * b1[0] + l2[0] * b2[0]
+        yy = l0[1] * b0[1] + l1[1] * b1[1] + l2[1] * b2[1]
+        zz = l0[2] * b0[2] + l1[2] * b1[2] + l2[2] * b2[2]
+        xy = l0[0] * b0[1] + l1[0] * b1[1] + l2[0] * b2[1] + l0[1] * b0[0] + l1[1] * b1[0] + l2[1] * b2[0]
+        yz = l0[1] * b0[2] + l1[1] * b1[2] + l2[1] * b2[2] + l0[2] * b0[1] + l1[2] * b1[1] + l2[2] * b2[1]
+        xz = l0[0] * b0[2] + l1[0] * b1[2] + l2[0] * b2[2] + l0[2] * b0[0] + l1[2] * b1[0] + l2[2] * b2[0]
+        return xx, yy, zz, xy, yz, xz
+
+    @wp.func
+    def deviator(direct: R, shear: R, mean: R, xx: R, yy: R, zz: R, xy: R, yz: R, xz: R):
+        d_xx = direct * (xx - mean)
+        d_yy = direct * (yy - mean)
+        d_zz = direct * (zz - mean)
+        d_xy = shear * xy
+        d_yz = shear * yz
+        d_xz = shear * xz
+        return mat33(d_xx, d_xy, d_xz, d_xy, d_yy, d_yz, d_xz, d_yz, d_zz)
+
+    @wp.func
+    def invariant(S: mat33):
+        shear = S[0, 1] * S[0, 1] + (S[1, 2] * S[1, 2] + S[0, 2] * S[0, 2])
+        return S[0, 0] * (S[0, 0] + S[1, 1]) + (S[1, 1] * S[1, 1] + shear)
+
+    return add_traction, symmetric_gradient, deviator, invariant
+
+
+@cache
+def flow_function(precision: str, law_name: str) -> Any:
+    """The function that takes the elastic stress at Gauss point g of element e to the yield surface.
+
+    It keeps the plastic strain if that grows. Returns the stress and whether the element has yielded.
+    """
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    read_plastic_strain, write_plastic_strain = history_functions(precision)
+    functions = law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
+    scale = LINE_SCALE**3
+
+    @wp.func
+    def flow_at(
+        S: mat33,
+        G: R,
+        g: int,
+        e: int,
+        m: int,
+        flag: int,
+        flag_new: int,
+        law: wp.array2d(dtype=R),
+        history_out: wp.array2d(dtype=R),
+    ):
+        eps_p = mat33()
+        p = R(0.0)
+        yielded = flag_new
+        if flag != 0:
+            eps_p, p = read_plastic_strain(history_out, g, e)
+        S_new, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(scale)))
+        if p_new > p:
+            write_plastic_strain(history_out, g, e, eps_new, p_new)
+            yielded = int(1)
+        return S_new, yielded
+
+    return flow_at
+
+
+@cache
+def small_strain_function(precision: str, law_name: str) -> Any:
+    """The function that gives the corner forces of an element, and the greatest S : S / 2 of a point.
+
+    It takes corners, local displacements and frame W; the material m and its K and G; where there is a law, the history
+    of element e. Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli: K, G and
+    stresses are those of the material times that.
+    """
+    t = scalars(precision)
+    R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
+    gauss_lines = gauss_line_function(precision, scaled=False)
+    _, to_lines = line_functions(precision)
+    edge_to_node = node_force_function(precision)
+    add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
+    plastic, flow_at = bool(law_name), flow_function(precision, law_name)
+
+    @wp.func
+    def element_forces(
+        Xl: mat83,
+        ul: mat83,
+        W: mat33,
+        K: R,
+        G: R,
+        e: int,
+        m: int,
+        law: wp.array2d(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+    ):
+        gx, gy, gz = gauss_lines(Xl)
+        lx, ly, lz = gauss_lines(ul)
+        Sx = mat43()  # stress times cofactor, summed over the two points of each Gauss line
+        Sy = mat43()
+        Sz = mat43()
+        Bx = mat43(R(NOTHING))  # cofactors alone, which carry the element's one pressure
+        By = mat43(R(NOTHING))
+        Bz = mat43(R(NOTHING))
+        volume = R(NOTHING)
+        dilation = R(NOTHING)
+        largest = R(0.0)
+        if wp.static(plastic):
+            flag = yielded_out[e]
+            flag_new = flag
+        for g in range(8):
+            jx, jy, jz = lines_of_point(g)
+            b0 = wp.cross(gy[jy], gz[jz])
+            b1 = wp.cross(gz[jz], gx[jx])
+            b2 = wp.cross(gx[jx], gy[jy])
+            det = wp.dot(gx[jx], b0)
+            xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
+            trace = xx + yy + zz
+            volume += det
+            dilation += trace
+            shear = G / det
+            direct = shear + shear
+            mean = R(THIRD) * trace
+            S = deviator(direct, shear, mean, xx, yy, zz, xy, yz, xz)
+            largest = wp.max(largest, invariant(S))
+            if wp.static(plastic):
+                S, flag_new = flow_at(S, G, g, e, m, flag, flag_new, law, history_out)
+            Sx[jx] = add_traction(S, b0, Sx[jx])
+            Sy[jy] = add_traction(S, b1, Sy[jy])
+            Sz[jz] = add_traction(S, b2, Sz[jz])
+            Bx[jx] = Bx[jx] + b0
+            By[jy] = By[jy] + b1
+            Bz[jz] = Bz[jz] + b2
+        if wp.static(plastic):
+            if flag_new != flag:
+                yielded_out[e] = flag_new
+        pressure = K * dilation / volume
+        Fx = to_lines(Sx + pressure * Bx)
+        Fy = to_lines(Sy + pressure * By)
+        Fz = to_lines(Sz + pressure * Bz)
+        return edge_to_node(Fx, Fy, Fz, W), largest
+
+    return element_forces
