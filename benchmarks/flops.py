@@ -51,7 +51,7 @@ def flops(element: str, precision: str, plastic: bool, patches: bool) -> dict[st
     import importlib
 
     patches = patches and element != "tet4"
-    kernels = importlib.import_module(f"warp_mca.kernels.{element}{'_patch' if patches else ''}")
+    kernels = importlib.import_module(f"warp_mca.kernels.elements.{element}{'_patch' if patches else ''}")
     law = J2Bilinear.law if plastic else Elastic.law
     total: Counter[str] = Counter(count(kernels.force_kernel(precision, law)))
     if element == "tet4":

@@ -16,8 +16,7 @@ from warp_mca.solve import solver, threads
 @pytest.fixture(autouse=True)
 def short_ranges(monkeypatch):
     """Ranges that small models can be cut in."""
-    for module in (threads, solver):
-        monkeypatch.setattr(module, "NODES", threads.LANES)
+    monkeypatch.setattr("warp_mca.solve.node_stage.NODES", threads.LANES)
     monkeypatch.setattr(solver, "RANGE", threads.LANES)
     for module in ("warp_mca.elements.stage", "warp_mca.elements.tet4_stage"):
         monkeypatch.setattr(f"{module}.ELEMENTS", threads.LANES)
