@@ -158,7 +158,7 @@ class Held:
         """Take a new state, for which graphs are captured anew."""
         self.state = self.solver.new_state()
         self.reset()
-        self.solver.search(self.state)
+        self.solver.begin(self.state)
 
     def reset(self) -> None:
         """Back to the motion, without plastic strain and friction."""

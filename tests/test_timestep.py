@@ -73,7 +73,7 @@ def frequencies(model: Model, free: np.ndarray | None = None) -> np.ndarray:
     dt, h = model.stable.dt, 1e-7 * H
     solver = Solver(model, device="cpu", precision="float64", dt=dt)
     state = solver.new_state()
-    solver.search(state)
+    solver.begin(state)
     node = np.concatenate([block.conn.ravel() for block in model.blocks])
 
     def force(u: np.ndarray) -> np.ndarray:
