@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import pickle
 from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import warp as wp
@@ -65,6 +69,30 @@ def result_of(impact: Impact, index: int = 0) -> mca.Result:
 def momentum(impact: Impact, first: int = 0, end: int | None = None) -> NDArray[np.float64]:
     """That of nodes first to end - 1 at the latest half step [kg m/s], shape (3,)."""
     return impact.solver.model.mass[first:end] @ impact.state.v.numpy()[first:end]
+
+
+def figures(impact: Impact) -> dict[str, NDArray]:
+    """What comes of a scene: histories, forces of each contact, stress along paths."""
+    found = result_of(impact)
+    arrays: dict[str, NDArray] = {f"history/{name}": column for name, column in found.history.items()}
+    arrays |= {f"contacts/{k}": contact.force for k, contact in enumerate(found.contacts)}
+    return arrays | {f"paths/{k}": path.stress for k, path in enumerate(found.paths)}
+
+
+def go_on(folder: Path) -> None:
+    """Continue the states <step>.state of a folder with the scene and settings.json there.
+
+    Leaves <step>.end, the final state, and <step>.npz, its figures.
+    """
+    for name, length in SHORT_RANGES.items():
+        module, _, constant = name.rpartition(".")
+        setattr(import_module(module), constant, length)
+    impact = begun(pickle.loads((folder / "scene").read_bytes()), **json.loads((folder / "settings.json").read_text()))
+    for path in sorted(folder.glob("*.state")):
+        impact.load(path)
+        impact.advance()
+        impact.save(path.with_suffix(".end"))
+        np.savez(path.with_suffix(".npz"), **figures(impact))
 
 
 class Displaced:

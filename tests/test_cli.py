@@ -15,6 +15,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.cli import main as cli
 from warp_mca.results.result import CONTACT_FILES, FILES, HISTORY_COLUMNS, load
+from warp_mca.scene import catalogue
 
 SCENE = '''"""A block lands on a rigid floor."""
 from typing import Annotated
@@ -149,8 +150,8 @@ def test_version(capsys: pytest.CaptureFixture[str]):
 def test_scenes_lists_presets_and_every_parameter(capsys: pytest.CaptureFixture[str]):
     assert cli.main(["scenes"]) == 0
     out = capsys.readouterr().out
-    for name in mca.registry.scene_names():
-        source = mca.registry.load_source(name)
+    for name in catalogue.scene_names():
+        source = catalogue.load_source(name)
         assert all(word in out for word in (name, *source.presets, *source.parameters))
     assert "0 to 10" in out and "kg/m^3" in out
 
@@ -294,7 +295,7 @@ def test_as_a_program_it_writes_one_line_on_stderr_and_no_progress_bar(here: Pat
 @pytest.mark.parametrize(("arguments", "frozen"), [("", "True"), ("['--version']", "False")], ids=["program", "call"])
 def test_only_a_program_ends_without_looking_for_garbage(arguments: str, frozen: str):
     """What is registered first runs last."""
-    code = "import atexit, gc, sys; from warp_mca import cli; sys.argv[1:] = ['--version'];"
+    code = "import atexit, gc, sys; from warp_mca.cli import main as cli; sys.argv[1:] = ['--version'];"
     code += f"atexit.register(lambda: print(gc.get_freeze_count() > 0)); cli.main({arguments})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == frozen

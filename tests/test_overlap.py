@@ -16,7 +16,7 @@ from warp_mca.scene.materials import Elastic, J2Bilinear
 from warp_mca.solve import early_launch as module
 from warp_mca.solve.early_launch import overlap
 
-KERNELS = Path(node.__file__).parent
+KERNELS = Path(node.__file__).parents[1]
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
 TWO = (("mixed", False), ("float64", True))
 LAWS = {False: Elastic.law, True: J2Bilinear.law}

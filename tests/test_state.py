@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import json
 import os
+import pickle
 import random
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import warp as wp
-from impacts import SHORT_RANGES, begun, result_of
+from impacts import SHORT_RANGES, begun, figures
 from test_batch import hinged
 from test_style import entries
 
@@ -68,25 +71,37 @@ def steps_to_pause_at(found: Impact) -> list[int]:
     return sorted(chosen)
 
 
-def figures(found: Impact) -> dict[str, np.ndarray]:
-    """What comes of it: histories, forces of each contact, stress along paths."""
-    result = result_of(found)
-    arrays = {f"history/{name}": column for name, column in result.history.items()}
-    arrays |= {f"contacts/{k}": contact.force for k, contact in enumerate(result.contacts)}
-    return arrays | {f"paths/{k}": path.stress for k, path in enumerate(result.paths)}
+def stored(folder: Path, precision: str, threads: int, device: str) -> None:
+    """States of one impact phase at some steps, and what `impacts.go_on` needs to continue them."""
+    settings = {"precision": precision, "threads": threads, "device": device}
+    (folder / "scene").write_bytes(pickle.dumps(scene()))
+    (folder / "settings.json").write_text(json.dumps(settings))
+    paused = begun(scene(), **settings)
+    for step in steps_to_pause_at(paused):
+        paused.advance(until=step)
+        assert paused.state.steps == step
+        paused.save(folder / f"{step}.state")
+    paused.advance()
+    assert paused.state.differences(whole(**settings).state) == []
 
 
-def go_on(folder: str, precision: str, threads: str, device: str) -> None:
-    """Continue each state of a folder; leave the figures and the final state beside it."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, length in SHORT_RANGES.items():
-            patch.setattr(name, length)
-        found = impact(precision, int(threads), device)
-        for path in sorted(Path(folder).glob("*.state")):
-            found.load(path)
-            found.advance()
-            found.save(path.with_suffix(".end"))
-            np.savez(path.with_suffix(".npz"), **figures(found))
+@pytest.fixture(scope="module")
+def continued(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[tuple[str, int], Path]]:
+    """Gives the folders of states of a device, which one fresh process has continued, by precision and threads."""
+
+    @cache
+    def make(device: str) -> dict[tuple[str, int], Path]:
+        kinds = [(precision, n) for precision in PRECISIONS for n in ((1, 2) if device == "cpu" else (1,))]
+        folders = {kind: tmp_path_factory.mktemp("states") for kind in kinds}
+        for (precision, threads), folder in folders.items():
+            stored(folder, precision, threads, device)
+        code = "import sys, pathlib, impacts; [impacts.go_on(pathlib.Path(folder)) for folder in sys.argv[1:]]"
+        paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+        command = [sys.executable, "-c", code, *map(str, folders.values())]
+        subprocess.run(command, env=os.environ | {"PYTHONPATH": paths}, check=True)
+        return folders
+
+    return make
 
 
 GPU = pytest.param(1, "cuda:0", marks=pytest.mark.gpu)
@@ -94,25 +109,17 @@ GPU = pytest.param(1, "cuda:0", marks=pytest.mark.gpu)
 
 @pytest.mark.parametrize(("threads", "device"), [(1, "cpu"), (2, "cpu"), GPU])
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_a_stored_state_goes_on_to_the_same_bits_in_a_fresh_process(precision, threads, device, tmp_path):
-    expected, paused = whole(precision, threads, device), impact(precision, threads, device)
-    steps = steps_to_pause_at(paused)
-    for step in steps:
-        paused.advance(until=step)
-        assert paused.state.steps == step
-        paused.save(tmp_path / f"{step}.state")
-    paused.advance()
-    assert paused.state.differences(expected.state) == []
-    code = f"import sys, test_state; test_state.go_on({str(tmp_path)!r}, {precision!r}, '{threads}', {device!r})"
-    paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
-    subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": paths}, check=True)
+def test_a_stored_state_goes_on_to_the_same_bits_in_a_fresh_process(precision, threads, device, continued):
+    folder, expected = continued(device)[precision, threads], whole(precision, threads, device)
     known, found = figures(expected), impact(precision, threads, device)
     assert known["history/F_n_N"].max() > 1e3 and np.abs(known["paths/0"]).max() > 1e6
     assert known["history/E_plastic"][-1] > 0.0 < known["history/E_friction"][-1]
+    steps = steps_to_pause_at(found)
+    assert len(steps) > 3
     for step in steps:
-        found.load(tmp_path / f"{step}.end")
+        found.load(folder / f"{step}.end")
         assert found.state.differences(expected.state) == [], step
-        with np.load(tmp_path / f"{step}.npz") as arrays:
+        with np.load(folder / f"{step}.npz") as arrays:
             assert [name for name in known if arrays[name].tobytes() != known[name].tobytes()] == [], step
 
 
@@ -261,9 +268,9 @@ def others() -> dict[str, mca.Scene]:
 
 
 @pytest.fixture(scope="module")
-def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A state of `scene`."""
-    path = tmp_path_factory.mktemp("stored") / "state"
+def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The state of `scene` before its first step."""
+    path = tmp_path_factory.mktemp("start") / "state"
     begun(scene()).save(path)
     return path
 
@@ -277,24 +284,24 @@ def refuses(found: Impact, path: Path, words: str) -> None:
 
 
 @pytest.mark.parametrize("change", others())
-def test_a_state_of_another_model_or_time_step_is_refused(change: str, stored: Path):
-    refuses(begun(others()[change]), stored, "another model, precision or time step; use the run's own")
+def test_a_state_of_another_model_or_time_step_is_refused(change: str, start: Path):
+    refuses(begun(others()[change]), start, "another model, precision or time step; use the run's own")
 
 
-def test_a_state_of_another_precision_is_refused(stored: Path):
-    refuses(impact("float64"), stored, "another model, precision or time step")
+def test_a_state_of_another_precision_is_refused(start: Path):
+    refuses(impact("float64"), start, "another model, precision or time step")
 
 
-def test_missing_and_damaged_files_are_refused(stored: Path, tmp_path: Path):
-    found, whole_file = impact(), stored.read_bytes()
+def test_missing_and_damaged_files_are_refused(start: Path, tmp_path: Path):
+    found, intact = impact(), start.read_bytes()
     refuses(found, tmp_path / "state", "there is no such file")
     path = tmp_path / "damaged"
-    middle = len(whole_file) // 2
-    flipped = whole_file[:middle] + bytes([whole_file[middle] ^ 255]) + whole_file[middle + 1 :]
-    for damaged in (b"", b"no archive", whole_file[:middle], flipped):
+    middle = len(intact) // 2
+    flipped = intact[:middle] + bytes([intact[middle] ^ 255]) + intact[middle + 1 :]
+    for damaged in (b"", b"no archive", intact[:middle], flipped):
         path.write_bytes(damaged)
         refuses(found, path, "damaged")
-    with np.load(stored) as archive:
+    with np.load(start) as archive:
         arrays = {name: archive[name] for name in archive.files}
     for name, array in (("u", None), ("u", arrays["u"][:-1]), ("scenes/0/peaks", None), ("header", arrays["u"])):
         with path.open("wb") as file:
