@@ -42,7 +42,9 @@ def checkout(name: str) -> Iterator[Path]:
             archive = subprocess.run(["git", "-C", str(ROOT), "archive", name], check=True, capture_output=True).stdout
             subprocess.run(["tar", "-xf", "-", "-C", folder], input=archive, check=True)
         for part in ("kernels", "scenes"):
-            (target / "warp_mca" / part).symlink_to(target / part)
+            link = target / "warp_mca" / part
+            link.unlink(missing_ok=True)  # of an editable install
+            link.symlink_to(target / part)
         yield target
 
 
