@@ -20,7 +20,6 @@ from warp_mca.elements import ELEMENTS, Element
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.model.model import Model, build_model
 from warp_mca.model.stable_step import StableStep, stable_step
-from warp_mca.runs.simulation import mesh
 from warp_mca.solve.solver import Solver
 
 STEEL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=400e6, E_t=2e9)
@@ -91,7 +90,7 @@ def assemble(element: str, count: int) -> Model:
         prescribed=(mca.Prescribed(body="upper", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
         impact=mca.ImpactPhase(duration=1e-3),
     )
-    meshes = mesh(scene)
+    meshes = mca.mesh(scene)
     rest = {name: np.zeros_like(m.points) for name, m in meshes.items()}
     with patch("warp_mca.model.assembly.stable_step", _stable_step):
         return build_model(scene, meshes, {name: m.points for name, m in meshes.items()}, rest)
@@ -138,10 +137,11 @@ def motion(model: Model, case: Case) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 class Held:
-    """A solver of the model as the case has it, with a state to return to.
+    """A solver of the model as the case has it, with a motion to return to.
 
     Attributes:
         solver: of warp_mca.
+        state: that it advances.
         case: what it has.
         precision: as in `warp_mca.run`.
     """
@@ -153,44 +153,50 @@ class Held:
         u, v = motion(model, case)
         with wp.ScopedDevice(device):
             self._u, self._v = wp.array(u, dtype=wp.vec3d), wp.array(v, dtype=wp.vec3d)
-        self.reset()
         self.solver.compile()
+        self.renew()
+
+    def renew(self) -> None:
+        """Take a new state, for which graphs are captured anew."""
+        self.state = self.solver.new_state()
+        self.reset()
+        self.solver.begin(self.state)
 
     def reset(self) -> None:
-        """Back to the state, virgin but for the plastic flow of one step."""
-        solver = self.solver
+        """Back to the motion, without plastic strain and friction."""
         with wp.ScopedDevice(self.device):
-            wp.copy(solver.u, self._u)
-            wp.copy(solver.v, self._v)
-            for stage in solver.elements:
-                stage.reset()
-            for stage in solver.contacts:
-                stage.spring.tangential.zero_()
-            solver.contact_force.zero_()
+            wp.copy(self.state.u, self._u)
+            wp.copy(self.state.v, self._v)
+            for own in self.state.elements:
+                own.yielded.zero_()
+                own.history.zero_()
+            for touched in self.state.contacts:
+                touched.spring.tangential.zero_()
+            self.solver.work.contact_force.zero_()
 
     def advance(self, steps: int) -> None:
         """Launch `steps` steps: a multiple of the case's records, or up to one."""
         if self.case.record:
-            self.solver.record_and_step(steps)
+            self.solver.record_and_step(self.state, steps)
         else:
-            self.solver.step(steps)
+            self.solver.step(self.state, steps)
 
     def yielded(self) -> float:
         """Share of elements that have yielded [-]."""
         if self.case.yielding is None:
             return 0.0
-        return float(np.mean(np.concatenate([stage.yielded.numpy() for stage in self.solver.elements])))
+        return float(np.mean(np.concatenate([own.yielded.numpy() for own in self.state.elements])))
 
     def sound(self) -> bool:
         """Whether no flag is up (search out of date, contact too deep, lists full) and the state is finite."""
-        return not self.solver.flag.numpy().any() and bool(np.isfinite(self.solver.u.numpy()).all())
+        return not self.state.flag.numpy().any() and bool(np.isfinite(self.state.u.numpy()).all())
 
     def forces(self) -> NDArray[np.float64]:
         """Forces of the elements on each node at the state [N], shape (node_count, 3)."""
         self.reset()
-        self.solver.step(1)
+        self.solver.step(self.state, 1)
         # slots of patches are other ones in each precision
         node = np.concatenate([stage.slot_node for stage in self.solver.elements])
-        slots = self.solver.force.numpy().astype(np.float64)
+        slots = self.solver.work.force.numpy().astype(np.float64)
         count = self.solver.model.node_count
         return np.stack([np.bincount(node, slots[:, k], minlength=count) for k in range(3)], axis=1)

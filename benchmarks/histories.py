@@ -28,7 +28,6 @@ name, device, precision, duration, out = sys.argv[1:]
 result = mca.run(mca.make_scene(name), device=device, precision=precision, duration=float(duration) or None)
 np.savez(out, **result.history)
 """
-LIST = "from warp_mca.scene.catalogue import scene_names; print(*scene_names())"
 
 
 @contextmanager
@@ -43,7 +42,9 @@ def checkout(name: str) -> Iterator[Path]:
             archive = subprocess.run(["git", "-C", str(ROOT), "archive", name], check=True, capture_output=True).stdout
             subprocess.run(["tar", "-xf", "-", "-C", folder], input=archive, check=True)
         for part in ("kernels", "scenes"):
-            (target / "warp_mca" / part).symlink_to(target / part)
+            link = target / "warp_mca" / part
+            link.unlink(missing_ok=True)  # of an editable install
+            link.symlink_to(target / part)
         yield target
 
 
@@ -79,12 +80,17 @@ def difference(old: dict[str, np.ndarray], new: dict[str, np.ndarray]) -> str:
     return f"{worst:.1e} ({where})" if where else "equal"
 
 
+def _scene_names(folder: Path) -> list[str]:
+    """Built-in scenes of a checkout: each has a file of its name."""
+    return sorted(file.stem for file in (folder / "scenes").glob("*.py") if not file.stem.startswith("_"))
+
+
 def compare(old: str, new: str, devices: Sequence[str], precisions: Sequence[str], scenes: Sequence[str]) -> list[str]:
     """Rows of the table, printed as they come."""
     rows = ["| scene | " + " | ".join(f"{d}, {p}" for d in devices for p in precisions) + " |"]
     rows.append("|---" * (1 + len(devices) * len(precisions)) + "|")
     with checkout(old) as before, checkout(new) as after:
-        for scene in scenes or _python(after, LIST).split():
+        for scene in scenes or _scene_names(after):
             cells = [
                 difference(*(histories(folder, scene, device, precision) for folder in (before, after)))
                 for device in devices

@@ -39,7 +39,7 @@ def step_bytes(held: Held) -> float:
     Positions and displacements are counted once for each kernel, as if the cache kept them for all elements around a
     node, or once for each patch around it; history is read and written for elements that yield only.
     """
-    s = held.solver
+    s, work = held.solver, held.solver.work
     total = 0.0
     nodes = s.model.node_count
     for stage in s.elements:
@@ -48,22 +48,23 @@ def step_bytes(held: Held) -> float:
             total += size(lists.corner) + size(stage.point) + size(lists.places) + vectors * 24 * len(stage.point)
         else:
             total += size(stage.conn) + size(stage.material) + 2 * 24 * nodes
-        total += size(s.force)
+        total += size(work.force)
         if held.case.yielding is not None:
-            total += size(stage.yielded) + 2.0 * held.case.yielding * size(stage.history)
+            own = held.state.elements[stage.index]
+            total += size(own.yielded) + 2.0 * held.case.yielding * size(own.history)
         if hasattr(stage, "group"):  # two kernels more: dilatation, and its mean at nodes
             total += size(stage.conn) + 2 * 24 * nodes + 2 * size(stage.growth) + size(stage.element)
             total += size(stage.offset) + size(stage.inverse_volume) + 2 * size(stage.dilation)
             total += size(stage.group)
-    total += size(s.force) + size(s.near) + size(s.more)
+    total += size(work.force) + size(work.near) + size(work.more)
     return total + (8 + 4 * 24) * nodes  # inverse mass; u and v read and written
 
 
 def memory(held: Held) -> dict[str, float]:
-    """Bytes of the solver's arrays and of a step, for each element."""
+    """Bytes of the arrays of solver and state, and of a step, for each element."""
     count = held.solver.model.element_count
     found = {
-        "bytes_per_element": sum(size(a) for a in arrays(held.solver, {}).values()) / count,
+        "bytes_per_element": sum(size(a) for a in arrays([held.solver, held.state], {}).values()) / count,
         "step_bytes_per_element": step_bytes(held) / count,
     }
     return found

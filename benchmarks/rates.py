@@ -13,13 +13,14 @@ from benchmarks.memory import memory
 from benchmarks.stages import shares
 from benchmarks.timing import Care, clock, ratio, seconds_per_call, steps_per_graph
 from warp_mca.model.model import Model
+from warp_mca.solve.stage import Step
 
 
 def steps_of(held: Held, care: Care) -> int:
     """Steps of a captured graph."""
     if held.case.record:
         return held.case.record
-    first = seconds_per_call(lambda: held.solver.step(1), held.device, Care(0.02, 1), held.reset)
+    first = seconds_per_call(lambda: held.solver.step(held.state, 1), held.device, Care(0.02, 1), held.reset)
     return steps_per_graph(first, care)
 
 
@@ -85,9 +86,9 @@ def measure_savings(model: Model, where: dict[str, Any], precisions: list[str], 
 def measure_host(model: Model, where: dict[str, Any], device: str, care: Care) -> dict[str, Any]:
     """Host time to launch a step: replayed from a graph of 20 steps, and kernel by kernel without a graph."""
     held = Held(model, FULL, device, "mixed")
-    solver = held.solver
+    solver, state = held.solver, held.state
     steps, launches, now = 20, 5, clock(device)
-    solver.step(steps)
+    solver.step(state, steps)
 
     def host(call: Any) -> float:
         times = []
@@ -102,10 +103,10 @@ def measure_host(model: Model, where: dict[str, Any], device: str, care: Care) -
 
     def plain() -> None:
         with wp.ScopedDevice(device):
-            solver._step()
+            solver._step(Step(state))
 
-    whole = seconds_per_call(lambda: solver.step(steps), device, care, held.reset) / steps
-    found = {"host_graph": host(lambda: solver.step(steps)) / steps, "host_plain": host(plain), "step": whole}
+    whole = seconds_per_call(lambda: solver.step(state, steps), device, care, held.reset) / steps
+    found = {"host_graph": host(lambda: solver.step(state, steps)) / steps, "host_plain": host(plain), "step": whole}
     found["step_plain"] = seconds_per_call(plain, device, care, held.reset)
     row = where | {"n_elements": solver.model.element_count} | found
     print("host   ", ", ".join(f"{k} {1e6 * v:.2f} us" for k, v in found.items()), flush=True)

@@ -6,35 +6,39 @@ from collections.abc import Callable
 
 from benchmarks.blocks import Held
 from benchmarks.timing import Care, captured, seconds_per_call, steps_per_graph
+from warp_mca.solve.stage import Step
 
 
 def bodies(held: Held) -> dict[str, Callable[[], None]]:
     """The launches of each stage, by name."""
-    s = held.solver
+    s, state = held.solver, held.state
 
     def elements() -> None:
         for stage in s.elements:
-            stage.forces(s.X, s.law, s.u, s.force)
+            stage.launch(s.work, state)
 
     def contact() -> None:
         for stage in s.contacts:
-            stage.touch(s.X, s.u, s.v, s.dt, s.contact_force, s.normal_force, s.flag)
+            stage.launch(s.work, state, s.dt)
 
     return {
         "element forces": elements,
         "contact": contact,
-        "gather and integrate": lambda: s._integrate(s.dt, s.dt, s.bonds.role),
-        "hinge and driven face": s._advance_bound,
+        "gather and integrate": lambda: s.nodes.advance(Step(state)),
+        "hinge and driven face": lambda: s.nodes.advance_bound(Step(state)),
     }
 
 
 def shares(held: Held, care: Care) -> dict[str, float]:
     """Time of each stage [s] in a step; a record is what a step that writes one takes more."""
     found = {}
-    step = held.solver._step
-    for name, body in (bodies(held) | {"step": step, "record": lambda: held.solver._record_step(frozenset())}).items():
+    whole: dict[str, Callable[[], None]] = {
+        "step": lambda: held.solver._step(Step(held.state)),
+        "record": lambda: held.solver._step(Step(held.state, records=True, is_row=True)),
+    }
+    for name, body in (bodies(held) | whole).items():
         held.reset()
-        step()  # yields, so that stages find the state that a run has
+        whole["step"]()  # yields, so that stages find the state that a run has
         one = seconds_per_call(captured(body, 1, held.device), held.device, Care(0.02, 1))
         count = steps_per_graph(one, care)
         call = captured(body, count, held.device)

@@ -17,19 +17,20 @@ import warp as wp
 wp.config.quiet = True
 import warp_mca as mca
 from warp_mca.model.model import build_model
-from warp_mca.runs.simulation import mesh
 from warp_mca.solve.solver import Solver
 imported = time.perf_counter()
 scene = mca.make_scene("rod_on_wall")
-meshes = mesh(scene)
+meshes = mca.mesh(scene)
 X = {k: m.points for k, m in meshes.items()}
 model = build_model(scene, meshes, X, {k: 0.0 * x + [1.5, 0.0, 0.0] for k, x in X.items()})
 built = time.perf_counter()
 solver = Solver(model, device=sys.argv[1], precision="mixed", dt=model.stable.dt)
 solver.compile()
-solver.start()
+state = solver.new_state()
+solver.begin(state)
+solver.start(state)
 compiled = time.perf_counter()
-solver.record_and_step(1)
+solver.record_and_step(state, 1)
 wp.synchronize_device(sys.argv[1])
 print(imported - begun, built - imported, compiled - built, time.perf_counter() - compiled)
 """

@@ -39,7 +39,7 @@ def test_about_five_per_cent_yield():
     from benchmarks.blocks import Held, assemble
 
     held = Held(assemble("hex8", 4000), RATES["plastic, 5 % yield"], "cpu", "float64")
-    held.solver.step(1)
+    held.advance(1)
     assert 0.02 < held.yielded() <= 0.1
 
 

@@ -19,6 +19,7 @@ from warp_mca.cli.request import read_request
 from warp_mca.cli.warp_start import start_warp
 from warp_mca.results.result import HISTORY_COLUMNS
 from warp_mca.results.storage import CONTACT_FILES, FILES, load
+from warp_mca.scene import catalogue
 
 SCENE = '''"""A block lands on a rigid floor."""
 from typing import Annotated
@@ -153,8 +154,8 @@ def test_version(capsys: pytest.CaptureFixture[str]):
 def test_scenes_lists_presets_and_every_parameter(capsys: pytest.CaptureFixture[str]):
     assert cli.main(["scenes"]) == 0
     out = capsys.readouterr().out
-    for name in mca.scene.catalogue.scene_names():
-        source = mca.scene.catalogue.load_source(name)
+    for name in catalogue.scene_names():
+        source = catalogue.load_source(name)
         assert all(word in out for word in (name, *source.presets, *source.parameters))
     assert "0 to 10" in out and "kg/m^3" in out
 

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from impacts import begun, finished, momentum, result_of
 
 import warp_mca as mca
-from warp_mca.runs.simulation import mesh
-from warp_mca.solve.solver import Solver
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 R, V = 0.01, 2.0
@@ -39,19 +38,7 @@ def impulse(result: mca.Result, column: str = "F_n_N") -> float:
     return float(result[column].sum() * (result.time[1] - result.time[0]))
 
 
-@pytest.fixture
-def momentum(monkeypatch):
-    """Gives the momentum [kg m/s] that the last run left in a range of its nodes."""
-    last = {}
-    monkeypatch.setattr(
-        Solver,
-        "max_plastic_strain",
-        lambda self, scene: last.update(p=self.model.mass[:, None] * self.v.numpy()) or 0.0,
-    )
-    return lambda start, end: last["p"][start:end].sum(axis=0)
-
-
-NODES = len(mesh(balls())["b"].points)
+NODES = len(mca.mesh(balls())["b"].points)
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +49,9 @@ def pole() -> mca.Result:
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize(("slave", "master"), [("pole", "surface"), ("boundary", "boundary"), ("boundary", "pole")])
-def test_forces_of_a_closed_master_are_those_of_its_pole_from_any_side(axis, slave, master, pole, momentum):
-    result = mca.run(balls(axis, slave, master))
-    gained = momentum(NODES, 2 * NODES)
+def test_forces_of_a_closed_master_are_those_of_its_pole_from_any_side(axis, slave, master, pole):
+    impact = finished(balls(axis, slave, master))
+    result, gained = result_of(impact), momentum(impact, NODES, 2 * NODES)
     assert gained["xyz".index(axis)] == pytest.approx(np.linalg.norm(gained), rel=1e-3)
     assert impulse(result) == pytest.approx(np.linalg.norm(gained), rel=2e-3)
     assert result.F_n == pytest.approx(pole.F_n, abs=0.01 * pole.F_n.max())
@@ -73,15 +60,15 @@ def test_forces_of_a_closed_master_are_those_of_its_pole_from_any_side(axis, sla
     assert np.abs(result["F_t_N"]).max() < 0.03 * result.F_n.max()
 
 
-def test_the_normal_force_of_two_closed_surfaces_does_not_ask_where_they_meet(momentum):
+def test_the_normal_force_of_two_closed_surfaces_does_not_ask_where_they_meet():
     """The second ball lies 30 degrees beside the way of the first, which begins 3 mm away from it."""
     scene = balls(slave="boundary", gap=3e-3)
     aside = replace(scene.bodies[0], position=(-np.sqrt(3.0) * R - 3e-3, R, 0.0))
     longer = replace(scene.impact, duration=1.6e-3)
-    result = mca.run(replace(scene, bodies=(aside, scene.bodies[1]), impact=longer))
-    gained = np.linalg.norm(momentum(NODES, 2 * NODES))
+    impact = finished(replace(scene, bodies=(aside, scene.bodies[1]), impact=longer))
+    gained = np.linalg.norm(momentum(impact, NODES, 2 * NODES))
     assert gained > 0.03
-    assert impulse(result) == pytest.approx(gained, rel=1e-3)
+    assert impulse(result_of(impact)) == pytest.approx(gained, rel=1e-3)
 
 
 @pytest.mark.parametrize("nodes", ["pole", "boundary"])
@@ -97,7 +84,7 @@ def test_friction_and_two_ways_on_a_closed_master(nodes):
         assert closed[column] == pytest.approx(open_one[column], abs=0.01 * open_one.F_n.max())
 
 
-def test_each_contact_of_each_scene_of_a_batch_counts_by_itself(momentum):
+def test_each_contact_of_each_scene_of_a_batch_counts_by_itself():
     """A ball catches up with one that meets a third: both closed, in one scene open."""
 
     def row(axis: str, master: str) -> mca.Scene:
@@ -107,11 +94,12 @@ def test_each_contact_of_each_scene_of_a_batch_counts_by_itself(momentum):
         behind = replace(meet, master=mca.Surface(body="c", nodes=master))
         return replace(scene, bodies=(first, second, replace(first, name="c", **twice)), contacts=(meet, behind))
 
-    results = mca.run_batch([row("x", "surface"), row("y", "pole"), row("z", "boundary")])
-    for k, result in enumerate(results):
-        a, b, c = (momentum(NODES * (3 * k + i), NODES * (3 * k + i + 1))[k] for i in range(3))
+    impact = begun(row("x", "surface"), row("y", "pole"), row("z", "boundary"))
+    impact.advance()
+    for k in range(3):
+        a, b, c = (momentum(impact, NODES * (3 * k + i), NODES * (3 * k + i + 1))[k] for i in range(3))
         before = 2.0 / 3.0 * (a + b + c)  # of the ball behind
-        assert impulse(result) == pytest.approx(b + before - c, rel=5e-3)
+        assert impulse(result_of(impact, k)) == pytest.approx(b + before - c, rel=5e-3)
 
 
 def block_and_plate(thickness: float, *, gap: float, speed: float, closed: bool = True, **contact) -> mca.Scene:

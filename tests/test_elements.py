@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import warp as wp
+from impacts import Displaced
 from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
@@ -28,33 +29,19 @@ STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 KINDS = [(name, kinematics) for name in ELEMENTS for kinematics in ("corotational", "finite")]
 
 
-def solver_of(mesh: Mesh, element: str, kinematics: str, precision: str = "float64", material=STEEL) -> Solver:
+def held_of(mesh: Mesh, element: str, kinematics: str, precision: str = "float64", material=STEEL) -> Displaced:
     body = mca.Body(name="body", geometry=mesh, material=material, element=element, kinematics=kinematics)
     scene = mca.Scene(name="test", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6))
     meshes = mca.mesh(scene)
     X = meshes["body"].points
     model = build_model(scene, meshes, {"body": X}, {"body": np.zeros_like(X)})
-    return Solver(model, device="cpu", precision=precision, dt=1e-9)
+    return Displaced(Solver(model, device="cpu", precision=precision, dt=1e-9))
 
 
-def forces(solver: Solver, u: np.ndarray) -> np.ndarray:
-    """Nodal forces [N] of a displacement field."""
-    solver.u.assign(u)
-    with wp.ScopedDevice("cpu"):
-        solver._forces()
-    force, total = solver.force.numpy().astype(float), np.zeros_like(u)
-    for stage in solver.elements:
-        np.add.at(total, stage.slot_node, force[stage.slot : stage.slot + len(stage.slot_node)])
-    return total
-
-
-def energy(solver: Solver, u: np.ndarray) -> float:
+def energy(held: Displaced, u: np.ndarray) -> float:
     """Elastic and hourglass energy [J]."""
-    forces(solver, u)
-    with wp.ScopedDevice("cpu"):
-        for stage in solver.elements:
-            stage.energies(solver.X, solver.law, solver.u, solver.energy)
-    return float(solver.energy.numpy()[[0, 4]].sum())
+    held.forces(u)
+    return float(held.energies()[[0, 4]].sum())
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +55,14 @@ def cube() -> Mesh:
 def test_forces_are_the_slope_of_the_energy(element: str, kinematics: str, cube: Mesh):
     """At strains of 20 %, along random directions; small strain takes the rotation for that of the energy's minimum."""
     rng = np.random.default_rng(0)
-    solver = solver_of(cube, element, kinematics)
+    held = held_of(cube, element, kinematics)
     size = 0.2 if kinematics == "finite" else 1e-3
     u = cube.points @ rng.uniform(-size, size, (3, 3)) + size * 0.3 * rng.uniform(-1, 1, cube.points.shape)
-    force = forces(solver, u)
+    force = held.forces(u)
     for _ in range(3):
         way = rng.normal(size=u.shape)
         h = 1e-6 * size
-        slope = (energy(solver, u + h * way) - energy(solver, u - h * way)) / (2.0 * h)
+        slope = (energy(held, u + h * way) - energy(held, u - h * way)) / (2.0 * h)
         # The co-rotational forces of hexahedra leave out how the rotation changes with the strain, a product of both
         # strains; so do the hourglass forces.
         tolerance = {"finite": 1e-6, "corotational": 5e-3}[kinematics]
@@ -86,14 +73,14 @@ def test_forces_are_the_slope_of_the_energy(element: str, kinematics: str, cube:
 @pytest.mark.parametrize(("precision", "tolerance"), [("float64", 3e-14), ("mixed", 2e-6)])
 @pytest.mark.parametrize(("element", "kinematics"), KINDS)
 def test_rotation_leaves_no_force_and_turns_those_there_are(element, kinematics, precision, tolerance, cube: Mesh):
-    solver = solver_of(cube, element, kinematics, precision)
+    held = held_of(cube, element, kinematics, precision)
     turn = Rotation.from_rotvec([0.9, -1.3, 0.6]).as_matrix()
     rigid = cube.points @ turn.T - cube.points + [3.0, -1.0, 2.0]
-    assert np.abs(forces(solver, rigid)).max() < tolerance * STEEL.E
+    assert np.abs(held.forces(rigid)).max() < tolerance * STEEL.E
     rng = np.random.default_rng(1)
     u = 0.05 * rng.uniform(-1, 1, cube.points.shape)
-    force = forces(solver, u)
-    turned = forces(solver, (cube.points + u) @ turn.T - cube.points)
+    force = held.forces(u)
+    turned = held.forces((cube.points + u) @ turn.T - cube.points)
     assert turned == pytest.approx(force @ turn.T, abs=30 * tolerance * np.abs(force).max() + tolerance * STEEL.E)
 
 
@@ -105,8 +92,8 @@ def test_patch_of_hexahedra_wedges_pyramids_and_tetrahedra(element: str, kinemat
     check(mesh, "mixed")
     assert volumes(mesh).sum() == pytest.approx(1.0, rel=1e-12)
     gradient = 0.1 * np.array([[0.5, 0.3, -0.2], [0.1, -0.4, 0.6], [0.7, 0.2, 0.3]])
-    solver = solver_of(mesh, element, kinematics)
-    force = forces(solver, mesh.points @ gradient.T)
+    held = held_of(mesh, element, kinematics)
+    force = held.forces(mesh.points @ gradient.T)
     inner = ((mesh.points > 1e-9) & (mesh.points < 1.0 - 1e-9)).all(axis=1)
     assert inner.sum() == 2
     assert np.abs(force[inner]).max() < 1e-13 * np.abs(force).max() * len(force)
@@ -115,8 +102,8 @@ def test_patch_of_hexahedra_wedges_pyramids_and_tetrahedra(element: str, kinemat
 @pytest.mark.parametrize("element", list(ELEMENTS))
 def test_uniform_stretch_at_finite_strain(element: str, cube: Mesh):
     """Twice as long without change of width: Cauchy stress (K + 4 G / 3) ln 2 / 2 along, from logarithmic strain."""
-    solver = solver_of(cube, element, "finite")
-    force = forces(solver, cube.points * [1.0, 0.0, 0.0])
+    held = held_of(cube, element, "finite")
+    force = held.forces(cube.points * [1.0, 0.0, 0.0])
     K, G = STEEL.bulk_modulus, STEEL.shear_modulus
     virial = (cube.points * [2.0, 1.0, 1.0]).T @ force  # minus the Kirchhoff stress times the volume
     cut = tetrahedral(cube) if element == "tet4" else cube
@@ -130,17 +117,18 @@ def test_uniform_stretch_at_finite_strain(element: str, cube: Mesh):
 def test_plastic_work_of_a_stretched_block(element: str, kinematics: str, cube: Mesh):
     """Isochoric stretch in one step: dp = (2 G e - sigma_y) / (3 G + H) of the equivalent strain, by hand."""
     metal = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=200e6, E_t=10e9, beta=1.0)
-    solver = solver_of(cube, element, kinematics, material=metal)
+    held = held_of(cube, element, kinematics, material=metal)
     stretch = 1.02
     if kinematics == "finite":
-        forces(solver, cube.points * [stretch - 1.0, stretch**-0.5 - 1.0, stretch**-0.5 - 1.0])
+        held.forces(cube.points * [stretch - 1.0, stretch**-0.5 - 1.0, stretch**-0.5 - 1.0])
         strain = np.log(stretch)
     else:
-        forces(solver, cube.points * [0.02, -0.01, -0.01])
+        held.forces(cube.points * [0.02, -0.01, -0.01])
         strain = 0.02
     G, H = metal.shear_modulus, metal.hardening_modulus
     expected = (3.0 * G * strain - metal.sigma_y) / (3.0 * G + H)
-    found = [stage.history.numpy()[5 : 6 * stage.points : 6] for stage in solver.elements]
+    parts = zip(held.solver.elements, held.state.elements, strict=True)
+    found = [own.history.numpy()[5 : 6 * stage.points : 6] for stage, own in parts]
     np.testing.assert_allclose(np.concatenate([part.ravel() for part in found]), expected, rtol=1e-9)
 
 
@@ -173,16 +161,16 @@ def test_element_eigenvalue_is_that_of_its_forces(element: str, kinematics: str)
         mesh = Mesh(x[[0, 1, 3, 4]], np.zeros((0, 8), np.int32), {}, {}, np.arange(4, dtype=np.int32)[None])
     else:
         mesh = Mesh(x, np.arange(8, dtype=np.int32)[None])
-    solver = solver_of(mesh, element, kinematics)
+    held = held_of(mesh, element, kinematics)
     n = mesh.points.size
     stiffness = np.zeros((n, n))
     for k in range(n):
         step = np.zeros(n)
         step[k] = 1e-7
         way = step.reshape(-1, 3)
-        stiffness[:, k] = -(forces(solver, way) - forces(solver, -way)).ravel() / 2e-7
+        stiffness[:, k] = -(held.forces(way) - held.forces(-way)).ravel() / 2e-7
     assert stiffness == pytest.approx(stiffness.T, abs=1e-5 * np.abs(stiffness).max())
-    root = np.repeat(solver.model.mass, 3) ** -0.5
+    root = np.repeat(held.solver.model.mass, 3) ** -0.5
     largest = np.linalg.eigvalsh(root[:, None] * stiffness * root)[-1]
     args = np.full(1, STEEL.bulk_modulus), np.full(1, STEEL.shear_modulus)
     mass = kind.lumped_masses(mesh.points[None], np.full(1, STEEL.rho))

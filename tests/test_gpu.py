@@ -186,12 +186,12 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
         assert np.abs(one - exact).max() < tolerance * np.abs(exact).max()
         for blocks in (stage.blocks // 3, 7):
             stage.blocks = blocks
-            held.solver.graphs.clear()
+            held.renew()
             assert np.array_equal(held.forces(), one)
         host = Held(model, Case(yielding), "cpu", precision)
         host.forces()
         assert held.yielded() == host.yielded()
-        for a, b in zip(held.solver.elements, host.solver.elements, strict=True):
+        for a, b in zip(held.state.elements, host.state.elements, strict=True):
             scale = np.abs(b.history.numpy()).max(initial=1e-30)
             np.testing.assert_allclose(a.history.numpy(), b.history.numpy(), rtol=0, atol=10.0 * tolerance * scale)
 
@@ -205,19 +205,19 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
     from warp_mca.kernels.nodes import node
     from warp_mca.solve import solver
 
-    monkeypatch.setattr(solver, "EARLY_ROUNDS", 0)
+    monkeypatch.setattr("warp_mca.solve.node_stage.EARLY_ROUNDS", 0)
     model, case = assemble(element, 90_000), {"elastic": Case(), "flows": Case(0.3), "everything": FULL}[name]
     overlap, changed, states = solver.overlap, [], []
     for change in (lambda graph: changed.append(overlap(graph)), lambda graph: None):
         monkeypatch.setattr(solver, "overlap", change)
         held = Held(model, case, "cuda:0", precision)
         if name == "elastic":
-            assert held.solver.integrate_kernel is node.integrate_kernel(precision, False, False, False, False, True)
+            early = node.integrate_kernel(precision, False, False, False, False, True)
+            assert held.solver.nodes.integrate_kernel is early
         for _ in range(10):
             held.advance(20)
-        state = [held.solver.u, held.solver.v, held.solver.force, held.solver.partial, held.solver.flag]
-        state += [array for stage in held.solver.elements for array in (stage.history, stage.yielded)]
-        states.append([array.numpy() for array in state])
+        arrays = [held.solver.work.force, held.solver.work.partial, *held.state.arrays().values()]
+        states.append([array.numpy() for array in arrays])
     edges = 20 * (4 if element == "tet4" else 2) - 1  # of a chain of 20 steps
     assert changed == [edges] if name != "everything" else changed[0] > edges
     assert all(np.array_equal(one, other) for one, other in zip(*states, strict=True))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from impacts import Displaced
 from rrd import rows
 
 import warp_mca as mca
@@ -367,7 +368,7 @@ def test_times_may_be_an_array():
     assert Cadence(times=np.array([1e-6, 3e-6])) == Cadence(times=(1e-6, 3e-6))  # type: ignore[arg-type]
 
 
-def solver_with_output(material, precision: str = "float64") -> tuple[Solver, Output]:
+def held_with_output(material, precision: str = "float64") -> tuple[Displaced, Output]:
     """A bar with an uneven mesh, and its output stage."""
     scene = bar(material)
     mesh = mca.mesh(scene)["bar"]
@@ -384,26 +385,26 @@ def solver_with_output(material, precision: str = "float64") -> tuple[Solver, Ou
         atol=1e-12,
     )
     solver.output = Output(solver, skins(model, meshes), probes, frozenset((SURFACE, VOLUME)))
-    return solver, solver.output
+    return Displaced(solver), solver.output
 
 
 @pytest.mark.parametrize("precision", ["mixed", "float64"])
 def test_a_uniform_strain_gives_a_uniform_stress_that_turns_with_the_body(precision: str):
     from scipy.spatial.transform import Rotation
 
-    solver, output = solver_with_output(STEEL, precision)
+    held, output = held_with_output(STEEL, precision)
     strain = 1e-3 * np.array([[2.0, 0.3, 0.1], [0.3, -1.0, 0.4], [0.1, 0.4, 0.5]])
     turn = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
-    X = solver.model.X
-    solver.u.assign(X @ (turn @ (np.eye(3) + strain)).T - X)
-    output.before_step(frozenset((SURFACE, VOLUME)))
+    X = held.solver.model.X
+    held.state.u.assign(X @ (turn @ (np.eye(3) + strain)).T - X)
+    output.before_step(held.state, frozenset((SURFACE, VOLUME)))
     K, G = STEEL.bulk_modulus, STEEL.shear_modulus
     deviator = strain - np.trace(strain) / 3.0 * np.eye(3)
     sigma = turn @ (2.0 * G * deviator + K * np.trace(strain) * np.eye(3)) @ turn.T
     expected = sigma[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
     tolerance = 1e-4 * np.abs(sigma).max()  # strain squared, and float32
     np.testing.assert_allclose(output.arrays[VOLUME]["stress"].numpy(), np.tile(expected, (len(X), 1)), atol=tolerance)
-    path_stress = output.path_stress.numpy()[solver.row.numpy()[0]]
+    path_stress = output.path_stress.numpy()[held.solver.work.row.numpy()[0]]
     np.testing.assert_allclose(path_stress, np.tile(expected, (37, 1)), atol=tolerance)
     von_mises = 2.0 * G * np.sqrt(1.5 * (deviator**2).sum())
     np.testing.assert_allclose(output.arrays[SURFACE]["von_mises"].numpy(), von_mises, rtol=1e-4)
@@ -412,11 +413,10 @@ def test_a_uniform_strain_gives_a_uniform_stress_that_turns_with_the_body(precis
 def test_plastic_strain_at_nodes():
     """Uniaxial strain beyond yield: p = (2 G e_eq' - sigma_y) / (3 G + H) from the radial return by hand."""
     metal = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=200e6, E_t=10e9)
-    solver, output = solver_with_output(metal)
-    X = solver.model.X
-    solver.u.assign(X * [5e-3, 0.0, 0.0])
-    solver._forces()
-    output.before_step(frozenset((SURFACE, VOLUME)))
+    held, output = held_with_output(metal)
+    X = held.solver.model.X
+    held.forces(X * [5e-3, 0.0, 0.0])
+    output.before_step(held.state, frozenset((SURFACE, VOLUME)))
     G, H = metal.shear_modulus, metal.hardening_modulus
     p = (2.0 * G * 5e-3 - 200e6) / (3.0 * G + H)
     np.testing.assert_allclose(output.arrays[SURFACE]["plastic_strain"].numpy(), p, rtol=1e-4)

@@ -12,6 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_FILES = sorted((ROOT / "kernels").rglob("*.py"))
+TEST_FILES = sorted((ROOT / "tests").glob("*.py"))
 HOST_FILES = sorted([*(ROOT / "warp_mca").rglob("*.py"), *(ROOT / "scenes").glob("*.py")])
 ALLOCATE = {"zeros", "ones", "empty", "full", "array", "clone", "zeros_like", "ones_like", "empty_like", "full_like"}
 IN_PLACE = "spring"  # the one struct of arrays that kernels read and write
@@ -194,3 +195,36 @@ def test_every_field_is_documented(cls: ast.ClassDef):
     for name, kind in names.items():
         if kind in ("Array", "Index") or kind.startswith("NDArray"):
             assert re.search(r"float64|float32|int32|uint16|uint8|bool", listed[name]), f"{name} has no dtype"
+
+
+def patched(tree: ast.AST) -> Iterator[str]:
+    """What attributes are set of: by setattr and patch, of a class by name or by path, and by assignment."""
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, ast.Call)
+            and node.args
+            and re.search(r"\b(setattr|delattr|patch)\b", ast.unparse(node.func))
+        ):
+            yield ast.unparse(node.args[0])
+        if isinstance(node, ast.Assign | ast.AugAssign):
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                if isinstance(target, ast.Attribute):
+                    yield ast.unparse(target.value)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "monkeypatch.setattr(solver.Solver, 'start', None)",
+        "patch.setattr('warp_mca.solve.solver.Solver.start', None)",
+        "with patch.object(Solver, 'start'): pass",
+        "Solver.start = None",
+    ],
+)
+def test_a_patch_of_the_solver_is_seen(source: str):
+    assert "Solver" in "".join(patched(ast.parse(source)))
+
+
+@pytest.mark.parametrize("path", TEST_FILES, ids=lambda path: path.stem)
+def test_tests_read_the_state_and_leave_the_solver_alone(path: Path):
+    assert not [what for what in patched(parse(path)) if re.search(r"\bSolver\b", what)]

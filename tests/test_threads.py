@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 import warp as wp
+from impacts import SHORT_RANGES
 
 import warp_mca as mca
 from warp_mca.cli.main import main
@@ -16,13 +17,8 @@ from warp_mca.solve import solver, threads
 @pytest.fixture(autouse=True)
 def short_ranges(monkeypatch):
     """Ranges that small models can be cut in."""
-    for module in (threads, solver):
-        monkeypatch.setattr(module, "NODES", threads.LANES)
-    monkeypatch.setattr(solver, "RANGE", threads.LANES)
-    for module in ("warp_mca.elements.stage", "warp_mca.elements.tet4_stage"):
-        monkeypatch.setattr(f"{module}.ELEMENTS", threads.LANES)
-    monkeypatch.setattr("warp_mca.elements.tet4_stage.NODES", threads.LANES)
-    monkeypatch.setattr("warp_mca.solve.contact_stage.CONTACT", threads.LANES // 2)
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)
 
 
 def scene(element: str = "hex8", **impact: float) -> mca.Scene:

@@ -12,8 +12,8 @@ from warp_mca.model import stable_step as timestep
 from warp_mca.model.model import Model, build_model, nodal_masses
 from warp_mca.model.stable_step import stable_step
 from warp_mca.rigid.handoff import hand_off
-from warp_mca.runs import simulation
 from warp_mca.solve.solver import Solver
+from warp_mca.solve.steps import Steps
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01
@@ -63,7 +63,7 @@ def scene(lower: mca.Mesh, upper: mca.Mesh | None = None, **contact) -> mca.Scen
 
 def assemble(made: mca.Scene) -> Model:
     """The model of a scene without a rigid phase."""
-    meshes = simulation.mesh(made)
+    meshes = mca.mesh(made)
     start = hand_off(made, meshes, nodal_masses(made, meshes))
     return build_model(made, meshes, start.positions, start.velocities)
 
@@ -72,18 +72,19 @@ def frequencies(model: Model, free: np.ndarray | None = None) -> np.ndarray:
     """Eigenvalues omega^2 [1/s^2] of the assembled model, from differences of the forces that the solver computes."""
     dt, h = model.stable.dt, 1e-7 * H
     solver = Solver(model, device="cpu", precision="float64", dt=dt)
-    solver.search()
+    state = solver.new_state()
+    solver.begin(state)
     node = np.concatenate([block.conn.ravel() for block in model.blocks])
 
     def force(u: np.ndarray) -> np.ndarray:
-        solver.u.assign(u)
-        solver.v.assign(u / dt)  # friction measures the motion since the last step
-        solver.contact_force.zero_()
-        for stage in solver.contacts:
-            stage.spring.tangential.zero_()
-        solver._forces()
-        total = solver.contact_force.numpy().copy() if solver.contacts else np.zeros_like(u)
-        np.add.at(total, node, solver.force.numpy())
+        state.u.assign(u)
+        state.v.assign(u / dt)  # friction measures the motion since the last step
+        solver.work.contact_force.zero_()
+        for own in state.contacts:
+            own.spring.tangential.zero_()
+        solver.forces(state)
+        total = solver.work.contact_force.numpy().copy() if solver.contacts else np.zeros_like(u)
+        np.add.at(total, node, solver.work.force.numpy())
         return total.ravel()
 
     size = model.X.size
@@ -235,8 +236,8 @@ def test_run_blows_up_just_beyond_the_assembled_limit(share: float, stable: bool
     free = np.flatnonzero(np.repeat(model.fixed_axes == 0, 3))
     dt = share * 2.0 / np.sqrt(frequencies(model, free).max())
     assert model.stable.dt < dt
-    steps = simulation.Steps(dt=dt, per_search=10, searches=1, intervals=60)
-    monkeypatch.setattr(simulation, "divide", lambda *_: steps)
+    steps = Steps(dt=dt, per_search=10, searches=1, intervals=60)
+    monkeypatch.setattr("warp_mca.runs.impact.divide_alike", lambda *_: steps)
     if stable:
         assert mca.run(made, precision="float64").summary["energy_error"] < 1e-3
     else:

@@ -8,7 +8,6 @@ import warp as wp
 wp.config.quiet = True
 import warp_mca as mca  # noqa: E402
 from warp_mca.model.model import build_model  # noqa: E402
-from warp_mca.runs.simulation import mesh  # noqa: E402
 from warp_mca.solve.solver import Solver  # noqa: E402
 
 element = "hex8r" if "hex8r" in sys.argv else "hex8"
@@ -23,7 +22,7 @@ scene = mca.Scene(
     fixed=(mca.Fixed(body="bar", nodes="xmin", axes="x"),),
     impact=mca.ImpactPhase(duration=1e-3),
 )
-meshes = mesh(scene)
+meshes = mca.mesh(scene)
 points, _, stopped, free = bar.mesh()
 v = 0.0 * points
 v[:, 0] = -bar.SPEED
@@ -32,12 +31,13 @@ model = build_model(scene, meshes, {"bar": meshes["bar"].points}, {"bar": v})
 assert model.stable.dt > bar.DT, model.stable.dt
 solver = Solver(model, device="cpu", precision=precision, dt=bar.DT)
 solver.compile()
-solver.start()
+state = solver.new_state()
+solver.start(state)
 steps = bar.STEPS // len(bar.SAMPLES)
 ends, wall = [], 0.0
 for _ in bar.SAMPLES:
     begun = bar.clock()
-    solver.step(steps)
+    solver.step(state, steps)
     wall += bar.clock() - begun
-    ends.append(float(solver.u.numpy()[free, 0].mean()))
+    ends.append(float(state.u.numpy()[free, 0].mean()))
 bar.say("warp_mca", mca.__version__, f"{element} {precision}", wall, ends)

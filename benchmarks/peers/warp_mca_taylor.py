@@ -8,7 +8,6 @@ import warp as wp
 wp.config.quiet = True
 import warp_mca as mca  # noqa: E402
 from warp_mca.model.model import build_model  # noqa: E402
-from warp_mca.runs.simulation import mesh  # noqa: E402
 from warp_mca.solve.solver import Solver  # noqa: E402
 
 element = "hex8r" if "hex8r" in sys.argv else "hex8"
@@ -21,7 +20,7 @@ scene = mca.Scene(
     fixed=(mca.Fixed(body="bar", nodes="end", axes="x"),),
     impact=mca.ImpactPhase(duration=taylor.DURATION),
 )
-meshes = mesh(scene)
+meshes = mca.mesh(scene)
 v = 0.0 * points
 v[:, 0] = taylor.SPEED
 v[foot, 0] = 0.0
@@ -29,9 +28,10 @@ solver = Solver(
     build_model(scene, meshes, {"bar": points}, {"bar": v}), device="cpu", precision="float64", dt=taylor.DT
 )
 solver.compile()
-solver.start()
+state = solver.new_state()
+solver.start(state)
 begun = taylor.clock()
-solver.step(taylor.STEPS)
+solver.step(state, taylor.STEPS)
 wall = taylor.clock() - begun
-u = solver.u.numpy()
+u = state.u.numpy()
 taylor.say("warp_mca", mca.__version__, f"{element} float64", wall, len(bricks), taylor.shape(points, u, foot))

@@ -17,11 +17,11 @@ ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the star
 
 @wp.struct
 class Spring:
-    """State of every slave node's springs; arrays have shape (slave_count,).
+    """State of every slave node's springs; arrays have shape (spring_count,), those of slave 0 first.
 
-    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1.
-    weight: shape functions of the touched point. energy: elastic energy held [J]. friction: energy dissipated so
-    far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
+    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1 [-].
+    weight: shape functions of the touched point [-]. energy: elastic energy held [J]. friction: energy dissipated
+    so far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
     force and normal force while sticking, summed over the steps since the last row of the history [N]. depth: largest
     penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
     in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.

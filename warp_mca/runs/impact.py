@@ -105,6 +105,7 @@ class Impact:
             RequestError: as in `State.load`.
         """
         self.state.load(path, self.solver.model, self.solver.dt)
+        self.stopped = [None] * len(self.ready)
         self._account()
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -130,6 +131,8 @@ class Impact:
             told: called when records have been read.
             ended: asked at each row of the history whether the phase ends there; records are then read as they come.
         """
+        if None not in self.stopped or self.state.steps > self.steps.count:
+            return  # with the last record of all
         with suppress(GuardError):  # that of the last scene
             _Loop(self, told, ended).run(until)
 

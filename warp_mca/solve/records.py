@@ -66,7 +66,9 @@ class SceneRecords:
 
     def arrays(self) -> dict[str, NDArray]:
         """All of it as arrays by name, for a file."""
-        found: dict[str, NDArray] = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        found: dict[str, NDArray] = {
+            f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "path_stress"
+        }
         found["path_stress"] = np.concatenate(self.path_stress) if self.path_stress else np.zeros((0, 0, 6), np.float32)
         return found
 

@@ -259,6 +259,7 @@ class Solver:
         Bodies are free of stress then.
         """
         with wp.ScopedDevice(self.device):
+            self.work.force.zero_()  # of a state that was advanced before
             self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.bonds.at_rest)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,6 +63,11 @@ class State:
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
 
+    @property
+    def _scalar(self) -> str:
+        """Type of the numbers that elements compute with."""
+        return str(self.elements[0].extreme.dtype.__name__)
+
     def arrays(self) -> dict[str, Any]:
         """Device arrays by name, as `elements/0/history`; of `normal_force` what lasts."""
         return {name: a[:1] if name == "normal_force" and len(a) else a for name, a in _arrays(self, "")}
@@ -103,7 +108,8 @@ class State:
         Raises:
             OSError: the file cannot be written.
         """
-        head = {"format": FORMAT, "model": digest(model), "dt": dt, "steps": self.steps, "scenes": len(self.scenes)}
+        head = {"format": FORMAT, "model": digest(model), "dt": dt, "steps": self.steps}
+        head |= {"scalar": self._scalar, "scenes": len(self.scenes)}
         arrays: dict[str, Any] = {name: array.numpy() for name, array in self.arrays().items()}
         for k, records in enumerate(self.scenes):
             arrays |= {f"scenes/{k}/{name}": array for name, array in records.arrays().items()}
@@ -114,7 +120,8 @@ class State:
         """Take over what `save` stored of a state of the same model, on whichever device.
 
         Raises:
-            RequestError: there is no such file, it is damaged, or of another model or time step; nothing has changed.
+            RequestError: there is no such file, it is damaged, or of another model, precision or time step; nothing has
+                changed.
         """
         if not Path(path).is_file():
             raise bad_value("state", str(path), "there is no such file")
@@ -124,16 +131,28 @@ class State:
             head = json.loads(stored.pop("header").tobytes())
             if head["format"] != FORMAT:
                 raise ValueError(head["format"])
-            alike = head["model"] == digest(model) and head["dt"] == dt
-            mine = {name: stored.pop(name) for name in self.arrays()} if alike else {}
+            alike = (head["model"], head["dt"], head["scalar"]) == (digest(model), dt, self._scalar)
+            mine = {name: _fitting(name, to, stored.pop(name)) for name, to in self.arrays().items()} if alike else {}
             scenes = [SceneRecords.of(_part(stored, f"scenes/{k}/")) for k in range(head["scenes"])]
         except DAMAGE as error:
             raise bad_value("state", str(path), "it is damaged or of another version; run again") from error
         if not alike:
-            raise bad_value("state", str(path), "it is of another model or time step; use the run's own")
+            raise bad_value("state", str(path), "it is of another model, precision or time step; use the run's own")
         for name, to in self.arrays().items():
             _fill(name, to, mine[name])
         self.steps, self.scenes = head["steps"], scenes
+
+
+def _fitting(name: str, to: wp.array, array: NDArray) -> NDArray:
+    """The array, if `to` can take it over.
+
+    Raises:
+        ValueError: it has another shape or dtype.
+    """
+    own = to.numpy()
+    if array.dtype != own.dtype or (array.shape != own.shape and name != "speed_square"):
+        raise ValueError(name)
+    return array
 
 
 def _fill(name: str, to: wp.array, array: NDArray) -> None:
@@ -188,9 +207,26 @@ def _part(stored: dict[str, NDArray], prefix: str) -> dict[str, NDArray]:
 
 
 def digest(model: Model) -> str:
-    """SHA-256 of what a model is made of: equal for the same scene and meshes."""
+    """SHA-256 of all that a model is made of: equal for the same scene and meshes."""
     found = hashlib.sha256()
-    parts: Sequence[NDArray] = (model.X, model.V, model.mass, model.law, model.joint_first, model.prescribed_node)
-    for array in (*parts, *(block.conn for block in model.blocks), *(item.stiffness for item in model.passes)):
-        found.update(np.ascontiguousarray(array).tobytes())
+    for part in _parts(model):
+        found.update(part)
     return found.hexdigest()
+
+
+def _parts(value: Any) -> Iterator[bytes]:
+    """A value of a model as bytes: arrays with their dtype and shape, dataclasses field by field."""
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype}{value.shape}".encode()
+        yield value.tobytes()
+    elif hasattr(value, "__dataclass_fields__"):
+        for name in _names(value):
+            yield from _parts(getattr(value, name))
+    elif isinstance(value, Mapping):
+        yield from _parts(tuple(value.items()))
+    elif isinstance(value, tuple | list):
+        yield f"{len(value)}".encode()
+        for item in value:
+            yield from _parts(item)
+    else:
+        yield repr(value).encode()
