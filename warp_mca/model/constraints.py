@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Rails, Side
@@ -76,7 +76,7 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
 
 def _side(parts: Assembly, body: str) -> Side:
     mesh, start = parts.meshes[body], parts.node_start[body]
-    return Side(body, mesh, parts.X[start : start + len(mesh.points)], turn(parts.scene.body(body).rotation))
+    return Side(body, mesh, parts.X[start : start + len(mesh.points)], rotation_matrix(parts.scene.body(body).rotation))
 
 
 @dataclass(frozen=True)
