@@ -10,8 +10,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.elements.state import ElementState
-from warp_mca.kernels.hardware.lanes import side_by_side
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.kernels.materials.laws import HISTORY_SIZE
 from warp_mca.model.patches import PATCH
 from warp_mca.solve.threads import ELEMENTS, Split, whole
@@ -64,9 +64,9 @@ class ElementStage:
         self.vectors: int = getattr(kernels, "VECTORS", 0)
         self.real = scalars(precision).real
         kind = (precision, block.law, block.finite)
-        self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
-        self.energy_kernel = side_by_side(kernels.energy_kernel(*kind), large=block.finite)
-        self.stress_kernel = side_by_side(kernels.stress_kernel(*kind), large=block.finite)
+        self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite)
+        self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
+        self.stress_kernel = vectorised(kernels.stress_kernel(*kind), large=block.finite)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

@@ -10,8 +10,8 @@ import warp as wp
 from warp_mca.elements.element import Array
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels.elements import tet4
-from warp_mca.kernels.hardware.lanes import side_by_side
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.solve.threads import ELEMENTS, NODES, Split, whole
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Tet4Stage(ElementStage):
         self.inverse_volume = wp.array(1.0 / around, dtype=real)
         self.growth = wp.zeros(self.count, dtype=real)
         self.dilation = wp.zeros(len(found), dtype=real)
-        self.dilation_kernel = side_by_side(tet4.dilation_kernel(precision, block.finite))
+        self.dilation_kernel = vectorised(tet4.dilation_kernel(precision, block.finite))
         self.average_kernel = tet4.average_kernel(precision)
 
     def kernels(self) -> list[Any]:
