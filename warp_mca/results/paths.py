@@ -16,6 +16,7 @@ from warp_mca.geometry.boxes import Boxes, cell_boxes
 from warp_mca.geometry.cell_types import MOST_CORNERS
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
+from warp_mca.model.layout import offsets
 from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Line, Path, Scene
 
@@ -149,3 +150,14 @@ def load_paths(file: str | os.PathLike[str]) -> tuple[PathHistory, ...]:
     """The paths that `save_paths` wrote."""
     found = load_histories(file, "position_m", "stress_Pa")
     return tuple(PathHistory(name, *columns) for name, columns in found.items())
+
+
+def join_probes(parts: Sequence[tuple[Probes, int]]) -> Probes:
+    """Probes of all scenes, scene by scene, in the node numbers of the batch model; positions are left out.
+
+    Args:
+        parts: probes and node count of each scene.
+    """
+    nodes = offsets([count for _, count in parts])
+    corner = [probes.corner + start for (probes, _), start in zip(parts, nodes, strict=False)]
+    return Probes({}, np.concatenate(corner), np.concatenate([probes.weight for probes, _ in parts]))

@@ -1,4 +1,4 @@
-"""Owns the joining of models: the scenes of a batch one after the other in one model, each as it would be alone."""
+"""Owns the model of a batch: the models of its scenes concatenated; each scene computes what it would compute alone."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.model import Model
-from warp_mca.results.paths import Probes
 
 Index = NDArray[np.int32]
 
 
 def join_models(models: Sequence[Model]) -> Model:
-    """One model of several scenes; a scene alone is its own model.
+    """Concatenate the models of several scenes; the model of a single scene is returned as it is.
 
-    Contact passes stay apart, those of each scene in turn: the solver runs the first of each scene in one launch, then
-    the second.
+    Contact passes are not merged: they are listed scene by scene, and the solver launches the k-th passes of all scenes
+    together.
     """
     if len(models) == 1:
         return models[0]
@@ -32,7 +31,7 @@ def join_models(models: Sequence[Model]) -> Model:
     stable = models[fastest].stable
 
     def shifted(name: str, start: Index) -> Index:
-        """Numbers of what begins at `start` in each scene; GROUND stays."""
+        """Indices of a field of all scenes, raised by the `start` of each scene; GROUND is kept."""
         values = [getattr(model, name) for model in models]
         return np.concatenate([np.where(v == GROUND, v, v + s) for v, s in zip(values, start, strict=False)])
 
@@ -137,14 +136,3 @@ def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:
         for k, model in enumerate(models)
         for body, start in getattr(model, name).items()
     }
-
-
-def join_probes(parts: Sequence[tuple[Probes, int]]) -> Probes:
-    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes.
-
-    Args:
-        parts: probes and node count of each scene.
-    """
-    nodes = offsets([count for _, count in parts])
-    corner = [probes.corner + start for (probes, _), start in zip(parts, nodes, strict=False)]
-    return Probes({}, np.concatenate(corner), np.concatenate([probes.weight for probes, _ in parts]))
