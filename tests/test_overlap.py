@@ -27,7 +27,7 @@ VARIANTS = {
     "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
     "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
-    "tet4_dilation": [tet4.dilation_kernel(p, m) for p, m in TWO],
+    "tet4_dilatation": [tet4.dilatation_kernel(p, m) for p, m in TWO],
     "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],
     "tet4_force": [tet4.force_kernel(p, LAWS[m], False) for p, m in TWO],
     "hex8_patch_force": [hex8_patch.force_kernel(p, LAWS[not m]) for p, m in TWO],
