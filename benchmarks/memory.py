@@ -56,7 +56,7 @@ def step_bytes(held: Held) -> float:
             total += size(stage.conn) + 2 * 24 * nodes + 2 * size(stage.growth) + size(stage.element)
             total += size(stage.offset) + size(stage.inverse_volume) + 2 * size(stage.dilatation)
             total += size(stage.group)
-    total += size(work.force) + size(work.near) + size(work.more)
+    total += size(work.force) + size(work.first_slots) + size(work.more_slots)
     return total + (8 + 4 * 24) * nodes  # inverse mass; u and v read and written
 
 

@@ -97,9 +97,9 @@ class Solver:
         self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
         for index, stage in enumerate(self.elements):
             stage.index = index
-        near, more = gather_lists(self.elements, model.node_count)
+        first_slots, more_slots = gather_lists(self.elements, model.node_count)
         slots = sum(len(stage.slot_node) for stage in self.elements)
-        self.work = Workspace(model, self.layout, self.precision, near, more, slots)
+        self.work = Workspace(model, self.layout, self.precision, first_slots, more_slots, slots)
         scenes = [model.passes[k * passes : (k + 1) * passes] for k in range(self.layout.count)]
         self.normal_force = NormalForce(scenes if passes else [], self.threads)
         self.contacts = [ContactStage(model.passes[k::passes], model, k, self.normal_force) for k in range(passes)]
