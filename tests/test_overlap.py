@@ -10,7 +10,7 @@ import warp as wp
 
 from warp_mca.kernels.contact import contact, sides
 from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
-from warp_mca.kernels.hardware.overlap import EARLY, LEAST_ARCH
+from warp_mca.kernels.hardware.overlap import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import constraint, node
 from warp_mca.scene.materials import Elastic, J2Bilinear
 from warp_mca.solve import early_launch as module
@@ -45,7 +45,7 @@ BRANCH = re.compile(r"\bbra\b")
 def test_kernel_touches_nothing_that_changes_before_it_waits(name, k, tmp_path):
     kernel = VARIANTS[name][k]
     assert kernel.key in EARLY
-    wp.compile_aot_module(kernel.module, device=None, arch=LEAST_ARCH, module_dir=tmp_path, use_ptx=True)
+    wp.compile_aot_module(kernel.module, device=None, arch=MIN_ARCH, module_dir=tmp_path, use_ptx=True)
     (source,) = tmp_path.glob("*.ptx")
     text = source.read_text(encoding="utf-8", errors="replace")
     assert text.count(WAIT) == 1
@@ -93,7 +93,7 @@ class Driver:
             self.changes.append((what, pairs, ports))
 
 
-def changed(monkeypatch, arch=LEAST_ARCH, driver=(13, 0)):
+def changed(monkeypatch, arch=MIN_ARCH, driver=(13, 0)):
     """Edges that `overlap` asks the driver to change, in a graph of two steps with a copy behind the first."""
     patches = VARIANTS["hex8_patch_force"][0].key
     keys = [patch.schedule.key, patches, patches, VARIANTS["integrate"][0].key, None, patches]
