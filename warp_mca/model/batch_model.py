@@ -49,10 +49,10 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_second=shifted("joint_second", nodes),
         joint_tied=np.concatenate([model.joint_tied for model in models]),
         joint_slides=shifted("joint_slides", pairs),
-        hinges=tuple(
-            replace(hinge, start=hinge.start + int(start), end=hinge.end + int(start))
+        joints=tuple(
+            replace(joint, start=joint.start + int(start), end=joint.end + int(start))
             for model, start in zip(models, pairs, strict=False)
-            for hinge in model.hinges
+            for joint in model.joints
         ),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
@@ -68,7 +68,7 @@ def join_models(models: Sequence[Model]) -> Model:
         stable=replace(stable, element=stable.element + int(elements[fastest])),
         batch=Layout(
             nodes=nodes,
-            hinges=offsets([len(model.hinges) for model in models]),
+            joints=offsets([len(model.joints) for model in models]),
             elements=ranges,
         ),
     )

@@ -49,7 +49,7 @@ class Model:
             float64.
         joint_slides: of each rail the first of its sliders, the first of its own nodes and the end of these in
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
-        hinges: the joints that own the pairs.
+        joints: name of each joint and its pairs.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
@@ -78,7 +78,7 @@ class Model:
     joint_second: Index
     joint_tied: Array
     joint_slides: Index
-    hinges: tuple[JointPairs, ...]
+    joints: tuple[JointPairs, ...]
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -237,7 +237,7 @@ def build_model(
         law=parts.law(),
         **held,
         **pairs,
-        hinges=joints,
+        joints=joints,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

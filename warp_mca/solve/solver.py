@@ -355,8 +355,8 @@ class Solver:
     def joint_impulses(self, state: State, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each joint of a scene gave to its first body [N s], by name."""
         impulse = state.constraints.impulse.numpy()
-        hinges = self.model.hinges[self.layout.hinges[scene] : self.layout.hinges[scene + 1]]
-        return {h.name: impulse[h.start : h.end].sum(axis=0).tolist() for h in hinges}
+        joints = self.model.joints[self.layout.joints[scene] : self.layout.joints[scene + 1]]
+        return {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
 
     def device_name(self) -> str:
         """The device, with what it is."""
