@@ -8,8 +8,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.hexahedron import history_functions, stress_function
 from warp_mca.kernels.elements.kinematics import kinematics
+from warp_mca.kernels.elements.point_records import history_functions, stress_function
 from warp_mca.kernels.elements.tet4 import gradient_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.laws import law_functions

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from test_joint import BAR, SIZE, SOFT, final_state
+from impacts import begun, finished, momentum, result_of
+from test_joint import BAR, SIZE, SOFT
 
 import warp_mca as mca
 from warp_mca.base.rotation import rotation_matrix
@@ -29,42 +30,37 @@ def pulled(joints, **bodies):
     )
 
 
-def test_a_wave_passes_a_weld_as_it_does_the_whole_bar(monkeypatch):
+def test_a_wave_passes_a_weld_as_it_does_the_whole_bar():
     """1 km/s: the pulse of 40 us has left the first half of the bar after 150 us and comes back from its end."""
-    state = final_state(monkeypatch)
-    whole = mca.run(pulled((), a=(BAR, 0.0)), precision="float64")
-    one = dict(state)
+    whole = finished(pulled((), a=(BAR, 0.0)), precision="float64")
     weld = mca.Weld(name="W", body="a", nodes="xmax", other="b", other_nodes="xmin")
-    welded = mca.run(pulled((weld,), a=(HALF, 0.0), b=(HALF, 0.05)), precision="float64")
-    assert len(state["model"].joint_first) == 9
-    assert welded.summary["dt"] == pytest.approx(whole.summary["dt"], rel=1e-12)
-    places = {tuple(np.round(x, 9)): u for x, u in zip(one["model"].X, one["u"], strict=True)}
-    expected = np.array([places[tuple(np.round(x, 9))] for x in state["model"].X])
+    welded = finished(pulled((weld,), a=(HALF, 0.0), b=(HALF, 0.05)), precision="float64")
+    model = welded.solver.model
+    assert len(model.joint_first) == 9
+    assert welded.steps.dt == pytest.approx(whole.steps.dt, rel=1e-12)
+    places = {tuple(np.round(x, 9)): u for x, u in zip(whole.solver.model.X, whole.state.u.numpy(), strict=True)}
+    expected = np.array([places[tuple(np.round(x, 9))] for x in model.X])
     assert np.ptp(expected[:, 0]) > 1e-5
-    assert state["u"] == pytest.approx(expected, abs=1e-13)
-    second = state["model"].node_start["b"]
-    taken = state["model"].mass[second:] @ state["v"][second:]
-    assert welded.summary["joint_impulse"]["W"] == pytest.approx(-taken, abs=1e-12)
+    assert welded.state.u.numpy() == pytest.approx(expected, abs=1e-13)
+    taken = momentum(welded, model.node_start["b"])
+    assert result_of(welded).summary["joint_impulse"]["W"] == pytest.approx(-taken, abs=1e-12)
 
 
-def test_a_bar_welded_to_the_ground_moves_as_one_with_a_fixed_end(monkeypatch):
-    state = final_state(monkeypatch)
+def test_a_bar_welded_to_the_ground_moves_as_one_with_a_fixed_end():
     free = pulled((), a=(BAR, 0.0))
     fixed = mca.Scene(**{**vars(free), "fixed": (mca.Fixed(body="a", nodes="xmax"),)})
-    mca.run(fixed, precision="float64")
-    expected = state["u"]
+    expected = finished(fixed, precision="float64").state.u.numpy()
     weld = mca.Weld(name="W", body="a", nodes="xmax")
-    result = mca.run(mca.Scene(**{**vars(free), "joints": (weld,)}), precision="float64")
-    assert state["u"] == pytest.approx(expected, abs=1e-15)
-    assert result.summary["joint_impulse"]["W"][0] < -1e-3
+    impact = finished(mca.Scene(**{**vars(free), "joints": (weld,)}), precision="float64")
+    assert impact.state.u.numpy() == pytest.approx(expected, abs=1e-15)
+    assert result_of(impact).summary["joint_impulse"]["W"][0] < -1e-3
 
 
-def test_a_rod_on_a_ball_joint_precesses(monkeypatch):
+def test_a_rod_on_a_ball_joint_precesses():
     """A steady conical pendulum, omega^2 (I_t - I_a) cos(tilt) = m g d, keeps its angular momentum about the vertical.
 
     It sags by some 60 um, for it starts free of stress.
     """
-    state = final_state(monkeypatch)
     tilt, gravity = 0.5, 1e4
     box = mca.Body(name="rod", geometry=BAR, material=SOFT)
     still = mca.Scene(name="rod", bodies=(box,), impact=mca.ImpactPhase(duration=1e-3))
@@ -87,24 +83,24 @@ def test_a_rod_on_a_ball_joint_precesses(monkeypatch):
         gravity=(0.0, -gravity, 0.0),
         impact=mca.ImpactPhase(duration=0.25 * 2.0 * math.pi / omega, output_interval=1e-4),
     )
-    result = mca.run(scene, precision="float64")
-    x, v = state["model"].X + state["u"], state["v"]
-    model = state["model"]
-    assert np.abs(state["u"][model.joint_first]).max() == 0.0
+    impact = finished(scene, precision="float64")
+    summary, model = result_of(impact).summary, impact.solver.model
+    u, v = impact.state.u.numpy(), impact.state.v.numpy()
+    x = model.X + u
+    assert np.abs(u[model.joint_first]).max() == 0.0
     spin = [model.mass @ np.cross(a, b)[:, 1] for a, b in ((model.X, model.V), (x, v))]
     assert spin[1] == pytest.approx(spin[0], rel=1e-11)
     middle = mass @ x / mass.sum()
-    angle = omega * (result.summary["simulated_time"] + result.summary["dt"])
+    angle = omega * (summary["simulated_time"] + summary["dt"])
     expected = rotation_matrix((0.0, angle, 0.0)) @ rotation_matrix(rotation) @ (0.05, 0.0, 0.0)
     assert middle == pytest.approx(expected, abs=1e-4)
     weight = np.array([0.0, -gravity, 0.0]) * mass.sum() * (angle / omega)
     change = mass @ v - mass @ model.V
-    assert np.array(result.summary["joint_impulse"]["S"]) == pytest.approx(change - weight, abs=1e-3 * abs(weight[1]))
+    assert np.array(summary["joint_impulse"]["S"]) == pytest.approx(change - weight, abs=1e-3 * abs(weight[1]))
 
 
-def test_bars_on_a_ball_joint_keep_momentum_and_angular_momentum(monkeypatch):
+def test_bars_on_a_ball_joint_keep_momentum_and_angular_momentum():
     """One turns about y and one about z; the start, where their speeds at the joint differ, is inelastic."""
-    state = final_state(monkeypatch)
     kind = {"geometry": BAR, "material": SOFT, "kinematics": "finite"}
     scene = mca.Scene(
         name="bars",
@@ -115,18 +111,17 @@ def test_bars_on_a_ball_joint_keep_momentum_and_angular_momentum(monkeypatch):
         joints=(mca.Spherical(name="S", body="a", at=(0.1, 0.0, 0.0), other="b"),),
         impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-4, energy_tolerance=1.0),
     )
-    mca.run(scene, precision="float64")
-    model, v = state["model"], state["v"]
-    assert model.mass @ v == pytest.approx(model.mass @ model.V, abs=1e-14)
-    before, after = (model.mass @ np.cross(x, w) for x, w in ((model.X, model.V), (model.X + state["u"], v)))
+    impact = finished(scene, precision="float64")
+    model, u, v = impact.solver.model, impact.state.u.numpy(), impact.state.v.numpy()
+    assert momentum(impact) == pytest.approx(model.mass @ model.V, abs=1e-14)
+    before, after = (model.mass @ np.cross(x, w) for x, w in ((model.X, model.V), (model.X + u, v)))
     assert np.abs(before).min() < 1e-12 and np.abs(before).max() > 1e-3
     assert after == pytest.approx(before, abs=1e-14)
-    assert (state["u"][model.joint_first] == state["u"][model.joint_second]).all()
+    assert (u[model.joint_first] == u[model.joint_second]).all()
 
 
-def test_a_block_slides_on_its_rail_by_the_gravity_along_it(monkeypatch):
+def test_a_block_slides_on_its_rail_by_the_gravity_along_it():
     """The rail takes what is across it, and no more: along it the momentum is m (g . a) t to rounding."""
-    state = final_state(monkeypatch)
     axis, gravity = np.array([0.6, 0.0, 0.8]), np.array([2e3, -9e3, 1e3])
     rotation = (0.0, 0.3, 0.0)
     scene = mca.Scene(
@@ -136,17 +131,17 @@ def test_a_block_slides_on_its_rail_by_the_gravity_along_it(monkeypatch):
         gravity=tuple(gravity),
         impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-5),
     )
-    result = mca.run(scene, precision="float64")
-    model, t = state["model"], result.summary["simulated_time"] + 0.5 * result.summary["dt"]
-    momentum = model.mass @ state["v"]
-    assert momentum @ axis == pytest.approx(model.mass.sum() * (gravity @ axis) * t, rel=1e-12)
-    u = state["u"][model.joint_first]
+    impact = finished(scene, precision="float64")
+    summary, model, gained = result_of(impact).summary, impact.solver.model, momentum(impact)
+    t, mass = summary["simulated_time"] + 0.5 * summary["dt"], model.mass.sum()
+    assert gained @ axis == pytest.approx(mass * (gravity @ axis) * t, rel=1e-12)
+    u = impact.state.u.numpy()[model.joint_first]
     assert u - np.outer(u @ axis, axis) == pytest.approx(0.0, abs=1e-15)
-    assert result.summary["energy_error"] < 1e-4
-    impulse = np.array(result.summary["joint_impulse"]["P"])
+    assert summary["energy_error"] < 1e-4
+    impulse = np.array(summary["joint_impulse"]["P"])
     assert impulse @ axis == pytest.approx(0.0, abs=1e-12 * np.abs(impulse).max())
     across = gravity - (gravity @ axis) * axis
-    assert impulse == pytest.approx(momentum - (momentum @ axis) * axis - model.mass.sum() * across * t, rel=1e-9)
+    assert impulse == pytest.approx(gained - (gained @ axis) * axis - mass * across * t, rel=1e-9)
 
 
 RAIL = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
@@ -168,29 +163,26 @@ def cart(spin=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), duration=5e-4, **change
     )
 
 
-def test_a_cart_slides_along_its_rail_without_a_force(monkeypatch):
+def test_a_cart_slides_along_its_rail_without_a_force():
     """It crosses five cells of the rail at 50 m/s, and bends nothing."""
-    state = final_state(monkeypatch)
-    result = mca.run(cart(velocity=(50.0, 0.0, 0.0), duration=1e-3), precision="float64")
-    start, t = state["model"].node_start["cart"], result.summary["simulated_time"] + result.summary["dt"]
-    assert state["u"][:start] == pytest.approx(0.0, abs=1e-15)
-    assert state["u"][start:] == pytest.approx(
-        np.broadcast_to([50.0 * t, 0.0, 0.0], state["u"][start:].shape), rel=1e-9
-    )
-    assert result.summary["joint_impulse"]["P"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+    impact = finished(cart(velocity=(50.0, 0.0, 0.0), duration=1e-3), precision="float64")
+    summary, u, start = result_of(impact).summary, impact.state.u.numpy(), impact.solver.model.node_start["cart"]
+    t = summary["simulated_time"] + summary["dt"]
+    assert u[:start] == pytest.approx(0.0, abs=1e-15)
+    assert u[start:] == pytest.approx(np.broadcast_to([50.0 * t, 0.0, 0.0], u[start:].shape), rel=1e-9)
+    assert summary["joint_impulse"]["P"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
 
 
-def test_a_cart_on_a_turning_rail_keeps_momentum_and_energy(monkeypatch):
+def test_a_cart_on_a_turning_rail_keeps_momentum_and_energy():
     """Momentum and angular momentum of both bodies to rounding; the cart is driven outwards as far as a rigid one."""
-    state = final_state(monkeypatch)
     omega, duration = 150.0, 3e-3
-    result = mca.run(cart(spin=(0.0, 0.0, omega), duration=duration), precision="float64")
-    model, v = state["model"], state["v"]
-    x, m, start = model.X + state["u"], model.mass, model.node_start["cart"]
+    impact = finished(cart(spin=(0.0, 0.0, omega), duration=duration), precision="float64")
+    model, v = impact.solver.model, impact.state.v.numpy()
+    x, m, start = model.X + impact.state.u.numpy(), model.mass, model.node_start["cart"]
     assert m @ v == pytest.approx(m @ model.V, abs=1e-12 * np.abs(m @ np.abs(model.V)).max())
     before, after = m @ np.cross(model.X, model.V), m @ np.cross(x, v)
     assert after == pytest.approx(before, abs=1e-11 * np.abs(before).max())
-    assert result.summary["energy_error"] < 1e-3
+    assert result_of(impact).summary["energy_error"] < 1e-3
     ends = x[(model.joint_first[model.joint_slides[:, 1:] - [0, 1]])]
     along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
     for (first, begin, _), end, line in zip(model.joint_slides, ends, along, strict=True):
@@ -279,11 +271,10 @@ def test_welds_that_tie_nothing_are_refused(joint, change, match):
         mca.run(two(mca.Weld(**joint), **change))
 
 
-def test_a_weld_ties_the_nodes_that_coincide(monkeypatch):
+def test_a_weld_ties_the_nodes_that_coincide():
     """3 x 3 cells on 2 x 2: only the corners do."""
-    state = final_state(monkeypatch)
-    mca.run(two(mca.Weld(**WELD, other="b", other_nodes="xmin"), other=FINE))
-    assert len(state["model"].joint_first) == 4
+    impact = begun(two(mca.Weld(**WELD, other="b", other_nodes="xmin"), other=FINE))
+    assert len(impact.solver.model.joint_first) == 4
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from linear_tet import LinearTet
 from scipy.spatial.transform import Rotation
-from test_elements import STEEL, energy, forces, solver_of
+from test_elements import STEEL, energy, held_of
 
 import warp_mca as mca
 from warp_mca.elements import ELEMENTS
@@ -37,15 +37,15 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_constant_strain_gives_constant_stress_and_no_force_inside(kinematics: str):
     """Patch test: Hooke's law at all nodes, and nodes inside the cube in balance; wedges and pyramids are cut."""
     mesh = mixed_cube()
-    solver = solver_of(mesh, NAME, kinematics, "float64")
+    held = held_of(mesh, NAME, kinematics)
     strain = 1e-6 * np.array([[3.0, 1.0, -2.0], [1.0, -1.0, 0.5], [-2.0, 0.5, 2.0]])
-    X = solver.model.X
-    force = forces(solver, X @ strain)
+    X = held.solver.model.X
+    force = held.forces(X @ strain)
     inside = ((X > 1e-9) & (X < 1.0 - 1e-9)).all(axis=1)
     assert inside.sum() == 2
     assert np.abs(force[inside]).max() < 1e-9 * np.abs(force).max()
-    recorded = NodalStress(solver, np.arange(len(X), dtype=np.int32))
-    recorded.launch()
+    recorded = NodalStress(held.solver, np.arange(len(X), dtype=np.int32))
+    recorded.launch(held.state)
     stress = 2.0 * STEEL.shear_modulus * strain
     stress += (STEEL.bulk_modulus - 2.0 / 3.0 * STEEL.shear_modulus) * np.trace(strain) * np.eye(3)
     expected = stress[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
@@ -55,14 +55,14 @@ def test_constant_strain_gives_constant_stress_and_no_force_inside(kinematics: s
 @pytest.mark.parametrize("kinematics", ["corotational", "finite"])
 def test_rotation_gives_no_force_and_forces_are_the_slope_of_the_energy(kinematics: str):
     rng, mesh = np.random.default_rng(0), mixed_cube()
-    solver = solver_of(mesh, NAME, kinematics, "float64")
-    X = solver.model.X
-    strained = np.abs(forces(solver, 1e-3 * X)).max()
+    held = held_of(mesh, NAME, kinematics)
+    X = held.solver.model.X
+    strained = np.abs(held.forces(1e-3 * X)).max()
     turned = Rotation.from_rotvec([0.7, -1.1, 0.4]).apply(X) - X
-    assert np.abs(forces(solver, turned)).max() < 1e-10 * strained
+    assert np.abs(held.forces(turned)).max() < 1e-10 * strained
     u = turned + 1e-3 * rng.uniform(-1.0, 1.0, X.shape)
-    force, way, h = forces(solver, u), rng.normal(size=X.shape), 1e-7
-    slope = (energy(solver, u + h * way) - energy(solver, u - h * way)) / (2.0 * h)
+    force, way, h = held.forces(u), rng.normal(size=X.shape), 1e-7
+    slope = (energy(held, u + h * way) - energy(held, u - h * way)) / (2.0 * h)
     assert -np.sum(force * way) == pytest.approx(slope, rel={"finite": 1e-6, "corotational": 5e-3}[kinematics])
 
 

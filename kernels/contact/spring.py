@@ -28,7 +28,7 @@ class Spring:
     stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
     became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free.
     normal_energy: the part of `energy` that the normal spring holds [J], only of laws that are not linear. parameters:
-    of the contact law, shape (slave_count, parameter_count).
+    of the contact law [SI units], shape (spring_count, parameter_count).
     """
 
     tangential: wp.array(dtype=wp.vec3d)

@@ -144,7 +144,7 @@ def _spans(scene: Scene) -> list[_Span]:
         raise bad_value("Scene.joints on the ground", [joint.name for joint in grounded], remedy)
     body, hinge, name = grounded[0].body, grounded[0].at, grounded[0].name
     left = [joint for joint in hinges if joint.other is not None]
-    spans, visited = [], {body}
+    spans = []
     while True:
         touching = [joint for joint in left if body in (joint.body, joint.other)]
         if len(touching) > 1:
@@ -153,12 +153,9 @@ def _spans(scene: Scene) -> list[_Span]:
         if not touching:
             break
         out, child, inbound = _cross(touching[0], body)
-        if child in visited:
-            raise bad_value(f"Revolute {touching[0].name}", child, "the joint closes a loop; the chain must stay open")
         spans.append(_Span(name, body, hinge[:2], (out[0] - hinge[0], out[1] - hinge[1])))
         left.remove(touching[0])
         body, hinge, name = child, inbound, touching[0].name
-        visited.add(body)
     if left:
         remedy = f"these joints do not hang on the ground hinge {grounded[0].name}; connect or remove them"
         raise bad_value("Scene.joints", [joint.name for joint in left], remedy)
