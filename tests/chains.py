@@ -28,9 +28,7 @@ def bars(count: int = 2, gravity: float = 9.8, elements: int = 10, **rigid: Any)
     box = mca.Box(size=(LENGTH, 0.02, 0.02), divisions=(elements, 2, 2), origin=(0.0, -0.01, -0.01))
     metal = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
     end, joints = (LENGTH, 0.0, 0.0), [mca.Revolute(name="O", body=names[0], at=(0.0, 0.0, 0.0))]
-    joints += [
-        mca.Revolute(name="AB"[k], body=names[k], at=end, other=names[k + 1]) for k in range(count - 1)
-    ]
+    joints += [mca.Revolute(name="AB"[k], body=names[k], at=end, other=names[k + 1]) for k in range(count - 1)]
     given = {"theta": (1.0, 1.4)[:count], "theta_dot": (-3.0, 2.0)[:count], **rigid}
     return mca.Scene(
         name="bars",

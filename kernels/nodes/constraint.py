@@ -8,7 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.each import kind, value_function
 from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.node import gather_function, hold, take_load
+from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -96,7 +96,7 @@ def drive(
 
 
 @cache
-def bound_kernel(precision: str, loaded: bool, each: bool = False, partial: bool = False) -> Any:
+def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
@@ -119,7 +119,7 @@ def bound_kernel(precision: str, loaded: bool, each: bool = False, partial: bool
         gravity: Vector,
         bonds: Bonds,
         dt: wp.float64,
-        load_out: wp.array(dtype=wp.vec3d),
+        contact_force_out: wp.array(dtype=wp.vec3d),
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
         v_before_out: wp.array(dtype=wp.vec3d),
@@ -139,8 +139,8 @@ def bound_kernel(precision: str, loaded: bool, each: bool = False, partial: bool
         else:
             i = bonds.node[k - pairs]
         total = gather(near[i], more, force)
-        if wp.static(loaded):
-            total += take_load(i, load_out)
+        if wp.static(contact):
+            total += take_contact(i, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         free = v_out[i] + dt * a
         u_free = u_out[i] + dt * free
@@ -154,8 +154,8 @@ def bound_kernel(precision: str, loaded: bool, each: bool = False, partial: bool
                 if v_before_out.shape[0] > 0:
                     v_before_out[j] = v_out[j]
                 total = gather(near[j], more, force)
-                if wp.static(loaded):
-                    total += take_load(j, load_out)
+                if wp.static(contact):
+                    total += take_contact(j, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
                 u_j = u_out[j] + dt * v_j
                 u = weighted_mean(mass[i], u_free, mass[j], u_j)

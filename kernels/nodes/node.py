@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 # In the role of a node, whose lowest three bits are its axes at rest:
 BOUND = 8  # `kernels.nodes.constraint` advances it
-LOADED = 16  # contact or a joint's torque may load it
+TOUCHABLE = 16  # it belongs to a surface of a contact
 
 KEEPERS = 32  # threads that keep the greatest normal force of each scene
 
@@ -56,11 +56,11 @@ def gather_function(precision: str) -> Any:
 
 
 @wp.func
-def take_load(i: int, load_out: wp.array(dtype=wp.vec3d)):
-    """The force of contact and of joints' torques on a node, which is given once."""
-    fc = load_out[i]
+def take_contact(i: int, contact_force_out: wp.array(dtype=wp.vec3d)):
+    """The contact force on a node, which is given once."""
+    fc = contact_force_out[i]
     if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
-        load_out[i] = wp.vec3d()
+        contact_force_out[i] = wp.vec3d()
     return fc
 
 
@@ -76,7 +76,7 @@ def hold(role: int, a: wp.vec3d):
 @cache
 def integrate_kernel(
     precision: str,
-    loaded: bool,
+    contact: bool,
     fixed: bool,
     bound: bool = False,
     each: bool = False,
@@ -85,10 +85,10 @@ def integrate_kernel(
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
-    where it is not empty. speed_square_out keeps the greatest v^2, see `extremes.keep_speed`. With `loaded`, KEEPERS
-    threads beyond the first range of nodes, if launched, run `extremes.keep_normal_force`. `fixed`: some axes are at
-    rest; `bound`: some nodes are left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of
-    a batch, and nodes know their scene. `early`: the next kernel takes its places as soon as nodes leave some.
+    where it is not empty. speed_square_out keeps the greatest v^2, see `extremes.keep_speed`. With `contact`, KEEPERS
+    threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
+    some nodes are left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and
+    nodes know their scene. `early`: the next kernel takes its places as soon as nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
@@ -105,7 +105,7 @@ def integrate_kernel(
         gravity: Vector,
         kick: wp.float64,
         drift: wp.float64,
-        load_out: wp.array(dtype=wp.vec3d),
+        contact_force_out: wp.array(dtype=wp.vec3d),
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
         v_before_out: wp.array(dtype=wp.vec3d),
@@ -116,12 +116,12 @@ def integrate_kernel(
             let_next_begin()
         i = wp.tid()
         beyond = i - u_out.shape[0]
-        if wp.static(loaded):
+        if wp.static(contact):
             i = wp.min(i, u_out.shape[0] - 1)
         pair = near[i]
         inverse = inverse_mass[i]
         wait_for_previous()
-        if wp.static(loaded):
+        if wp.static(contact):
             if beyond >= 0:  # no node waits for the sums
                 keep_normal_force(beyond, wp.static(KEEPERS), normal_force_out)
                 return
@@ -129,9 +129,9 @@ def integrate_kernel(
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
         total = gather(pair, more, force)
-        if wp.static(loaded):
-            if int(role[i]) & wp.static(LOADED) != 0:
-                total += take_load(i, load_out)
+        if wp.static(contact):
+            if int(role[i]) & wp.static(TOUCHABLE) != 0:
+                total += take_contact(i, contact_force_out)
         a = inverse * total + of(gravity, of(scene, i))
         if wp.static(fixed):
             a = hold(int(role[i]), a)

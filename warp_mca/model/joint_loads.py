@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.errors import bad_value
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.constraints import JointPairs
 
@@ -27,7 +28,7 @@ class HingeLoad:
     """Torque and friction in a hinge about z; the laws are those of `rigid.loads.Loads`.
 
     Attributes:
-        inner, outer: nodes near the hinge on which the torque acts, of the body before it (empty for the ground) and of
+        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground) and of
             the link that it carries, shape (count,), int32.
         friction: Coulomb torque tau_C [N m].
         damping: viscous coefficient c [N m s/rad].
@@ -76,8 +77,14 @@ def _shifted(table: Table | None, start: float, rest: Array) -> tuple[Array, Arr
     return table.times - start, table.values
 
 
-def hinge_loads(parts: Assembly, chain: Chain | None, start: float) -> tuple[HingeLoad, ...]:
-    """The chain's hinges in which torque or friction acts, for a phase that starts so long after the release [s]."""
+def hinge_loads(parts: Assembly, free: NDArray[np.bool_], chain: Chain | None, start: float) -> tuple[HingeLoad, ...]:
+    """The chain's hinges in which torque or friction acts, for a phase that starts so long after the release [s].
+
+    `free` are nodes that no joint ties and nothing holds or drives, shape (node_count,).
+
+    Raises:
+        RequestError: a link has no free nodes off the axis of such a hinge.
+    """
     if chain is None or chain.loads is None:
         return ()
     found, loads = [], chain.loads
@@ -89,12 +96,12 @@ def hinge_loads(parts: Assembly, chain: Chain | None, start: float) -> tuple[Hin
         if j > 0:
             before = chain.links[j - 1]
             hinge = before.hinge_in[0] + before.hinge_out[0], before.hinge_in[1] + before.hinge_out[1]
-            inner = _near(parts, before.body, hinge)
+            inner = _near(parts, free, before.body, hinge)
         times, torques = _shifted(table, start, np.zeros(1))
         found.append(
             HingeLoad(
                 inner=inner,
-                outer=_near(parts, link.body, link.hinge_in),
+                outer=_near(parts, free, link.body, link.hinge_in),
                 friction=friction,
                 damping=damping,
                 friction_rate=loads.friction_rate,
@@ -105,14 +112,22 @@ def hinge_loads(parts: Assembly, chain: Chain | None, start: float) -> tuple[Hin
     return tuple(found)
 
 
-def _near(parts: Assembly, body: str, hinge: Vec2) -> Index:
-    """Nodes of a body as near to a hinge's axis as the body is thick there, and the nearest ones off the axis."""
-    points = parts.meshes[body].points
+def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> Index:
+    """Free nodes of a body as near to a hinge's axis as the body is thick there; more where these are on a line along z.
+
+    Raises:
+        RequestError: all free nodes are.
+    """
+    points, first = parts.meshes[body].points, parts.node_start[body]
     away = np.linalg.norm(points[:, :2] - np.asarray(hinge), axis=1)
-    on_axis = away <= ON_AXIS * np.ptp(points, axis=0).max()
+    tolerance = ON_AXIS * float(np.ptp(points, axis=0).max())
+    on_axis = away <= tolerance
     thickness = float(np.ptp(points[on_axis, 2])) if on_axis.any() else 0.0
-    radius = max(thickness, float(away[~on_axis].min()))
-    return (np.flatnonzero(away <= MARGIN * radius) + parts.node_start[body]).astype(np.int32)
+    for radius in (thickness, *np.unique(away[away > thickness])):
+        found = np.flatnonzero((away <= MARGIN * radius) & free[first : first + len(points)])
+        if len(found) and np.ptp(points[found, :2], axis=0).max() > tolerance:
+            return (found + first).astype(np.int32)
+    raise bad_value(f"nodes of {body} at its hinge", hinge, "none is free to take the joint's torque; refine its mesh")
 
 
 def movable_bases(

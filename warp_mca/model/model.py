@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.constraints import JointPairs, check_bindings, constraints, join_bodies
+from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.layout import Layout
@@ -254,7 +254,7 @@ def build_model(
         **held,
         **pairs,
         hinges=joints,
-        hinge_loads=hinge_loads(parts, chain, start),
+        hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
         passes=passes,
         contact_axes=axes,

@@ -1,4 +1,4 @@
-"""Owns the device side of what binds nodes: axes at rest, joints, driven axes; and which nodes take loads."""
+"""Owns the device side of what binds nodes: axes at rest, joints, driven axes; and which nodes may be touched."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes.constraint import Bonds
-from warp_mca.kernels.nodes.node import BOUND, LOADED
+from warp_mca.kernels.nodes.node import BOUND, TOUCHABLE
 from warp_mca.model.layout import Layout
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class BondStage:
         partial: whether some pairs are tied in some directions only.
         rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
         bonds: pairs, driven nodes and their tables.
-        role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or loaded.
+        role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
         at_rest: the same of a model without joints and driven axes.
         pairs, driven: their numbers.
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
@@ -54,11 +54,8 @@ class BondStage:
         self.count = self.pairs + self.driven
         role = model.fixed_axes.astype(np.uint8)
         for item in model.passes:
-            role[item.slave] |= LOADED
-            role[item.master] |= LOADED
-        for load in model.hinge_loads:
-            role[load.inner] |= LOADED
-            role[load.outer] |= LOADED
+            role[item.slave] |= TOUCHABLE
+            role[item.master] |= TOUCHABLE
         if not self.count and not role.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)

@@ -229,7 +229,7 @@ class ContactStage:
 
         def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
             threads = lanes * (part.stop - part.start)
-            outputs: list[Any] = [work.load, state.flag]
+            outputs: list[Any] = [work.contact_force, state.flag]
             if kernel is self.kernel:  # a row of sums for each range of slaves
                 outputs.insert(1, state.normal_force[next(first)])
             wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)

@@ -29,9 +29,10 @@ class LoadState:
     """State of loaded hinges and movable bases; empty where a scene has none.
 
     Attributes:
-        torque: of drive and of friction in each hinge at the latest step [N m], shape (hinge_count,), vec2d.
-        inertia: of the nodes on which they acted then, inner and outer [kg m^2], shape (hinge_count,), vec2d.
+        spin: of each hinge's inner and outer nodes about their mass centre at the latest half step [kg m^2/s], shape
+            (hinge_count,), vec2d.
         work: of drive and of friction in each hinge up to t(n) [J], shape (hinge_count,), vec2d.
+        work_after: the same half a step later [J], shape (hinge_count,), vec2d.
         clock: steps that each hinge has taken [-], shape (hinge_count,), int32.
         carriage: velocity of each base's carriage at the latest half step [m/s], shape (base_count,), vec3d.
         base_work: of each base's motion and its carriage's weight up to t(n) [J], shape (base_count,), float64.
@@ -39,9 +40,9 @@ class LoadState:
         base_clock: steps that each base has taken [-], shape (base_count,), int32.
     """
 
-    torque: wp.array
-    inertia: wp.array
+    spin: wp.array
     work: wp.array
+    work_after: wp.array
     clock: wp.array
     carriage: wp.array
     base_work: wp.array
@@ -100,15 +101,13 @@ class LoadStage:
         found.v_x = _joined([item.velocities[:, 0] for item in items], wp.float64)
         found.v_y = _joined([item.velocities[:, 1] for item in items], wp.float64)
         # half a step before the start, as `Solver.start` takes the nodes there
-        start = [
-            model.V[model.joint_first[item.start]] - 0.5 * self.dt * model.gravity[item.scene] for item in items
-        ]
+        start = [model.V[model.joint_first[item.start]] - 0.5 * self.dt * model.gravity[item.scene] for item in items]
         self.device_bases, self.start_velocities = found, np.array(start).reshape(-1, 3)
 
     def new_state(self) -> LoadState:
         """State before the first step, on the current device."""
         hinges, bases = len(self.hinges), len(self.bases)
-        pairs = {name: wp.zeros(hinges, dtype=wp.vec2d) for name in ("torque", "inertia", "work")}
+        pairs = {name: wp.zeros(hinges, dtype=wp.vec2d) for name in ("spin", "work", "work_after")}
         return LoadState(
             **pairs,
             clock=wp.zeros(hinges, dtype=wp.int32),
@@ -124,11 +123,11 @@ class LoadStage:
         found += [base.move_bases] if self.bases else []
         return [*found, loads.sum_loads] if found else []
 
-    def torques(self, state: State, counts: bool = True) -> None:
-        """Forces of the hinges' torques, added to those on nodes; without `counts` the state does not change."""
-        work, own = self.work, state.loads
-        inputs = [self.first_hinge, self.loads, work.X, work.mass, state.u, state.v, self.dt, counts]
-        outputs = [work.load, own.torque, own.inertia, own.work, own.clock]
+    def torques(self, state: State, kick: float, drift: float) -> None:
+        """Let torques act for `kick` [s] on nodes that all else has advanced by `drift` [s]; 0 before the first step."""
+        own = state.loads
+        inputs = [self.first_hinge, self.loads, self.work.X, self.work.mass, kick, drift]
+        outputs = [state.u, state.v, state.speed_square, own.spin, own.work, own.work_after, own.clock]
         threads = (self.scenes, self.lanes)
         wp.launch(joint_torque.joint_torques, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
 

@@ -37,10 +37,10 @@ class NodeStage:
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
-        self.loaded, fixed = len(work.load) > 0, bool(model.fixed_axes.any())
+        self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         bound, early = bonds.count > 0, rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(precision, self.loaded, fixed, bound, each, early)
-        self.bound_kernel = constraint.bound_kernel(precision, self.loaded, each, bonds.partial) if bound else None
+        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
+        self.bound_kernel = constraint.bound_kernel(precision, self.touched, each, bonds.partial) if bound else None
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -56,7 +56,7 @@ class NodeStage:
         work, state, own = self.work, step.state, step.state.constraints
         inputs = [work.mass, work.inverse_mass, work.near, work.more, self.bonds.role, work.force, self.scene]
         inputs += [self.gravity, self.bonds.bonds, self.dt]
-        outputs = [work.load, state.u, state.v, work.v_before if step.records else None, state.speed_square]
+        outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
         wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
@@ -81,11 +81,11 @@ class NodeStage:
 
         def launch(part: slice) -> None:
             scene = 0 if isinstance(self.scene, int) else self.scene[part]
-            load = work.load[part] if self.loaded else work.load
+            contact_force = work.contact_force[part] if self.touched else work.contact_force
             inputs = [work.inverse_mass[part], work.near[part], work.more]
             inputs += [role[part] if len(role) else role, work.force, scene, self.gravity, kick, drift]
-            outputs = [load, state.u[part], state.v[part], None if before is None else before[part]]
-            keepers = node.KEEPERS if len(state.normal_force) and part.start == 0 else 0
+            outputs = [contact_force, state.u[part], state.v[part], None if before is None else before[part]]
+            keepers = node.KEEPERS if self.touched and part.start == 0 else 0
             outputs += [squares[part] if len(squares) > 1 else squares, state.normal_force if keepers else None]
             threads = part.stop - part.start + keepers
             wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

@@ -134,8 +134,6 @@ class Solver:
         forces += [
             Stage("contact", lambda s, c=c: c.launch(work, s.state, self.dt, s.split), BESIDE) for c in self.contacts
         ]
-        if self.model.hinge_loads:
-            forces.append(Stage("joint torques", lambda s: self.loads.torques(s.state), BESIDE))
         forces.append(Stage("next record", self.records.next_row, BESIDE, only_records=True))
         energies = [Stage("paths, frames: stress", self._before_step, only_records=True)]
         energies += [
@@ -157,7 +155,8 @@ class Solver:
         ]
         if self.loads.kernels():
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
-        return [forces, energies, sums, advance, motion]
+        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
+        return [forces, energies, sums, advance, *([torques] if self.model.hinge_loads else []), motion]
 
     def _before_step(self, step: Step) -> None:
         if self.output and step.is_row:
@@ -251,7 +250,7 @@ class Solver:
             tried = state.copy()
             for stage in self.contacts:
                 stage.launch(self.work, tried, 0.0)
-            self.work.load.zero_()
+            self.work.contact_force.zero_()
             springs = [own.spring for own in tried.contacts]
             return [(spring.depth.numpy(), spring.energy.numpy()) for spring in springs]
 
@@ -265,13 +264,13 @@ class Solver:
     def start(self, state: State) -> None:
         """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
 
-        Bodies are free of stress then, so that gravity and joints' torques alone accelerate them.
+        Bodies are free of stress then, so that gravity and the drives of joints alone accelerate them.
         """
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
-            if self.model.hinge_loads:
-                self.loads.torques(state, counts=False)
             self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.bonds.at_rest)
+            if self.model.hinge_loads:
+                self.loads.torques(state, -0.5 * self.dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))

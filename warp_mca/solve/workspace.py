@@ -24,8 +24,7 @@ class Workspace:
         law: parameters of each material, see `Model.law`, in the scalars of the precision.
         near, more: slots of the forces on each node, see `gather_lists`.
         force: of each element on its nodes, by slot [N], vec3 in the scalars of the precision.
-        load: forces of contact and of joints' torques on nodes [N], shape (node_count,), vec3d, zero between steps; empty
-            where neither acts.
+        contact_force: other forces on nodes [N], shape (node_count,), vec3d, zero between steps; empty without contact.
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
         energy: of each element at a record, see `ElementStage.energies`, shape (5, element_count).
         row: of the latest record in the rings, shape (1,), int32.
@@ -44,7 +43,7 @@ class Workspace:
         self.law = wp.array(limited(model.law, precision), dtype=t.real)
         self.near, self.more = wp.array(near, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)
         self.force = wp.zeros(slots, dtype=t.vec3)
-        self.load = wp.zeros(model.node_count if passes or model.hinge_loads else 0, dtype=wp.vec3d)
+        self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
