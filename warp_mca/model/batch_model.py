@@ -54,6 +54,16 @@ def join_models(models: Sequence[Model]) -> Model:
             for model, start in zip(models, pairs, strict=False)
             for joint in model.joints
         ),
+        hinge_loads=tuple(
+            replace(item, inner=item.inner + first, outer=item.outer + first, scene=k)
+            for k, (model, first) in enumerate(zip(models, nodes, strict=False))
+            for item in model.hinge_loads
+        ),
+        bases=tuple(
+            replace(item, start=item.start + int(start), end=item.end + int(start), scene=k)
+            for k, (model, start) in enumerate(zip(models, pairs, strict=False))
+            for item in model.bases
+        ),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)

@@ -157,6 +157,14 @@ def _nodes_of(pairs: dict[str, NDArray]) -> Index:
     return both[both != GROUND]
 
 
+def free_nodes(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> NDArray[np.bool_]:
+    """Nodes that no joint ties and nothing holds or drives, shape (node_count,)."""
+    free = held["fixed_axes"] == 0
+    free[held["prescribed_node"]] = False
+    free[_nodes_of(pairs)] = False
+    return free
+
+
 def check_bindings(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> None:
     """Refuse nodes of joints that are fixed or driven too: each stage would undo what the other set.
 

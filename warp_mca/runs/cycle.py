@@ -19,7 +19,7 @@ from warp_mca.model.model import build_model, nodal_masses
 from warp_mca.results.paths import Found, locate
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.chain import Chain
-from warp_mca.rigid.handback import HandBack, deformed_chain, hand_back
+from warp_mca.rigid.handback import HandBack, carriage_motion, deformed_chain, hand_back
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.rigid.swing import Swing, swing_until
@@ -237,7 +237,7 @@ class Cycle:
         """From a touch until all contacts have parted."""
         X, u, V = self._place(motion)
         watched = [(link.body, node) for link in self.chain.links for node in self.link_ends(link.body)]
-        model = build_model(self.scene, self.meshes, X, V, watched)
+        model = build_model(self.scene, self.meshes, X, V, watched, chain=self.chain, start=motion.t)
         probes = locate(self.scene, model, self.meshes, self.places)
         warnings = () if self._impacts else tuple(mesh_warnings(self.scene, self.meshes, model))
         ready = Prepared(self.scene, self.meshes, self.first, model, probes, warnings)
@@ -270,7 +270,7 @@ class Cycle:
             ended_by=ended_by,
             impact=impact,
             theta=self.chain.angles(motion.theta),
-            jump=self._kinetic(V) - self._rigid_kinetic(motion),
+            jump=self._kinetic(V) + self._carriage_kinetic(motion) - self._rigid_kinetic(motion),
             settled=settled,
             back=None,
             lost=0.0,
@@ -328,6 +328,11 @@ class Cycle:
         """Kinetic energy of the nodes [J]."""
         return float(sum(0.5 * self.masses[name] @ (v**2).sum(axis=1) for name, v in V.items()))
 
+    def _carriage_kinetic(self, motion: Motion) -> float:
+        """Kinetic energy of the carriage [J]."""
+        _, velocities = self.chain.moved_to(motion.t).hinges(motion.theta, motion.theta_dot)
+        return float(0.5 * self.chain.carriage_mass * (velocities[0] ** 2).sum())
+
     def _rigid_kinetic(self, motion: Motion) -> float:
         """Kinetic energy of the chain and the other bodies [J]."""
         chain = motion.chain.moved_to(motion.t)
@@ -354,19 +359,21 @@ class Cycle:
 
         points = {name: self.meshes[name].points for name in names}
         now, rest, velocities = by_body(model.X + u), by_body(model.X + kept.u), by_body(v)
-        near, common = self.chain.angles(motion.theta), {"held": self.held, "t": part.end}
-        chain = self.chain.moved_to(part.end)
+        base = self.chain.links[0].body
+        carriage = carriage_motion(self.chain, part.end, points[base], now[base], velocities[base])
+        near = self.chain.angles(motion.theta)
+        common = {"held": self.held, "t": part.end, "carriage": carriage}
         still = {name: np.zeros_like(x) for name, x in rest.items()}
-        shapes = hand_back(chain, points, self.masses, rest, still, near=near, **common).displacements
+        shapes = hand_back(self.chain, points, self.masses, rest, still, near=near, **common).displacements
         deformed = {name: points[name] + shapes[name] for name in names}
-        chain = deformed_chain(chain, points, deformed)
+        chain = deformed_chain(self.chain, points, deformed)
         back = hand_back(chain, deformed, self.masses, now, velocities, near=near, **common)
         assert back.chain is not None
         swings = back.chain if self.rigid.inertia == "mesh" else _with_inertia_of(back.chain, self.chain)
         turned = take_history(relaxation.solver, kept.state, rotations)
         after = Motion(
             t=part.end,
-            chain=replace(swings, origin=self.chain.origin, origin_velocity=(0.0, 0.0)),
+            chain=swings,
             theta=back.theta,
             theta_dot=back.theta_dot,
             placements=back.placements,
@@ -382,7 +389,7 @@ class Cycle:
         return after, replace(
             part,
             back=back,
-            lost=stored - left,
+            lost=stored - left - back.drive_work,
             jump_back=self._rigid_kinetic(after) - back.kinetic_energy,
             hinge_impulse=self._hinge_impulses(back, deformed, velocities),
         )

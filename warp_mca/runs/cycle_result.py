@@ -168,7 +168,8 @@ def _add_impact(cycle: Cycle, part: ImpactPart, story: Story) -> None:
     rows["external_work"] = totals.external_work + energies["external_work"]
     rows |= _angles(cycle, _link_angles(cycle, part))
     last = {key: float(column[-1]) for key, column in energies.items()}
-    totals.external_work += last["external_work"]
+    back = part.back
+    totals.external_work += last["external_work"] - (back.drive_work if back else 0.0)
     totals.friction += last["friction"]
     totals.contact_loss += last["contact_loss"]
     totals.joint += last["joint"]
@@ -178,8 +179,8 @@ def _add_impact(cycle: Cycle, part: ImpactPart, story: Story) -> None:
     phase = _phase("impact", part.start, part.end, part.ended_by, energy, totals)
     more: dict[str, Any] = {"lost": part.lost, "settled": part.settled, "jump": part.jump, "jump_back": part.jump_back}
     more["hinge_impulse"] = {name: impulse.tolist() for name, impulse in part.hinge_impulse.items()}
-    if part.back is not None:
-        more["vibration"] = {"kinetic": part.back.vibration_energy, "elastic": part.lost - part.back.vibration_energy}
+    if back:
+        more["vibration"] = {"kinetic": back.vibration_energy, "elastic": part.lost - back.vibration_energy}
     story.add(rows, {**phase, **more})
 
 

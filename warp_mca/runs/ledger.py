@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import (
+    CARRIAGE,
     DRIVE_WORK,
     ELASTIC,
     FRICTION,
@@ -17,7 +18,9 @@ from warp_mca.kernels.records.columns import (
     HOURGLASS,
     IMPULSE,
     JACOBIAN,
+    JOINT_HEAT,
     KINETIC,
+    LOAD_WORK,
     LOST,
     NORMAL_ENERGY,
     NORMAL_FORCE,
@@ -136,9 +139,14 @@ class Ledger:
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
         springs = self.springs(sums)
-        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., PLANE_WORK].sum(axis=-1)
+        work = (
+            sums[..., GRAVITY_WORK]
+            + sums[..., DRIVE_WORK]
+            + sums[..., LOAD_WORK]
+            + springs[..., PLANE_WORK].sum(axis=-1)
+        )
         return {
-            "kinetic": sums[..., KINETIC],
+            "kinetic": sums[..., KINETIC] + sums[..., CARRIAGE],
             "elastic": sums[..., ELASTIC],
             "plastic": sums[..., PLASTIC],
             "hourglass": sums[..., HOURGLASS],
@@ -146,7 +154,7 @@ class Ledger:
             "friction": springs[..., FRICTION].sum(axis=-1),
             "contact_loss": springs[..., LOST].sum(axis=-1),
             "damping": np.zeros(sums.shape[:-1]),
-            "joint": np.zeros(sums.shape[:-1]),
+            "joint": sums[..., JOINT_HEAT],
             "external_work": work - self.kept.initial_work,
         }
 

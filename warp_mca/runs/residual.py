@@ -1,7 +1,7 @@
 """Owns the shape that bodies keep between two impacts: the equilibrium of their elements with the plastic strain.
 
-The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground or on held axes stay where
-they are. Forces are those of the elements in float64, whatever the precision of the run.
+The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground, on a base or on held axes
+stay where they are. Forces are those of the elements in float64, whatever the precision of the run.
 """
 
 from __future__ import annotations
@@ -54,6 +54,7 @@ class Relaxation:
         self.held = np.stack([(model.fixed_axes >> axis & 1).astype(bool) for axis in range(3)], axis=1)
         self.held[model.prescribed_node, model.prescribed_axis] = True
         self.held[model.joint_first[second == GROUND]] = True
+        self.grounded = model.joint_first[(second == GROUND) & model.joint_tied.any(axis=(1, 2))]  # not on a base
         self.held[second[self.tied]] = True  # they follow the first node of their pair
         self.masses = model.mass.copy()
         np.add.at(self.masses, model.joint_first[self.tied], model.mass[second[self.tied]])
@@ -98,7 +99,7 @@ class Relaxation:
         follows = np.abs(u[first] - u[second]).max(initial=0.0) > 0.0
         found[first] = share * u[first] + (1.0 - share) * u[second] if follows else u[first]
         found[second] = found[first]
-        found[model.joint_first[model.joint_second == GROUND]] = 0.0
+        found[self.grounded] = 0.0
         return found
 
     def _evaluate(self, u: Array) -> None:
