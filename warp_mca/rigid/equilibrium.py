@@ -56,6 +56,7 @@ def equilibrium(
     elastic_energy: float,
     held: NDArray[np.bool_] | None = None,
     name: str = "body",
+    energy: Callable[[Array], float] | None = None,
 ) -> Equilibrium:
     """Relax the displacements of one body until its internal forces balance.
 
@@ -71,11 +72,13 @@ def equilibrium(
         elastic_energy: against which the remaining energy is small [J]: that of the body at the start, or of the scene.
         held: axes of nodes that keep their displacement and may take forces, shape (node_count, 3), bool.
         name: of the body, for messages.
+        energy: strain energy of displacements, plastic work included [J], from the same history. Where elements yield
+            and unload, a step may make it smaller, though not the forces; such a step is taken too.
 
     Raises:
         GuardError: forces are not finite, or the search does not converge.
     """
-    search = _Search(forces, u, points, masses, held, name)
+    search = _Search(forces, u, points, masses, held, name, energy)
     u, residual = u.copy(), search.residual(u)
     released, drop, delay = 0.0, np.inf, MIN_DELAY
     for _ in range(MAX_NEWTON):
@@ -83,10 +86,13 @@ def equilibrium(
             return Equilibrium(u=u, released=released, remaining=0.0, evaluations=search.evaluations)
         step, drop, iterations = search.linear_step(u, residual, 0.1 * TOLERANCE * elastic_energy, delay)
         delay = max(delay, iterations // 2)
-        before, force = u, residual
-        u, residual = search.apply(u, residual, step)
-        released += float((0.5 * (force + residual) * (u - before)).sum())
-        if drop <= TOLERANCE * elastic_energy:
+        enough, found = drop <= TOLERANCE * elastic_energy, search.apply(u, residual, step)
+        if found is None and not enough:
+            raise search.failure("no part of the last step makes its forces smaller")
+        if found is not None:
+            released += float((0.5 * (residual + found[1]) * (found[0] - u)).sum())
+            u, residual = found
+        if enough:  # a last step that helps no more is rounding
             return Equilibrium(u=u, released=released, remaining=drop, evaluations=search.evaluations)
     raise GuardError(
         f"the shape of {name} without vibration was not found: after {MAX_NEWTON} steps {drop:.3g} J of "
@@ -109,8 +115,9 @@ class _Search:
         masses: Array,
         held: NDArray[np.bool_] | None,
         name: str,
+        energy: Callable[[Array], float] | None,
     ) -> None:
-        self._forces, self._masses, self._name = forces, masses[:, None], name
+        self._forces, self._masses, self._name, self._energy = forces, masses[:, None], name, energy
         self._loose = np.ones(u.shape) if held is None else (~held).astype(np.float64)
         shape = points + u
         none = np.zeros(u.shape, dtype=bool)
@@ -158,22 +165,21 @@ class _Search:
             before, rz = rz, float((r * z).sum())
             p = z + (rz / before) * p
         if len(drops) < MAX_ITERATIONS:
-            raise self._failure("it has no stiffness against some displacement")
-        raise self._failure(f"a linear step takes more than {MAX_ITERATIONS} iterations")
+            raise self.failure("it has no stiffness against some displacement")
+        raise self.failure(f"a linear step takes more than {MAX_ITERATIONS} iterations")
 
-    def apply(self, u: Array, residual: Array, step: Array) -> tuple[Array, Array]:
-        """The displacements after the step, halved until it makes the residual smaller, and the residual then.
+    def apply(self, u: Array, residual: Array, step: Array) -> tuple[Array, Array] | None:
+        """The displacements after the step, halved until it makes residual or energy smaller, and the residual then.
 
-        Raises:
-            GuardError: no part of the step does.
+        None if no part of the step does.
         """
-        before = self._size(residual)
+        before, stored = self._size(residual), self._energy(u) if self._energy else 0.0
         for _ in range(MAX_HALVINGS):
             after = self.residual(u + step)
-            if self._size(after) < before:
+            if self._size(after) < before or (self._energy and self._energy(u + step) < stored):
                 return u + step, after
             step = 0.5 * step
-        raise self._failure("no part of the last step makes its forces smaller")
+        return None
 
     def _size(self, residual: Array) -> float:
         """The residual's square over the diagonal of K [J]."""
@@ -207,8 +213,9 @@ class _Search:
         diagonal = total / (PROBES * np.maximum(axes, 1.0))
         typical = float(np.median(np.abs(diagonal[axes > 0.0])))
         if typical == 0.0:
-            raise self._failure("it has no stiffness")
+            raise self.failure("it has no stiffness")
         return np.maximum(diagonal, 1e-2 * typical)[:, None]
 
-    def _failure(self, reason: str) -> GuardError:
+    def failure(self, reason: str) -> GuardError:
+        """An error that says why the search failed."""
         return GuardError(f"the shape of {self._name} without vibration was not found: {reason}")

@@ -96,6 +96,7 @@ class Relaxation:
             elastic_energy=before[0] + before[2],
             held=self.held,
             name="the bodies",
+            energy=self._energy,
         )
         u = self._followed(found.u)
         self._evaluate(u)
@@ -138,6 +139,11 @@ class Relaxation:
         force[first] += force[second]
         force[second] = 0.0
         return force
+
+    def _energy(self, u: Array) -> float:
+        """Strain energy of displacements, plastic work included [J]."""
+        self._evaluate(self._followed(u))
+        return sum(self._energies())
 
     def _energies(self) -> tuple[float, float, float]:
         """Elastic, plastic and hourglass energy of the trial state [J], after `_evaluate`."""
