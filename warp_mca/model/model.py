@@ -13,8 +13,8 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
-from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
