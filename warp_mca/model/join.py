@@ -50,21 +50,7 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_second=shifted("joint_second", nodes),
         joint_tied=np.concatenate([model.joint_tied for model in models]),
         joint_slides=shifted("joint_slides", pairs),
-        hinges=tuple(
-            replace(hinge, start=hinge.start + int(start), end=hinge.end + int(start))
-            for model, start in zip(models, pairs, strict=False)
-            for hinge in model.hinges
-        ),
-        hinge_loads=tuple(
-            replace(item, inner=item.inner + first, outer=item.outer + first, scene=k)
-            for k, (model, first) in enumerate(zip(models, nodes, strict=False))
-            for item in model.hinge_loads
-        ),
-        bases=tuple(
-            replace(item, start=item.start + int(start), end=item.end + int(start), scene=k)
-            for k, (model, start) in enumerate(zip(models, pairs, strict=False))
-            for item in model.bases
-        ),
+        **_joints(models, nodes, pairs),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)
@@ -137,6 +123,28 @@ def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
         "table_offset": np.append(np.concatenate(starts), entries[-1]).astype(np.int32),
         "table_time": np.concatenate([model.table_time for model in models]),
         "table_value": np.concatenate([model.table_value for model in models]),
+    }
+
+
+def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, tuple]:
+    """Joints of all scenes, and what acts in them: first nodes and first pairs of each scene are given."""
+    scenes = [(k, model, nodes[k], int(pairs[k])) for k, model in enumerate(models)]
+    return {
+        "hinges": tuple(
+            replace(hinge, start=hinge.start + first, end=hinge.end + first)
+            for _, model, _, first in scenes
+            for hinge in model.hinges
+        ),
+        "hinge_loads": tuple(
+            replace(load, inner=load.inner + node, outer=load.outer + node, scene=k)
+            for k, model, node, _ in scenes
+            for load in model.hinge_loads
+        ),
+        "bases": tuple(
+            replace(base, start=base.start + first, end=base.end + first, scene=k)
+            for k, model, _, first in scenes
+            for base in model.bases
+        ),
     }
 
 
