@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chains import BASE, SPAN, START, TORQUE, bars, impact, motion_at_end, ready, rigid_end
-from impacts import momentum
+from impacts import SHORT_RANGES, momentum
 
 import warp_mca as mca
 from warp_mca.model.join import join_models
 from warp_mca.rigid.loads import Table
 from warp_mca.rigid.swing import swing_until
 from warp_mca.runs.impact import Impact
+from warp_mca.scenes import single_link
 
 SLIDE = mca.Slide(direction=(0.8, 0.6, 0.0), carriage_mass=0.3, velocity=0.5)
 FRICTION = {"joint_friction": (0.2, 0.1), "joint_damping": (0.02, 0.01)}
@@ -176,6 +177,62 @@ def test_a_stored_state_goes_on_to_the_same_bits(tmp_path: Path):
     assert fresh.state.differences(whole.state) == []
     own = whole.state.loads
     assert own.work.numpy()[1, 0] > 0.0 > own.work.numpy()[:, 1].max() and own.base_work.numpy()[0] != 0.0
+
+
+def test_threads_give_the_same_bits(monkeypatch: pytest.MonkeyPatch):
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)
+    one, two = (impact(bars(elements=40, **ALL), threads=threads) for threads in (1, 2))
+    assert two.solver.threads == 2
+    for found in (one, two):
+        found.advance(until=100)
+    assert two.state.differences(one.state) == []
+
+
+@pytest.mark.gpu
+def test_a_gpu_gives_what_a_cpu_does_and_repeats_it():
+    host, first, again = (impact(bars(**ALL), device=device) for device in ("cpu", "cuda:0", "cuda:0"))
+    for found in (host, first, again):
+        found.advance()
+    assert again.state.differences(first.state) == []
+    known, energy = (found.accounts[0].ledger.energy() for found in (host, first))
+    for key in ("kinetic", "external_work", "joint"):
+        assert energy[key] == pytest.approx(known[key], rel=1e-6)
+    assert first.accounts[0].ledger.exchange_error < CLOSED
+
+
+def test_a_cycle_goes_through_an_impact_on_a_driven_sliding_base():
+    """The rigid phases before and after join the impact without a jump of energy; all work and heat add up."""
+    scene = single_link.build(
+        axial=4,
+        section=2,
+        ring=1,
+        plate_core=2,
+        plate_core_depth=1,
+        plate_layers=2,
+        plate_extension=1,
+        focus_size=2e-3,
+        focus_layers=2,
+        output_interval=1e-5,
+        t_end=0.11,
+    )
+    assert scene.rigid is not None
+    loads = {
+        "base_motion": mca.BaseMotion(times=(0.0, 0.1, 0.2), vx=(0.0, 0.3, 0.0), vy=(0.0, -0.1, 0.1)),
+        "slide": mca.Slide(carriage_mass=0.3, velocity=0.2),
+        "torques": (constant(-0.4),),
+        "joint_friction": (0.02,),
+        "joint_damping": (0.001,),
+    }
+    result = mca.run(replace(scene, rigid=replace(scene.rigid, **loads)), precision="float64")
+    swing, hit, back = result.summary["phases"]
+    assert [phase["kind"] for phase in (swing, hit, back)] == ["rigid", "impact", "rigid"]
+    assert abs(hit["jump"]) < 1e-12 and abs(hit["jump_back"]) < 1e-12
+    assert swing["energy"]["joint"] < hit["energy"]["joint"] < back["energy"]["joint"]
+    assert result.summary["energy_error"] < 1e-3
+    errors, t = result.history["E_total_error"], result.history["time_s"]
+    after = np.flatnonzero(t > hit["end"] - hit["start"] + 1e-9)
+    assert np.ptp(errors[after]) < 1e-6  # of some 0.3 J: the swing goes on from what the impact left
 
 
 def test_scenes_of_a_batch_take_their_own_loads():
