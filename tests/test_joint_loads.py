@@ -13,7 +13,10 @@ from chains import BASE, SPAN, START, TORQUE, bars, impact, motion_at_end, ready
 from impacts import SHORT_RANGES, momentum
 
 import warp_mca as mca
+from warp_mca.base.errors import RequestError
+from warp_mca.model.assembly import Assembly
 from warp_mca.model.join import join_models
+from warp_mca.model.joint_loads import hinge_loads
 from warp_mca.rigid.loads import Table
 from warp_mca.rigid.swing import swing_until
 from warp_mca.runs.impact import Impact
@@ -160,6 +163,13 @@ def test_torques_act_near_the_hinge_on_free_nodes():
     for nodes in outer:
         away = np.linalg.norm(model.X[nodes, :2] - hinge[:2], axis=1)
         assert away.max() <= 0.0200001 and len(nodes) > 6
+
+
+def test_a_link_without_free_nodes_off_the_axis_is_refused():
+    item = ready(bars(**FRICTION))
+    parts = Assembly(item.scene, item.meshes, item.start.positions)
+    with pytest.raises(RequestError, match="^nodes of bar0 at its hinge = .*: none is free to take the joint's torque"):
+        hinge_loads(parts, np.zeros(item.model.node_count, dtype=bool), item.start.chain, START)
 
 
 def test_a_scene_without_loads_has_none():

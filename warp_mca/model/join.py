@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,7 @@ def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
     }
 
 
-def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, tuple]:
+def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any]:
     """Joints of all scenes, and what acts in them: first nodes and first pairs of each scene are given."""
     scenes = [(k, model, nodes[k], int(pairs[k])) for k, model in enumerate(models)]
     return {

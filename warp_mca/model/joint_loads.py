@@ -123,7 +123,7 @@ def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> I
     tolerance = ON_AXIS * float(np.ptp(points, axis=0).max())
     on_axis = away <= tolerance
     thickness = float(np.ptp(points[on_axis, 2])) if on_axis.any() else 0.0
-    for radius in (thickness, *np.unique(away[away > thickness])):
+    for radius in np.append(thickness, np.unique(away[away > thickness])):
         found = np.flatnonzero((away <= MARGIN * radius) & free[first : first + len(points)])
         if len(found) and np.ptp(points[found, :2], axis=0).max() > tolerance:
             return (found + first).astype(np.int32)
