@@ -52,9 +52,10 @@ def ready(scene: mca.Scene, start: float = START) -> Prepared:
     return Prepared(scene, meshes, begin, model, locate(scene, model, meshes))
 
 
-def impact(*scenes: mca.Scene, start: float = START, span: float = SPAN, device: str = "cpu") -> Impact:
+def impact(*scenes: mca.Scene, start: float = START, span: float = SPAN, **settings: Any) -> Impact:
     """Their impact phase side by side, in float64, before its first step."""
-    return Impact([ready(s, start) for s in scenes], span, device=device, precision="float64", threads=1)
+    chosen = {"device": "cpu", "precision": "float64", "threads": 1, **settings}
+    return Impact([ready(item, start) for item in scenes], span, **chosen)
 
 
 def rigid_end(begin: HandOff, start: float = START, span: float = SPAN) -> Swing:

@@ -30,6 +30,7 @@ from warp_mca.kernels.contact.spring import Spring
 from warp_mca.runs.impact import Impact
 from warp_mca.solve.bonds import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.state import State
 
@@ -341,7 +342,7 @@ def described(kind: type) -> dict[str, str]:
 def holders() -> list:
     """Every array of a state, with the class that describes it."""
     state = whole("mixed", 1, "cpu").state
-    parts = [state, *state.elements, state.contacts[0], state.contacts[0].spring, state.constraints]
+    parts = [state, *state.elements, state.contacts[0], state.contacts[0].spring, state.constraints, state.loads]
     found = []
     for part in parts:
         if part is state.contacts[0].spring:
@@ -369,7 +370,7 @@ def test_every_array_says_its_unit_shape_and_dtype():
         if kind is not Spring.cls:  # which is declared with its dtypes
             assert re.search(rf"\b{array.dtype.__name__}\b", text), f"{kind.__name__}.{name} has no dtype"
         seen.add(kind)
-    assert seen == {State, ElementState, ContactState, ConstraintState, Spring.cls}
+    assert seen == {State, ElementState, ContactState, ConstraintState, LoadState, Spring.cls}
 
 
 def test_every_record_says_its_unit_and_arrays_their_shape_and_dtype():

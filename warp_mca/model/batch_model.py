@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,21 +50,7 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_second=shifted("joint_second", nodes),
         joint_tied=np.concatenate([model.joint_tied for model in models]),
         joint_slides=shifted("joint_slides", pairs),
-        joints=tuple(
-            replace(joint, start=joint.start + int(start), end=joint.end + int(start))
-            for model, start in zip(models, pairs, strict=False)
-            for joint in model.joints
-        ),
-        hinge_loads=tuple(
-            replace(item, inner=item.inner + first, outer=item.outer + first, scene=k)
-            for k, (model, first) in enumerate(zip(models, nodes, strict=False))
-            for item in model.hinge_loads
-        ),
-        bases=tuple(
-            replace(item, start=item.start + int(start), end=item.end + int(start), scene=k)
-            for k, (model, start) in enumerate(zip(models, pairs, strict=False))
-            for item in model.bases
-        ),
+        **_joints(models, nodes, pairs),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)
@@ -136,6 +123,28 @@ def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
         "table_offset": np.append(np.concatenate(starts), entries[-1]).astype(np.int32),
         "table_time": np.concatenate([model.table_time for model in models]),
         "table_value": np.concatenate([model.table_value for model in models]),
+    }
+
+
+def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any]:
+    """Joints of all scenes, and what acts in them: first nodes and first pairs of each scene are given."""
+    scenes = [(k, model, nodes[k], int(pairs[k])) for k, model in enumerate(models)]
+    return {
+        "joints": tuple(
+            replace(joint, start=joint.start + first, end=joint.end + first)
+            for _, model, _, first in scenes
+            for joint in model.joints
+        ),
+        "hinge_loads": tuple(
+            replace(load, inner=load.inner + node, outer=load.outer + node, scene=k)
+            for k, model, node, _ in scenes
+            for load in model.hinge_loads
+        ),
+        "bases": tuple(
+            replace(base, start=base.start + first, end=base.end + first, scene=k)
+            for k, model, _, first in scenes
+            for base in model.bases
+        ),
     }
 
 

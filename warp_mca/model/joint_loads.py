@@ -28,8 +28,8 @@ class HingeLoad:
     """Torque and friction in a hinge about z; the laws are those of `rigid.loads.Loads`.
 
     Attributes:
-        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground) and of
-            the link that it carries, shape (count,), int32.
+        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground)
+            and of the link that it carries, shape (count,), int32.
         friction: Coulomb torque tau_C [N m].
         damping: viscous coefficient c [N m s/rad].
         friction_rate: w_0 [rad/s].
@@ -113,7 +113,7 @@ def hinge_loads(parts: Assembly, free: NDArray[np.bool_], chain: Chain | None, s
 
 
 def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> Index:
-    """Free nodes of a body as near to a hinge's axis as the body is thick there; more where these are on a line along z.
+    """Free nodes of a body as near to a hinge's axis as the body is thick there, more if these are on a line along z.
 
     Raises:
         RequestError: all free nodes are.
@@ -123,7 +123,7 @@ def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> I
     tolerance = ON_AXIS * float(np.ptp(points, axis=0).max())
     on_axis = away <= tolerance
     thickness = float(np.ptp(points[on_axis, 2])) if on_axis.any() else 0.0
-    for radius in (thickness, *np.unique(away[away > thickness])):
+    for radius in np.append(thickness, np.unique(away[away > thickness])):
         found = np.flatnonzero((away <= MARGIN * radius) & free[first : first + len(points)])
         if len(found) and np.ptp(points[found, :2], axis=0).max() > tolerance:
             return (found + first).astype(np.int32)

@@ -139,12 +139,8 @@ class Ledger:
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
         springs = self.springs(sums)
-        work = (
-            sums[..., GRAVITY_WORK]
-            + sums[..., DRIVE_WORK]
-            + sums[..., LOAD_WORK]
-            + springs[..., PLANE_WORK].sum(axis=-1)
-        )
+        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + sums[..., LOAD_WORK]
+        work = work + springs[..., PLANE_WORK].sum(axis=-1)
         return {
             "kinetic": sums[..., KINETIC] + sums[..., CARRIAGE],
             "elastic": sums[..., ELASTIC],
