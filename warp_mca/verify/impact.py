@@ -70,24 +70,26 @@ def coaxial_rods(setup: Setup) -> list[Row]:
     length, v, c = 0.5, 2.0, math.sqrt(200e9 / 7800.0)
     exact = 0.5 * 7800.0 * c * 0.04**2 * v
     mass, transit = 7800.0 * 0.04**2 * length, 2.0 * length / c
-    force, duration, short, restitution = [], [], [], []
-    for count in counts:
+
+    def figures(count: int) -> tuple[float, float, float, float]:
+        """Force [N], duration [s], speed of the short rod afterwards [m/s], restitution."""
         result = setup.run(setup.scene("coaxial_rods", axial=count))
         plateau = (result.time > 0.25 * transit) & (result.time < 0.75 * transit)
-        force.append(float(result.F_n[plateau].mean()))
         half = crossings(result.time, result.F_n, 0.5 * exact)
-        duration.append(float(half[-1] - half[0]))
         impulse = float(result.F_n.sum() * (result.time[1] - result.time[0]))
-        short.append(v - impulse / mass)
+        speed = v - impulse / mass
         period = result.time > result.time[-1] - 2.0 * transit
-        restitution.append((float(result["plate_vx"][period].mean()) - short[-1]) / v)
+        restitution = (float(result["plate_vx"][period].mean()) - speed) / v
+        return float(result.F_n[plateau].mean()), float(half[-1] - half[0]), speed, restitution
+
+    force, duration, short, restitution = zip(*map(figures, counts), strict=True)
     sizes = tuple(length / count for count in counts)
     front = "dispersion smears the front over (L h^2)^(1/3), so errors fall as h^(2/3)"
     return [
         Row(
             quantity="force F",
             exact=exact,
-            measured=tuple(force),
+            measured=force,
             unit="N",
             tolerance=0.002,
             why="its mean over the middle half of contact leaves out the oscillations behind the front",
@@ -96,7 +98,7 @@ def coaxial_rods(setup: Setup) -> list[Row]:
         Row(
             quantity="duration at F / 2",
             exact=transit,
-            measured=tuple(duration),
+            measured=duration,
             unit="s",
             tolerance=0.03,
             why=front,
@@ -106,7 +108,7 @@ def coaxial_rods(setup: Setup) -> list[Row]:
         Row(
             quantity="speed v1 of the short rod afterwards",
             exact=0.0,
-            measured=tuple(short),
+            measured=short,
             unit="m/s",
             tolerance=0.01,
             why=front,
@@ -117,7 +119,7 @@ def coaxial_rods(setup: Setup) -> list[Row]:
         Row(
             quantity="restitution e",
             exact=0.5,
-            measured=tuple(restitution),
+            measured=restitution,
             unit="-",
             tolerance=0.03,
             why=front,
