@@ -11,7 +11,7 @@ import numpy as np
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 
-LIMIT = 200_000_000  # elements: more fit no machine that this runs on
+LIMIT = 200_000_000  # elements; more exceed the memory of any machine
 
 
 class Recipe(Protocol):

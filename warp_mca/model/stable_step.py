@@ -1,4 +1,4 @@
-"""Owns the stable time step: the largest eigenvalue of any element, contact springs counted in."""
+"""Owns the stable time step: the largest eigenvalue of any element, contact springs included."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def stable_step(
 
     def exact(part: Part) -> Array:
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is refused
+            with np.errstate(over="ignore", invalid="ignore"):  # values that are not numbers are refused
                 return formulation.largest_eigenvalues(X[conn[part]], K[part], G[part], mass[part]) + contact[part]
         except np.linalg.LinAlgError as error:
             raise _out_of_range(int(index[part[0]]), float(bound.max())) from error
@@ -130,7 +130,7 @@ def _worst(
         part = left[start : start + BATCH]
         if bound[part[0]] <= worst:
             break
-        if start >= MAX_EXACT:  # the bound of what is left does as well
+        if start >= MAX_EXACT:  # the bound of the remaining elements is close enough
             worst, element = float(bound[part[0]]), int(part[0])
             break
         value = exact(part)
@@ -178,6 +178,6 @@ def _different(X: Array, conn: Index, bound: Array) -> NDArray[np.intp]:
     _, first, lot = np.unique(key, return_index=True, return_inverse=True)
     kept = np.zeros(len(conn), dtype=bool)
     kept[first] = True
-    for part in chunks(len(conn), CHUNK):  # lots that only have a key in common are told apart
+    for part in chunks(len(conn), CHUNK):  # groups that agree in the key alone are separated
         kept[part] |= (digits(part) != digits(first[lot[part]])).any(axis=1)
     return np.flatnonzero(kept)
