@@ -163,7 +163,7 @@ def test_what_is_not_registered_is_refused():
     class Softer(Voce):
         pass
 
-    with pytest.raises(RequestError, match="give an Elastic or a J2Bilinear or a Voce, no class made of them"):
+    with pytest.raises(RequestError, match=r"give an Elastic or a J2Bilinear or a Voce, or one .* listed in MATERIALS"):
         bars(own=Softer(**vars(VOCE)))
 
 

@@ -142,7 +142,7 @@ class Folder:
                 folder.mkdir()
             except FileExistsError as error:
                 if folder.is_symlink() and not folder.exists():
-                    remedy = f"{folder} is a link to nowhere; name another folder"
+                    remedy = f"{folder} is a link to a folder that does not exist; name another folder"
                     raise bad_value("out", str(self.path), remedy) from error
             except FileNotFoundError:
                 raise

@@ -127,7 +127,7 @@ def texts(owner: str, /, **values: str) -> None:
     kinds(owner, str, "give a text", **values)
     for name, value in values.items():
         if not value.isascii() and value != value.encode(errors="replace").decode():  # half of a character
-            raise bad_value(f"{owner}.{name}", value, "give a text of whole characters")
+            raise bad_value(f"{owner}.{name}", value, "give a text that UTF-8 can encode")
 
 
 def members(owner: str, kind: type, /, **values: Sequence[object]) -> None:

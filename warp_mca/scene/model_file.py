@@ -149,7 +149,7 @@ def _check_unpacked(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())
     if unpacked > max(SMALL, DENSEST * packed):
-        remedy = f"it would unpack to {unpacked / 1e9:.2g} GB, {unpacked / packed:.0f} times its size, as no mesh does"
+        remedy = f"it would unpack to {unpacked / 1e9:.2g} GB, {unpacked / packed:.0f} times its size, unlike meshes"
         raise bad_value("model file", str(path), f"{remedy}; make it again with warp-mca build")
     free = _free_memory()
     if unpacked > free:
