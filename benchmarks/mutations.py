@@ -20,7 +20,8 @@ from pathlib import Path
 
 from warp_mca.verify import cases
 from warp_mca.verify.case import Case
-from warp_mca.verify.mutations import MUTATIONS, Mutation
+from warp_mca.verify.mutation import Mutation
+from warp_mca.verify.mutations import MUTATIONS
 
 ROOT = Path(__file__).parent.parent
 STORE = ROOT / "docs" / "mutations.json"

@@ -126,3 +126,26 @@ def test_the_page_says_of_each_array_of_the_state_what_its_docstring_says():
     ]
     assert len(rows) > 20
     assert table("State") == rows
+
+
+FOLDERS = ["", "warp_mca/", *(f"kernels/{name}/" for name in ("elements", "materials", "contact"))]
+
+
+def test_files_that_contributors_are_sent_to_exist():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w./]+(?:\.py|\.md|\.toml|/))`|\]\(([^):]+)\)", text))
+    paths = {path for pair in named for path in pair if path}
+    assert len(paths) > 30
+    assert [path for path in paths if not any((ROOT / folder / path).exists() for folder in FOLDERS)] == []
+
+
+def test_tables_that_contributors_are_sent_to_hold_what_the_package_has():
+    """Each of the five tasks names a table of the code, in the file that it gives, and a test that exists."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (material|element|contact law|joint|recorder) \|(.*)\|$", text, flags=re.M)
+    assert len(rows) == 5
+    for name, row in rows:
+        _, line, test = row.split("|")
+        ((constant, path),) = re.findall(r"`([A-Z_]+)` in `([\w/.]+)`", line)
+        assert re.search(rf"^{constant}\b.*= \{{", (ROOT / path).read_text(encoding="utf-8"), flags=re.M), name
+        assert all((ROOT / file).exists() for file in re.findall(r"`(tests/\w+\.py)`", test))

@@ -11,7 +11,7 @@ import warp_mca as mca
 from warp_mca.geometry.boundary import boundary_faces
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import tetrahedral
-from warp_mca.verify.elements import mixed_cube
+from warp_mca.verify.small_meshes import mixed_cube
 
 
 def meshes() -> dict[str, mca.Mesh]:

@@ -186,7 +186,7 @@ def test_a_folder_under_the_name_of_a_result_is_refused(tmp_path: Path):
     with pytest.raises(RequestError, match=r"out = .*: forces\.png is a folder there"):
         save(result(1), tmp_path, force=True)
     (tmp_path / "link").symlink_to("nowhere")
-    with pytest.raises(RequestError, match="link is a link to nowhere"):
+    with pytest.raises(RequestError, match="link is a link to a folder that does not exist"):
         save(result(1), tmp_path / "link")
 
 

@@ -16,7 +16,7 @@ from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.quality import check, edge_lengths, gauss_jacobians, scaled_jacobian, volumes
-from warp_mca.verify.elements import patch
+from warp_mca.verify.small_meshes import patch
 
 
 def has_node(mesh: Mesh, place: tuple[float, float, float], tolerance: float = 0.0) -> bool:

@@ -207,9 +207,9 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
 
     monkeypatch.setattr("warp_mca.solve.node_stage.EARLY_ROUNDS", 0)
     model, case = assemble(element, 90_000), {"elastic": Case(), "flows": Case(0.3), "everything": FULL}[name]
-    overlap, changed, states = solver.overlap, [], []
-    for change in (lambda graph: changed.append(overlap(graph)), lambda graph: None):
-        monkeypatch.setattr(solver, "overlap", change)
+    own, changed, states = solver.launch_early, [], []
+    for change in (lambda graph: changed.append(own(graph)), lambda graph: None):
+        monkeypatch.setattr(solver, "launch_early", change)
         held = Held(model, case, "cuda:0", precision)
         if name == "elastic":
             early = node.integrate_kernel(precision, False, False, False, False, True)

@@ -10,11 +10,11 @@ import warp as wp
 
 from warp_mca.kernels.contact import contact, sides
 from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
-from warp_mca.kernels.hardware.overlap import EARLY, MIN_ARCH
+from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import constraint, node
 from warp_mca.scene.materials import Elastic, J2Bilinear
 from warp_mca.solve import early_launch as module
-from warp_mca.solve.early_launch import overlap
+from warp_mca.solve.early_launch import launch_early
 
 KERNELS = Path(node.__file__).parents[1]
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
@@ -94,7 +94,7 @@ class Driver:
 
 
 def changed(monkeypatch, arch=MIN_ARCH, driver=(13, 0)):
-    """Edges that `overlap` asks the driver to change, in a graph of two steps with a copy behind the first."""
+    """Edges that `launch_early` asks the driver to change, in a graph of two steps with a copy behind the first."""
     patches = VARIANTS["hex8_patch_force"][0].key
     keys = [patch.schedule.key, patches, patches, VARIANTS["integrate"][0].key, None, patches]
     names = [key and f"{key}_1a2b3c4d_cuda_kernel_forward" for key in keys]
@@ -102,7 +102,7 @@ def changed(monkeypatch, arch=MIN_ARCH, driver=(13, 0)):
     monkeypatch.setattr(module, "_call", fake)
     monkeypatch.setattr(wp, "get_cuda_driver_version", lambda: driver)
     device = SimpleNamespace(is_cuda=True, get_cuda_compile_arch=lambda: arch)
-    assert overlap(SimpleNamespace(device=device, graph=ctypes.c_void_p(1))) == (2 if fake.changes else 0)
+    assert launch_early(SimpleNamespace(device=device, graph=ctypes.c_void_p(1))) == (2 if fake.changes else 0)
     return fake.changes
 
 
@@ -121,4 +121,4 @@ def test_graph_of_a_cpu_stays_as_it_is():
     values = wp.zeros(1, dtype=float, device="cpu")
     with wp.ScopedDevice("cpu"), wp.ScopedCapture() as capture:
         values.fill_(1.0)
-    assert overlap(capture.graph) == 0
+    assert launch_early(capture.graph) == 0

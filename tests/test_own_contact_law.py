@@ -153,7 +153,10 @@ def test_a_model_file_holds_the_law(registered: None, tmp_path):
 
 
 def test_what_is_not_registered_is_refused():
-    with pytest.raises(mca.RequestError, match=r"^Contact.law = 'Stiffening': give a Penalty, no class made of them"):
+    with pytest.raises(
+        mca.RequestError,
+        match=r"^Contact.law = 'Stiffening': give a Penalty; other classes must be listed in CONTACT_LAWS",
+    ):
         block(Stiffening(g_0=1e-5))
 
 

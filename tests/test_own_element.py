@@ -19,8 +19,8 @@ from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.model.assembly import body_cells
 from warp_mca.recorders import UsdFile, VtkHdfFile
 from warp_mca.solve.output import NodalStress
-from warp_mca.verify.elements import mixed_cube
 from warp_mca.verify.runner import verify
+from warp_mca.verify.small_meshes import mixed_cube
 
 SOFT = mca.Elastic(E=70e9, nu=0.0, rho=2700.0)
 NAME = LinearTet.name

@@ -16,7 +16,7 @@ from test_elements import held_of
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.kernels.elements import hex8_patch, hex8r_patch
-from warp_mca.kernels.hardware.overlap import MIN_ARCH
+from warp_mca.kernels.hardware.early_launch import MIN_ARCH
 from warp_mca.recorders.colours import ColourScale
 from warp_mca.scene import model_file as scene_file
 from warp_mca.scene.materials import MATERIALS
@@ -163,7 +163,7 @@ def test_what_is_not_registered_is_refused():
     class Softer(Voce):
         pass
 
-    with pytest.raises(RequestError, match="give an Elastic or a J2Bilinear or a Voce, no class made of them"):
+    with pytest.raises(RequestError, match=r"give an Elastic or a J2Bilinear or a Voce, or one .* listed in MATERIALS"):
         bars(own=Softer(**vars(VOCE)))
 
 

@@ -12,7 +12,7 @@ from warp_mca.base.errors import RequestError
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.model.model import build_model
 from warp_mca.results.paths import Probes, locate
-from warp_mca.verify.elements import mixed_cube
+from warp_mca.verify.small_meshes import mixed_cube
 
 STEEL = mca.Elastic(E=2e11, nu=0.3, rho=7850.0)
 

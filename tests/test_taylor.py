@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.taylor_axisymmetric import LAWS, bar
 from warp_mca.verify import Setup
-from warp_mca.verify.impact import mushroom
+from warp_mca.verify.taylor import mushroom
 
 
 @pytest.fixture(scope="module")

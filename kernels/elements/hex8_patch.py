@@ -24,7 +24,7 @@ from warp_mca.kernels.elements.patch import (
     from_start,
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
-from warp_mca.kernels.hardware.overlap import begins_early
+from warp_mca.kernels.hardware.early_launch import begins_early
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,

@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.overlap import let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.early_launch import let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.shared_memory import (
     HEADS,
     barrier,

@@ -14,7 +14,7 @@ from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.kinematics import kinematics
 from warp_mca.kernels.elements.patterns import mean_frame
 from warp_mca.kernels.elements.point_records import history_functions, stress_function
-from warp_mca.kernels.hardware.overlap import begins_early, wait_for_previous
+from warp_mca.kernels.hardware.early_launch import begins_early, wait_for_previous
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions

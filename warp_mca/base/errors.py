@@ -1,4 +1,4 @@
-"""Owns the two ways in which a request or a run can fail, and the exit status of each."""
+"""Owns the errors: a request that cannot be carried out, a run stopped by a guard; and the exit status of each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def bad_value(field: str, value: object, remedy: str) -> RequestError:
 
 
 def _shown(value: object) -> str:
-    """The value as a message shows it: in one line, cut where it is long."""
+    """The value as a message shows it: on one line, shortened if it is long."""
     try:
         text = repr(value)
     except Exception:  # Python refuses to print integers of many digits; a user's own class may fail too

@@ -1,4 +1,4 @@
-"""Owns what users give as paths: whether one is a path, and can be written."""
+"""Owns the checks of paths that users give: whether the value is a path, and whether it can be written."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from warp_mca.base.validate import brief
 
 
 def given_path(field: str, value: object, remedy: str) -> Path:
-    """What the user named `field` as a path; an empty name would be the folder that one is in.
+    """The user's value of `field` as a path; an empty name is refused, because it would mean the working directory.
 
     Raises:
         RequestError: it is no path.
@@ -41,13 +41,13 @@ def check_folder(field: str, path: Path) -> None:
     """
     try:
         existing = nearest(path)
-    except FileNotFoundError:  # the working directory is gone, which is no fault of the name
+    except FileNotFoundError:  # the working directory was deleted; the name is not at fault
         raise
-    except OSError as error:  # as of a name that is too long
+    except OSError as error:  # for example, the name is too long
         raise bad_value(field, str(path), f"{error.strerror or error}; name another") from error
     if not existing.is_dir():
         raise bad_value(field, str(path), f"{existing} is not a folder; name another")
-    try:  # root may write to folders that take no file all the same
+    try:  # for root, access() allows folders that refuse files nevertheless
         tempfile.TemporaryDirectory(prefix=".warp_mca-", dir=existing).cleanup()
     except OSError as error:
         what = f"{existing} cannot be written to ({error.strerror or error}); name another"
@@ -55,7 +55,7 @@ def check_folder(field: str, path: Path) -> None:
 
 
 def write_atomically(target: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let `write` fill a file, whole or not at all; an older one is replaced.
+    """Write a file by `write` completely or not at all; an older file is replaced.
 
     Raises:
         OSError: the file cannot be written.

@@ -16,7 +16,7 @@ from warp_mca.base.errors import bad_value
 
 STAGING = ".warp_mca-"  # prefix of the hidden folders in which results are written first
 LONGEST_SAVE = 3600.0  # older hidden folders are leftovers of killed processes [s]
-ATTEMPTS = 100  # to open a folder that other runs keep removing
+ATTEMPTS = 100  # attempts to open a folder that other runs may remove
 
 
 class Folder:
@@ -118,7 +118,7 @@ class Folder:
                 descriptor = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
             except FileNotFoundError:  # another run removed it between the two calls
                 continue
-            except PermissionError:  # it may be written to, but not read
+            except PermissionError:  # the folder is writable but not readable
                 return
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -142,7 +142,7 @@ class Folder:
                 folder.mkdir()
             except FileExistsError as error:
                 if folder.is_symlink() and not folder.exists():
-                    remedy = f"{folder} is a link to nowhere; name another folder"
+                    remedy = f"{folder} is a link to a folder that does not exist; name another folder"
                     raise bad_value("out", str(self.path), remedy) from error
             except FileNotFoundError:
                 raise
@@ -181,7 +181,7 @@ def held(path: Path) -> Iterator[Folder]:
 
 
 def _clear(path: Path) -> None:
-    """Remove hidden folders that runs left which were killed while they saved."""
+    """Remove hidden folders left by runs that were killed while they saved."""
     for folder in path.glob(f"{STAGING}*"):
         with suppress(OSError):
             if time.time() - folder.stat().st_mtime > LONGEST_SAVE:

@@ -1,4 +1,4 @@
-"""Owns the process's standard streams, and how what the system refuses is told."""
+"""Owns the process's standard streams, and the messages about errors of the system."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import suppress
 
 
 def what_failed(error: OSError) -> str:
-    """One sentence of what the system refused."""
+    """The system's error in one sentence."""
     what = error.strerror or str(error)
     if error.filename is None and isinstance(error, FileNotFoundError):
         return "the working directory is gone: change to one that exists"
@@ -20,12 +20,12 @@ def what_failed(error: OSError) -> str:
 
 
 def open_streams() -> None:
-    """Files would take the numbers of standard streams that are closed; a name may hold what they cannot print."""
+    """Reopen closed standard streams, whose descriptors files would take; replace characters that they cannot print."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free descriptor
             setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -33,7 +33,7 @@ def open_streams() -> None:
 
 
 def drop_output() -> None:
-    """Leave nothing that Python would try to print once more at its end."""
+    """Redirect standard output to the null device, so that Python does not flush it again at exit."""
     with suppress(OSError, ValueError, AttributeError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())

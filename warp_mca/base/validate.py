@@ -1,4 +1,4 @@
-"""Owns the checks of what users give: values of scenes, recipes and runs, code of their own, damaged files."""
+"""Owns the checks of user input: values of scenes, recipes and runs, results of user code, damaged files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ MAX_COUNT = 1_000_000_000  # upper limit of every count that users give; memory 
 
 
 def plain(item: Any) -> None:
-    """Turn the numbers and sequences among a dataclass's values into Python's own: float, int, bool and tuple.
+    """Convert numbers and sequences in the fields of a dataclass to Python's float, int, bool and tuple.
 
     NumPy arrays, lists and fractions then compare, hash and print like the numbers that they stand for. A number stays
     an int only in a field whose annotation says int. All other values stay as they are, for the checks that follow.
@@ -127,7 +127,7 @@ def texts(owner: str, /, **values: str) -> None:
     kinds(owner, str, "give a text", **values)
     for name, value in values.items():
         if not value.isascii() and value != value.encode(errors="replace").decode():  # half of a character
-            raise bad_value(f"{owner}.{name}", value, "give a text of whole characters")
+            raise bad_value(f"{owner}.{name}", value, "give a text that UTF-8 can encode")
 
 
 def members(owner: str, kind: type, /, **values: Sequence[object]) -> None:
@@ -150,7 +150,7 @@ def brief(value: object) -> object:
 
 
 def call(field: str, value: object, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    """What a user's function returns.
+    """Call a user's function and return its result.
 
     Args:
         field, value: that the function belongs to, for the message.
@@ -164,7 +164,7 @@ def call(field: str, value: object, what: str, function: Callable[..., Any], *ar
         found = function(*args, **kwargs)
     except McaError:
         raise
-    except (Exception, SystemExit) as error:  # whatever a user's code raises; not status 0
+    except (Exception, SystemExit) as error:  # user code may raise anything, SystemExit included
         line = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(line.filename).name}, line {line.lineno}"
         words = " ".join(f"{type(error).__name__}: {error}".split())

@@ -24,7 +24,7 @@ _LOW, _HIGH = ([np.flatnonzero(_SIDE[:, axis] == side) for axis in range(3)] for
 _EDGES = [
     [(a, b) if side[a] < side[b] else (b, a) for a, b in HEXAHEDRON.edges if side[a] != side[b]] for side in _SIDE.T
 ]
-FINEST = 1e-8  # smallest edge of a cell [extent of all blocks]
+FINEST = 1e-8  # smallest edge of a cell, as a share of the extent of all blocks
 _LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
 _one_at_a_time = threading.Lock()  # gmsh keeps one global state
 
@@ -222,7 +222,7 @@ def _outwards(points: np.ndarray, hexahedra: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _signals_kept() -> Iterator[None]:
-    """Whoever handles signals still does afterwards: gmsh's start resets SIGTERM and others behind Python's back.
+    """Restore signal handlers: gmsh resets SIGTERM and others when it starts, and Python is not told.
 
     In C, because Python takes signals in the main thread only, and knows no handler of a library.
     """
@@ -239,7 +239,7 @@ def _signals_kept() -> Iterator[None]:
 
 @contextmanager
 def _gmsh() -> Iterator[ModuleType]:
-    """A silent gmsh with an empty model of our own; a session that the caller had open is left as it was."""
+    """gmsh without output and with an empty model; a session that the caller has open is not changed."""
     try:
         import gmsh
     except ImportError as error:

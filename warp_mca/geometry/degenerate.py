@@ -35,7 +35,7 @@ def stored(points: NDArray[np.float64], cells: Cells, name: str) -> Cells:
 def cell_names(nodes: NDArray[np.integer]) -> NDArray[np.str_]:
     """Type of each cell, shape (cell_count,), out of CELL_TYPES.
 
-    A hexahedron that collapsed in another way than a wedge or a pyramid is stored stays a hexahedron.
+    A hexahedron collapsed in any other way than a stored wedge or pyramid counts as a hexahedron.
 
     Args:
         nodes: of each cell, shape (cell_count, MAX_CORNERS), -1 beyond its last corner.

@@ -15,8 +15,8 @@ from warp_mca.geometry.hexahedron import shape_functions
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
-CANDIDATES = 64  # cells near a point that are tried: long thin ones have their centres far away
-OUTSIDE = 0.05  # of a cell's diagonal that a point may lie outside: curved surfaces have flat faces
+CANDIDATES = 64  # candidate cells for each point: the centres of long thin cells are far away
+OUTSIDE = 0.05  # share of a cell's diagonal by which a point may lie outside: faces on curved surfaces are flat
 
 # For each point: nodes of its cell, shape (point_count, MAX_CORNERS), int32; shape functions there [-], of that shape;
 # distance between point and cell [m], and the largest distance at which the point still counts as inside [m], both

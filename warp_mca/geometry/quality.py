@@ -79,7 +79,7 @@ def doubled_nodes(mesh: Mesh) -> int:
 
 
 def check(mesh: Mesh, name: str) -> None:
-    """Refuses a mesh that is not whole, or that has an inverted cell.
+    """Raise RequestError for a mesh that is incomplete or has an inverted cell.
 
     Hexahedra are judged where they are integrated: a corner may be folded over a little, as in patch tests.
 
@@ -102,7 +102,7 @@ def check(mesh: Mesh, name: str) -> None:
 
 
 def check_whole(mesh: Mesh, name: str) -> None:
-    """Refuses arrays that make no mesh: they fail deep inside a run, or count mass and stiffness twice.
+    """Raise RequestError for arrays that do not make a mesh: they would fail later, or count mass and stiffness twice.
 
     Args:
         mesh: the mesh of one body.
@@ -170,7 +170,7 @@ def _repeated(nodes: NDArray) -> tuple[int, int] | None:
     """The first two cells with the same corners, in whichever order."""
     if not len(nodes):
         return None
-    # Sums of random words know no order of corners, and are as good as distinct without sorting every row.
+    # Sums of random words do not depend on the order of corners, and differ almost surely; rows need no sorting.
     word = np.random.default_rng(1).integers(0, 2**64, int(nodes.max()) + 1, dtype=np.uint64)
     key = np.zeros(len(nodes), dtype=np.uint64)
     for corner in nodes.T:

@@ -11,7 +11,7 @@ import numpy as np
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 
-LIMIT = 200_000_000  # elements: more fit no machine that this runs on
+LIMIT = 200_000_000  # elements; more exceed the memory of any machine
 
 
 class Recipe(Protocol):
@@ -32,4 +32,4 @@ def check_size(owner: str, divisions: Iterable[tuple[int, int, int]], /, **count
     """
     if sum(math.prod(map(int, block)) for block in divisions) > LIMIT:
         name = max(counts, key=lambda name: np.max(counts[name]))
-        raise bad_value(f"{owner}.{name}", counts[name], f"more than {LIMIT:,} elements follow from it; give less")
+        raise bad_value(f"{owner}.{name}", counts[name], f"more than {LIMIT:,} elements would result; lower it")

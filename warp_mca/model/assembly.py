@@ -1,4 +1,4 @@
-"""Owns the way from a scene's meshes to flat arrays: elements by formulation, materials, masses, blocks."""
+"""Owns the assembly of a scene's meshes into flat arrays: elements by formulation, materials, masses, blocks."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from warp_mca.scene.materials import Material
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
-GROUND = -1  # in place of a node where there is none
-NEAR = 0.05  # share of a body's extent that a point of it may lie off it
+GROUND = -1  # stands for the ground, or for no node
+NEAR = 0.05  # distance from a body at which a point may lie, as a share of the body's extent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class Block:
 
     @property
     def kind(self) -> tuple[bool, str, str, bool]:
-        """What tells it from other blocks: not plastic, law, element, finite. Blocks of a model stand in this order."""
+        """Key of the block: (not plastic, law, element, finite). Blocks of a model are sorted by it."""
         return not self.plastic, self.law, self.element, self.finite
 
 

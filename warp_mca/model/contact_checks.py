@@ -20,7 +20,7 @@ FACING = 0.1  # cosine between a face's normal and the direction of approach fro
 
 
 def check_spacing(contact: Contact, X: Array, V: Array, slave: Faces, master: Faces | None) -> None:
-    """Refuse a contact whose bodies can pass between the slave's nodes, since only nodes are kept out.
+    """Raise RequestError if bodies can pass between slave nodes: only nodes are kept out of the master.
 
     Args:
         contact: of the scene.

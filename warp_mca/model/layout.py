@@ -1,4 +1,4 @@
-"""Owns where each scene of a batch lies in the arrays of a model; a lone scene is the only one of its own."""
+"""Owns where each scene of a batch lies in the arrays of a model; a single scene fills them."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ class Layout:
 
 
 def offsets(counts: list[int]) -> Index:
-    """First entry of each scene, and the number of all, from the number that each has."""
+    """First entry of each scene and the total, from the count of each scene."""
     return np.cumsum([0, *counts]).astype(np.int32)
 
 
 def layout_of(model: Model) -> Layout:
-    """That of a batch, or of the lone scene of a model."""
+    """The layout of a batch, or of a model of one scene."""
     if model.batch is not None:
         return model.batch
     ends = [[block.first, block.first + block.conn.shape[1]] for block in model.blocks]

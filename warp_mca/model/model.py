@@ -1,4 +1,4 @@
-"""Owns `Model`: a scene, its meshes and its initial motion turned into flat arrays that never change."""
+"""Owns `Model`: a scene, its meshes and its initial motion as flat arrays that never change."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
     return mean if np.linalg.norm(mean) > CLOSED * master.area[touched].sum() else np.array([0.0, 1.0, 0.0])
 
 
-@np.errstate(over="ignore", invalid="ignore")  # `stable_step` refuses what is not finite
+@np.errstate(over="ignore", invalid="ignore")  # `stable_step` raises for values that are not finite
 def build_model(
     scene: Scene,
     meshes: Mapping[str, Mesh],

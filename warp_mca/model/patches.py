@@ -21,7 +21,7 @@ SLOT_BITS, MATERIAL_BITS = 9, 14
 SECOND_SLOT = SLOT_BITS + MATERIAL_BITS
 GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners just fit 32
 LARGEST = 128.0  # extent of a patch over that of its smallest element, where the grid rounds 4 times as much as float32
-SORT_CHUNK = 1 << 13  # elements that are sorted at a time, where parts are smaller
+SORT_CHUNK = 1 << 13  # elements sorted in one batch, where parts are smaller than this
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -58,7 +58,7 @@ def compact_order(X: Array, conn: Index, size: int) -> Index:
                 _cut(box, order, begin[alike[lot]], int(length), int(half[alike[0]]))
         begin, end = np.stack([begin, begin + half]).ravel(), np.stack([begin + half, end]).ravel()
     full = count // size * size
-    order[:full].reshape(-1, size).sort(axis=1)  # neighbours stay neighbours: threads read what lies side by side
+    order[:full].reshape(-1, size).sort(axis=1)  # adjacent elements stay adjacent: contiguous memory
     order[full:].sort()
     return order
 
@@ -118,7 +118,7 @@ class Patches:
     places: NDArray[np.uint8]
 
     def heads(self, exponent: Index) -> Index:
-        """What a block of threads must know of a patch, shape (patch_count, 4), int32.
+        """Header of each patch for its block of threads, shape (patch_count, 4), int32.
 
         First element, first slot, (slots << 16) + (exponent << 8) + elements, and number.
 

@@ -1,4 +1,4 @@
-"""Owns the range of numbers of mixed precision: elements and moduli that float32 cannot compute with are refused."""
+"""Owns the number range of mixed precision: elements and moduli outside the range of float32 are refused."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REMEDY = "choose --precision float64 (precision='float64'), or other units"
 
 
 def check_range(model: Model, precision: str) -> None:
-    """Refuse what mixed precision cannot compute with.
+    """Raise RequestError for sizes and moduli that mixed precision cannot represent.
 
     Args:
         model: of one scene.

@@ -1,8 +1,9 @@
-"""Owns the stable time step: the largest eigenvalue of any element, contact springs counted in."""
+"""Owns the stable time step: the largest eigenvalue of any element, contact springs included."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,9 @@ MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem
 # holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
 BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9
 KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
+
+
+Part = NDArray[np.intp]  # indices of some elements
 
 
 @dataclass(frozen=True)
@@ -64,14 +68,14 @@ def stable_step(
         RequestError: a bound is not finite.
     """
 
-    def exact(part: NDArray[np.intp]) -> Array:
+    def exact(part: Part) -> Array:
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is refused
+            with np.errstate(over="ignore", invalid="ignore"):  # values that are not numbers are refused
                 return formulation.largest_eigenvalues(X[conn[part]], K[part], G[part], mass[part]) + contact[part]
         except np.linalg.LinAlgError as error:
             raise _out_of_range(int(index[part[0]]), float(bound.max())) from error
 
-    def bounds(part: NDArray[np.intp] | slice, coarse: bool) -> Array:
+    def bounds(part: Part | slice, coarse: bool) -> Array:
         return formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse) + contact[part]
 
     bound = np.empty(len(conn))
@@ -80,27 +84,7 @@ def stable_step(
     if not np.isfinite(bound).all():
         raise _out_of_range(int(index[np.argmin(np.isfinite(bound))]), float(bound.max()))
     usual = float(np.median(bound))
-    first = _greatest(bound, BATCH)
-    value = exact(first)
-    worst, element = float(value.max()), int(first[value.argmax()])
-    bound[first] = 0.0
-    left = np.flatnonzero(bound > worst)
-    if len(left) > MAX_EXACT:
-        left = left[_different(X, conn[left], bound[left])]
-    for part in chunks(len(left), CHUNK):
-        bound[left[part]] = bounds(left[part], False)
-    left = left[bound[left] > worst]
-    left = left[np.argsort(-bound[left], kind="stable")]
-    for start in range(0, len(left), BATCH):
-        part = left[start : start + BATCH]
-        if bound[part[0]] <= worst:
-            break
-        if start >= MAX_EXACT:  # the bound of what is left does as well
-            worst, element = float(bound[part[0]]), int(part[0])
-            break
-        value = exact(part)
-        if value.max() > worst:
-            worst, element = float(value.max()), int(part[value.argmax()])
+    worst, element = _worst(bound, exact, bounds, lambda part: part[_different(X, conn[part], bound[part])])
     own = worst - float(contact[element])
     stiff = np.flatnonzero(_switching(contact, 1.0) > worst)
     if len(stiff):
@@ -115,6 +99,44 @@ def stable_step(
         contact_share=1.0 - own / worst,
         shortened=math.sqrt(own / usual),
     )
+
+
+def _worst(
+    bound: Array,
+    exact: Callable[[Part], Array],
+    bounds: Callable[[Part, bool], Array],
+    different: Callable[[Part], Part],
+) -> tuple[float, int]:
+    """Largest eigenvalue of any element [1/s^2], and that element.
+
+    Args:
+        bound: coarse upper bound of each [1/s^2], shape (element_count,), float64; closer ones replace them.
+        exact: exact eigenvalues of some elements.
+        bounds: coarse or closer bounds of some elements.
+        different: those of some elements that are not alike.
+    """
+    first = _greatest(bound, BATCH)
+    value = exact(first)
+    worst, element = float(value.max()), int(first[value.argmax()])
+    bound[first] = 0.0
+    left = np.flatnonzero(bound > worst)
+    if len(left) > MAX_EXACT:
+        left = different(left)
+    for part in chunks(len(left), CHUNK):
+        bound[left[part]] = bounds(left[part], False)
+    left = left[bound[left] > worst]
+    left = left[np.argsort(-bound[left], kind="stable")]
+    for start in range(0, len(left), BATCH):
+        part = left[start : start + BATCH]
+        if bound[part[0]] <= worst:
+            break
+        if start >= MAX_EXACT:  # the bound of the remaining elements is close enough
+            worst, element = float(bound[part[0]]), int(part[0])
+            break
+        value = exact(part)
+        if value.max() > worst:
+            worst, element = float(value.max()), int(part[value.argmax()])
+    return worst, element
 
 
 def _out_of_range(element: int, bound: float) -> RequestError:
@@ -156,6 +178,6 @@ def _different(X: Array, conn: Index, bound: Array) -> NDArray[np.intp]:
     _, first, lot = np.unique(key, return_index=True, return_inverse=True)
     kept = np.zeros(len(conn), dtype=bool)
     kept[first] = True
-    for part in chunks(len(conn), CHUNK):  # lots that only have a key in common are told apart
+    for part in chunks(len(conn), CHUNK):  # groups that agree in the key alone are separated
         kept[part] |= (digits(part) != digits(first[lot[part]])).any(axis=1)
     return np.flatnonzero(kept)

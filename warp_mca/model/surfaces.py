@@ -15,7 +15,7 @@ from warp_mca.scene import Contact, RigidPlane
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
-SEARCH_MARGIN = 0.25  # of the smallest face: how far a slave looks for faces beyond those that it touches
+SEARCH_MARGIN = 0.25  # margin of the search for faces, as a share of the edge of the smallest face
 LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
 LONGEST_LIST = 4096  # slave nodes near a face at most
 # Default spring stiffness over E* A^2 / V, with E* = E / (1 - nu^2): at nu = 0.3 as penalty = 1 and 5. Few nodes carry

@@ -1,4 +1,4 @@
-"""Owns the way of frames from the device to the recorders: these work on one while the device computes the next."""
+"""Owns the transfer of frames to the recorders, which work on one while the device computes the next."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ class Recording:
             self._call(recorder, lambda recorder=recorder: recorder.history(rows))
 
     def finish(self, ok: bool) -> None:
-        """Pass on what is under way, and close the recorders."""
+        """Pass on the frames that are still being copied, and close the recorders."""
         while ok and self.transfer and self.transfer.pending:
             self._deliver(self.transfer)
         for recorder, _ in list(self.rows):
@@ -193,7 +193,7 @@ class Recording:
                 self.taken[id(recorder)] = index + 1
 
     def _call(self, recorder: Recorder, act: Callable[[], None]) -> None:
-        """Let a recorder act; one that fails is closed and left out from then on."""
+        """Call a recorder; one that fails is closed and not called again."""
         try:
             act()
         except (Exception, SystemExit) as error:

@@ -147,7 +147,7 @@ def _mesh(
 
 
 def _write(path: Path, mesh: meshio.Mesh) -> None:
-    """Let meshio write, without what it prints."""
+    """Let meshio write, and suppress what it prints."""
     with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
         _load_meshio().write(path, mesh, file_format=_format(path))
 
@@ -172,7 +172,7 @@ def _try(path: Path) -> tuple[list[str], list[str]]:
             if [block.type for block in read.cells] != [HEXAHEDRON.meshio] or (read.cells[0].data != nodes).any():
                 raise ValueError("they do not come back")
             parts = [part.name for part in trial.parent.iterdir()]
-        except (Exception, SystemExit) as error:  # its writers and readers raise whatever went wrong, or exit
+        except (Exception, SystemExit) as error:  # meshio's writers and readers raise any exception, or exit
             why = " ".join(str(error).split())
             raise bad_value(
                 "final", str(path), f"meshio cannot write 8-node hexahedra in this format ({why}); {USUAL}"

@@ -1,4 +1,4 @@
-"""Owns the interface of recorders: what they are told before a run, one frame of it, and when they want one."""
+"""Owns the interface of recorders: facts given before a run, frames, and when frames are taken."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Float = NDArray[np.float32]
 Index = NDArray[np.int32]
 
-DISK_RESERVE = 64 << 20  # that recorders leave free on a disk, for the results [byte]
+DISK_RESERVE = 64 << 20  # disk space that recorders leave free for the results [byte]
 # What a frame can hold. Only what a recorder of the run asks for is computed and copied.
 SURFACE, CONTACT, PATHS, VOLUME = NEEDS = "surface", "contact", "paths", "volume"
 
@@ -222,7 +222,7 @@ class Recorder(Protocol):
 
 
 def apart(names: Iterable[str]) -> list[str]:
-    """The names, each with as many underscores behind it as keep it apart from those before."""
+    """The names, made unique by underscores appended to repeated ones."""
     found: list[str] = []
     for name in names:
         while name in found:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
     from warp_mca.recorders.rerun_viewer import Viewer
 
-FLUSH_EVERY = 4  # frames: what a killed run may lack
+FLUSH_EVERY = 4  # frames between flushes: as many may be lost when a run is killed
 CLOSE_TIMEOUT = 10.0  # of the file at the end [s]
 END = b"RRF2FOOT"  # 12 bytes before the end of a whole file
 FRAMES = Cadence(frames=100)
@@ -288,7 +288,7 @@ def entity(*parts: str) -> str:
 
 
 def _whole(path: Path) -> bool:
-    """Whether a recording ends with its table of contents."""
+    """Whether a recording is complete: it then ends with its table of contents."""
     with suppress(OSError), path.open("rb") as file:
         file.seek(-12, os.SEEK_END)
         return file.read(len(END)) == END

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
 LOOPBACK = "127.0.0.1"
-START_TIMEOUT = 30.0  # that a viewer may take to open [s]
-FLUSH_TIMEOUT = 10.0  # that it may take to receive what is left at the end [s]
-BACKLOG = 256 << 20  # that may be under way to it [byte]
+START_TIMEOUT = 30.0  # time limit for the viewer to open [s]
+FLUSH_TIMEOUT = 10.0  # time limit for the viewer to receive the rest at the end [s]
+BACKLOG = 256 << 20  # largest amount of data not yet received by the viewer [byte]
 SUFFIX = ".rrd"
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
 FRAMES = Cadence(frames=100)
-SAVE_EVERY = 5  # frames: what a killed run may lack; a save costs more than a frame
+SAVE_EVERY = 5  # frames between saves: as many may be lost when a run is killed; a save costs more than a frame
 PLAYBACK = 24.0  # frames shown in a second
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
 POINT_SIZE = 0.004  # of contact points, as a share of the scene

@@ -116,7 +116,7 @@ class VtkHdfFile:
         if self._file is None:
             return
         try:
-            self._publish(self._file, self.frame_count)  # undoes a frame that was interrupted
+            self._publish(self._file, self.frame_count)  # discards a frame whose writing was interrupted
             self._file.close()
             self._file = None
         except (OSError, RuntimeError) as error:
@@ -132,7 +132,7 @@ class VtkHdfFile:
         for name in FIELDS:
             self._places[name][place] = fields[name]
         self._places["step"][self.frame_count] = step
-        file.flush()  # a frame is in the file before the number of steps speaks of it
+        file.flush()  # the frame is written before the number of steps counts it
         self._publish(file, self.frame_count + 1, time)
         if self.frame_count == 0:
             self._unborn.replace(self.path)

@@ -93,7 +93,7 @@ def print_quality(quality: Quality) -> None:
 
 
 def print_summary(result: Result, files: Sequence[str]) -> None:
-    """The figures of a run that one looks at first, its warnings, and the files written."""
+    """The main figures of a run, its warnings, and the files written."""
     out = console()
     table = Table.grid(padding=(0, 2, 0, 0))
     for label, text in _figures(result.summary):

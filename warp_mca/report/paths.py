@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-INSTANTS = 6  # curves in paths.png when none are named
+INSTANTS = 6  # number of curves in paths.png by default
 PASSAGES = 2.5  # of the slowest wave along a path, that waves.png shows
 NEAR = 0.05  # share of a path that does not set the height of paths.png
 DECADES = 3.0  # of stress in waves.png: the first wave is weak

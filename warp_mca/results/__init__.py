@@ -1,1 +1,1 @@
-"""Owns what a run leaves behind: results, histories of forces and paths, files."""
+"""Owns the outcome of a run: results, histories of forces and paths, files."""

@@ -1,4 +1,4 @@
-"""Owns what a run recorded of each contact by itself (forces.npz), and what the summary says of it."""
+"""Owns the history of each contact (forces.npz), and its figures in the summary."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
 
 
 def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[str]:
-    """What a run should say of its contacts: none touched, some did not end, normals off the axes of F_n and F_t.
+    """Warnings about contacts: none touched, some did not end, normals deviate from the axes of F_n and F_t.
 
     Args:
         contacts: of the scene.

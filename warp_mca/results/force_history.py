@@ -1,4 +1,4 @@
-"""Owns what is read off a force history: contact intervals, peaks and stick intervals.
+"""Owns the evaluation of force histories: contact intervals, peaks and stick intervals.
 
 A history has one row per output interval, all of one length. `time[i]` is the end of interval i, which begins at
 `time[i - 1]`; the first one begins one interval earlier, though not before 0. Forces are means over their interval.
@@ -20,7 +20,7 @@ Rows = tuple[int, int]  # the first row and the one after the last
 
 CONTACT_THRESHOLD = 1e-3  # share of the greatest F_n above which the bodies count as touching
 REVERSAL_THRESHOLD = 1e-2  # share of the greatest |F_t| that both signs must reach
-MERGED_GAP = 0.02  # share of a contact below which a separation is nodes changing over, not the contact's end
+MERGED_GAP = 0.02  # share of a contact below which a separation is a change of nodes and does not end the contact
 STICK_THRESHOLD = 0.5  # share of the contact that must stick
 SMOOTHING = 0.02  # share of a contact: standard deviation of the Gaussian that takes the jitter out of its force
 PROMINENCE = 0.05  # share of the greatest F_n by which a peak must stand out of its valleys

@@ -1,4 +1,4 @@
-"""Owns what a run leaves behind: `Result`, and the figures of its summary."""
+"""Owns `Result`, the outcome of a run, and the figures of its summary."""
 
 from __future__ import annotations
 

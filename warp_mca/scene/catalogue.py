@@ -86,7 +86,7 @@ class SceneSource:
         return dataclasses.replace(scene, parameters=dict(values))
 
     def findings(self, result: Result) -> list[str]:
-        """What the scene file's `check` says of a result; nothing where it has none.
+        """Sentences of the scene file's `check` about a result; empty without `check`.
 
         Raises:
             RequestError: `check` failed or returned something else than sentences.
@@ -196,14 +196,14 @@ def _parameters(builder: Callable[..., Scene], module: ModuleType, scene: str) -
         signature = inspect.signature(builder).parameters
         written = {name: item.annotation for name, item in signature.items() if item.annotation is not item.empty}
         hints = get_type_hints(SimpleNamespace(__annotations__=written), vars(module), include_extras=True)
-    except Exception as error:  # whatever reading a user's annotation raises
+    except Exception as error:  # evaluating a user's annotation may raise anything
         raise bad_value("scene", scene, f"an annotation of build() cannot be read: {error}") from error
     parameters = {}
     for name, argument in signature.items():
         if argument.default is inspect.Parameter.empty:
             raise bad_value("scene", scene, f"give parameter {name} of build() a default")
         kind, *metadata = get_args(hints.get(name)) or (hints.get(name, type(argument.default)),)
-        if argument.default is None:  # a value that may be left out, as in float | None
+        if argument.default is None:  # an optional value, as in float | None
             kind = next((item for item in get_args(kind) if item is not NoneType), kind)
         if not (isinstance(kind, type) and kind in KIND_WORDS):
             raise bad_value("scene", scene, f"parameter {name} of build() must be a float, an int, a str or a bool")
@@ -213,7 +213,7 @@ def _parameters(builder: Callable[..., Scene], module: ModuleType, scene: str) -
 
 
 def _known(wrong: object, names: Iterable[str], nothing: str) -> str:
-    """The names that come close to `wrong`, then all of them."""
+    """Names similar to `wrong`, then all names."""
     listed = list(names)
     close = get_close_matches(str(wrong), listed, n=1, cutoff=0.6)
     return ", ".join(listed or [nothing]) + (f" (did you mean {close[0]}?)" if close else "")

@@ -1,4 +1,4 @@
-"""Owns the public vocabulary of contact laws: how hard a penalty spring presses along the normal.
+"""Owns the public vocabulary of contact laws: normal force of a penalty spring over its depth.
 
 A law is plain, immutable data that names the module of its device functions. A new one is a dataclass made of
 `ContactLaw` with a place in the table `CONTACT_LAWS`.
@@ -13,7 +13,7 @@ from typing import ClassVar
 
 @dataclass(frozen=True, kw_only=True)
 class ContactLaw(ABC):
-    """What all contact laws have.
+    """Base class of contact laws.
 
     Attributes:
         law: module of its device functions, those of `kernels.contact.laws`.

@@ -90,7 +90,7 @@ class Contact:
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
         if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
-            remedy = f"give a {' or a '.join(CONTACT_LAWS)}, no class made of them"
+            remedy = f"give a {' or a '.join(CONTACT_LAWS)}; other classes must be listed in CONTACT_LAWS"
             raise bad_value("Contact.law", validate.brief(self.law), remedy)
         if self.penalty is not None:
             validate.positive("Contact", penalty=self.penalty)

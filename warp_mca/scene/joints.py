@@ -21,7 +21,7 @@ from warp_mca.scene.ties import Index, Rails, Side, Ties, coincident, rails_alon
 
 @dataclass(frozen=True, kw_only=True)
 class Joint(ABC):
-    """What all joints have.
+    """Base class of joints.
 
     Attributes:
         name: unique in the scene; `joint_impulse` of the summary goes by it.

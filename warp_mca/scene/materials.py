@@ -98,6 +98,6 @@ class J2Bilinear(Elastic):
         return *super().parameters, self.sigma_y, self.hardening_modulus, self.beta
 
 
-Material = Elastic  # a name for any of these: all are elastic first
+Material = Elastic  # for annotations: every material is elastic below yield
 
 MATERIALS: dict[str, type[Material]] = {kind.__name__: kind for kind in (Elastic, J2Bilinear)}

@@ -32,8 +32,8 @@ from warp_mca.scene.catalogue import load_source
 
 SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
-DENSEST = 50  # times their packed size, that meshes unpack to at most: boxes of equal cells reach 5
-SMALL = 64 << 20  # what is not worth a check [byte]
+DENSEST = 50  # largest ratio of unpacked to packed size of meshes; boxes of equal cells reach 5
+SMALL = 64 << 20  # smaller files are not checked [byte]
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def _check_unpacked(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())
     if unpacked > max(SMALL, DENSEST * packed):
-        remedy = f"it would unpack to {unpacked / 1e9:.2g} GB, {unpacked / packed:.0f} times its size, as no mesh does"
+        remedy = f"it would unpack to {unpacked / 1e9:.2g} GB, {unpacked / packed:.0f} times its size, unlike meshes"
         raise bad_value("model file", str(path), f"{remedy}; make it again with warp-mca build")
     free = _free_memory()
     if unpacked > free:
@@ -239,7 +239,7 @@ def _decoded(value: object, arrays: Mapping[str, NDArray]) -> Any:
 
 
 def _same(one: object, other: object) -> bool:
-    """Whether two geometries are equal; meshes have no truth value of their own."""
+    """Whether two geometries are equal; meshes are compared array by array."""
     if isinstance(one, Mesh) or isinstance(other, Mesh):
         if not (isinstance(one, Mesh) and isinstance(other, Mesh)):
             return False

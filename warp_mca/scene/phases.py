@@ -100,7 +100,7 @@ class JointTorque:
 
 
 def _check_table(owner: str, times: tuple[float, ...], **values: tuple[float, ...]) -> None:
-    """Times must increase, and each of the values be as many."""
+    """Check that times increase and that every column has one value for each time."""
     for name, column in (("times", times), *values.items()):
         if not validate.is_list(column):
             raise bad_value(f"{owner}.{name}", column, "give finite numbers")

@@ -1,4 +1,4 @@
-"""Owns what a joint gives the solver: pairs of tied nodes, or nodes on rails; and what it knows of its bodies."""
+"""Owns what a joint returns, pairs of tied nodes or nodes on rails, and what it may read of its bodies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
-COINCIDENT = 1e-6  # of the extent of a joint's first body: nodes no further apart count as coincident
+COINCIDENT = 1e-6  # distance of coincident nodes, as a share of the extent of the joint's first body
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Ties:
-    """Pairs of nodes that stand at the same place and move as one, in all directions or in some.
+    """Pairs of coincident nodes that move as one, in all directions or in some.
 
     Attributes:
         first: nodes of the joint's body, in the numbering of its mesh, shape (pair_count,), int32.
@@ -81,7 +81,7 @@ class Rails:
 
 
 def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:
-    """Nodes among `a` of one body that stand where some of `b` of the other do, and those."""
+    """Nodes among `a` of one body that coincide with nodes among `b` of the other, and the latter."""
     from scipy.spatial import KDTree
 
     away, place = KDTree(second.X[b]).query(first.X[a])

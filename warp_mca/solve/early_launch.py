@@ -1,4 +1,6 @@
-"""Owns which kernels of a captured CUDA graph begin while the one before them ends; see `kernels.hardware.overlap`.
+"""Owns which kernels of a captured CUDA graph begin while the one before them ends, by marks on its edges.
+
+See `kernels.hardware.early_launch` for the kernels' side.
 
 Warp captures graphs but leaves their edges as they are, so that the driver is asked to change them: CUDA Driver API,
 "Graph Management".
@@ -12,7 +14,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.overlap import EARLY, MIN_ARCH
+from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 
 MIN_DRIVER = (12, 3)
 
@@ -63,18 +65,19 @@ def _key(node: int) -> str:
     return (name.value or b"").decode().removesuffix(_SUFFIX).rpartition("_")[0]
 
 
-def overlap(graph: Any) -> int:
-    """Let kernels of a captured graph begin early that can, after others that can.
+def launch_early(graph: Any) -> int:
+    """Let a kernel that is registered by `begins_early` begin while the registered kernel before it ends.
 
-    All others begin, and are followed, as before: what they write may be read ahead of a wait. So may two of one kind,
-    elements of two blocks: a second one that finds some multiprocessors full and others not would spread unevenly.
+    Edges to and from other kernels stay as they are, because what these write may be read ahead of a wait. So do edges
+    between two kernels of one kind, such as elements of two blocks: the second would spread unevenly over
+    multiprocessors that are partly full.
 
     Args:
-        graph: of Warp, not launched yet.
+        graph: captured by Warp, not launched yet.
 
     Returns:
-        The number of edges that say so; none on a CPU, where code is compiled for GPUs before Hopper, or with a driver
-        older than 12.3.
+        The number of edges changed: 0 on a CPU, for code compiled for GPUs before Hopper, or with a driver older than
+        12.3.
 
     Raises:
         RuntimeError: the driver failed.

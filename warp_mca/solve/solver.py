@@ -31,7 +31,7 @@ from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.bonds import BondStage
 from warp_mca.solve.contact_stage import ContactStage
-from warp_mca.solve.early_launch import overlap
+from warp_mca.solve.early_launch import launch_early
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.node_stage import NodeStage
@@ -196,7 +196,7 @@ class Solver:
             if name not in graphs:
                 with wp.ScopedCapture() as capture:
                     body()
-                overlap(capture.graph)
+                launch_early(capture.graph)
                 graphs[name] = capture.graph
             with self._flush():
                 wp.capture_launch(graphs[name])

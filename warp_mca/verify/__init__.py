@@ -21,7 +21,9 @@ FILES = (
     "waves",
     "bending",
     "impact",
+    "taylor",
     "friction",
+    "rolling",
     "rigid",
     "hinges",
 )

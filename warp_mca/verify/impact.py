@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 import warp_mca as mca
-from warp_mca.recorders import Cadence
 from warp_mca.verify.case import Row, Setup, case, crossings
 
 if TYPE_CHECKING:
-    from warp_mca.recorders.recorder import Frame, RunInfo
+    pass
 
 
 @case(
@@ -74,24 +70,26 @@ def coaxial_rods(setup: Setup) -> list[Row]:
     length, v, c = 0.5, 2.0, math.sqrt(200e9 / 7800.0)
     exact = 0.5 * 7800.0 * c * 0.04**2 * v
     mass, transit = 7800.0 * 0.04**2 * length, 2.0 * length / c
-    force, duration, short, restitution = [], [], [], []
-    for count in counts:
+
+    def figures(count: int) -> tuple[float, float, float, float]:
+        """Force [N], duration [s], speed of the short rod afterwards [m/s], restitution."""
         result = setup.run(setup.scene("coaxial_rods", axial=count))
         plateau = (result.time > 0.25 * transit) & (result.time < 0.75 * transit)
-        force.append(float(result.F_n[plateau].mean()))
         half = crossings(result.time, result.F_n, 0.5 * exact)
-        duration.append(float(half[-1] - half[0]))
         impulse = float(result.F_n.sum() * (result.time[1] - result.time[0]))
-        short.append(v - impulse / mass)
+        speed = v - impulse / mass
         period = result.time > result.time[-1] - 2.0 * transit
-        restitution.append((float(result["plate_vx"][period].mean()) - short[-1]) / v)
+        restitution = (float(result["plate_vx"][period].mean()) - speed) / v
+        return float(result.F_n[plateau].mean()), float(half[-1] - half[0]), speed, restitution
+
+    force, duration, short, restitution = zip(*map(figures, counts), strict=True)
     sizes = tuple(length / count for count in counts)
     front = "dispersion smears the front over (L h^2)^(1/3), so errors fall as h^(2/3)"
     return [
         Row(
             quantity="force F",
             exact=exact,
-            measured=tuple(force),
+            measured=force,
             unit="N",
             tolerance=0.002,
             why="its mean over the middle half of contact leaves out the oscillations behind the front",
@@ -100,7 +98,7 @@ def coaxial_rods(setup: Setup) -> list[Row]:
         Row(
             quantity="duration at F / 2",
             exact=transit,
-            measured=tuple(duration),
+            measured=duration,
             unit="s",
             tolerance=0.03,
             why=front,
@@ -110,7 +108,7 @@ def coaxial_rods(setup: Setup) -> list[Row]:
         Row(
             quantity="speed v1 of the short rod afterwards",
             exact=0.0,
-            measured=tuple(short),
+            measured=short,
             unit="m/s",
             tolerance=0.01,
             why=front,
@@ -121,7 +119,7 @@ def coaxial_rods(setup: Setup) -> list[Row]:
         Row(
             quantity="restitution e",
             exact=0.5,
-            measured=tuple(restitution),
+            measured=restitution,
             unit="-",
             tolerance=0.03,
             why=front,
@@ -233,90 +231,3 @@ def hertz_block(setup: Setup) -> list[Row]:
             ("duration", duration, tuple(item[1] for item in found), "s", limit, reason),
         )
     ]
-
-
-class _Foot:
-    """A recorder that keeps the final shape of `taylor_bar`.
-
-    Attributes:
-        length: greatest extent along x [m].
-        radius: mean distance of the nodes of the foot's rim from the axis [m].
-    """
-
-    name = "foot"
-    needs = frozenset(("surface",))
-
-    def __init__(self, length: float, radius: float) -> None:
-        self.cadence = Cadence(frames=2)
-        self._end, self._rim = length, radius
-        self._nodes: NDArray[np.intp] | None = None
-        self.length = self.radius = math.nan
-
-    def start(self, info: RunInfo) -> None:
-        """Nothing to prepare."""
-
-    def frame(self, frame: Frame) -> None:
-        """Choose the rim in the first frame, measure in each."""
-        x, y, z = np.asarray(frame.points["bar"], dtype=np.float64).T
-        distance = np.hypot(y, z)
-        if self._nodes is None:
-            self._nodes = np.flatnonzero((x > 0.9999 * self._end) & (distance > 0.999 * self._rim))
-        self.length, self.radius = float(np.ptp(x)), float(distance[self._nodes].mean())
-
-    def history(self, rows: object) -> None:
-        """Not used."""
-
-    def finish(self, succeeded: bool) -> None:
-        """Nothing to close."""
-
-
-@case(
-    group="impact",
-    title="A copper cylinder strikes a rigid wall at 227 m/s and mushrooms as other codes have it",
-    reference="Taylor's impact test. Foot held on the wall, as in publications: radius 7.22 mm of converged "
-    "hexahedra, Foulk et al., Int. J. Numer. Meth. Engng (2021); 7.0 to 7.2 mm on the meshes of earlier "
-    "authors, as Simo, Comput. Meth. Appl. Mech. Engng 99 (1992) 61, and Camacho and Ortiz, ibid. 142 (1997) 269. "
-    "Length, and all of a foot that is free to leave the wall: axisymmetric elements with a multiplicative law, "
-    "benchmarks/taylor_axisymmetric.py, taken to the limit.",
-    catches=("logarithmic_strain_doubled", "hourglass_stays_elastic"),
-)
-def taylor_bar(setup: Setup) -> list[Row]:
-    """L = 32.4 mm, R = 3.2 mm, E = 117 GPa, nu = 0.35, 8930 kg/m^3, sigma_y = 400 MPa, E_t = 100 MPa; finite strain.
-
-    The radius is the mean over the rim's nodes, which lay on the circle: the corners of the core lead to rim nodes up
-    to 1 % farther out. Free, the rim lifts off the wall by 0.3 mm and spreads farther. Cells of the foot flatten, so
-    that the step is a small share of the first stable one.
-    """
-    counts = setup.choose((24,), (24, 36))
-    rows = []
-    for foot, final_length, final_radius in setup.choose(_FEET[:1], _FEET):
-        length, radius = zip(*(mushroom(setup, count, foot) for count in counts), strict=True)
-        coarse = 24.0 / counts[-1]
-        left = coarse * setup.by_element(0.10, hex8r=0.32), coarse * setup.by_element(0.22, hex8r=0.34, tet4=0.30)
-        found = (("length", final_length, length), ("radius", final_radius, radius))
-        rows += [
-            Row(
-                quantity=f"final {what}, foot {foot}",
-                exact=exact,
-                measured=measured,
-                unit="mm",
-                tolerance=(0.03 + mesh) / exact,
-                why=f"the references agree within 0.03 mm; order 1 leaves {mesh:.2f} mm on the finest mesh, as the "
-                "change from 24 to 36 cells shows",
-                sizes=tuple(1.0 / count for count in counts),
-            )
-            for (what, exact, measured), mesh in zip(found, left, strict=True)
-        ]
-    return rows
-
-
-_FEET = (("held", 21.42, 7.22), ("free", 21.47, 7.38))  # with final length and radius of the foot [mm]
-
-
-def mushroom(setup: Setup, count: int, foot: str) -> tuple[float, float]:
-    """Final length and radius of the foot [mm], with `count` cells along the bar, a sixth as many over its radius."""
-    shape = _Foot(0.0324, 0.0032)
-    scale = setup.by_element(0.15, hex8r=0.12) * 24.0 / count
-    mesh = {"axial": count, "section": count // 6, "ring": count // 12}
-    setup.run(setup.scene("taylor_bar", foot=foot, time_step_scale=scale, **mesh), recorders=[shape])
-    return 1e3 * shape.length, 1e3 * shape.radius

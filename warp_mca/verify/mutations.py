@@ -5,27 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Mutation:
-    """A deliberate error.
-
-    Attributes:
-        what: is wrong then, to end the sentence "fails when …".
-        file: that is changed, from the repository's root.
-        old: text that stands there once.
-        new: what takes its place.
-        element: with which the case must be run to notice.
-    """
-
-    what: str
-    file: str
-    old: str
-    new: str
-    element: str = "hex8"
-
+from warp_mca.verify.element_mutations import ELEMENT_MUTATIONS
+from warp_mca.verify.mutation import Mutation
 
 MUTATIONS: dict[str, Mutation] = {
     "shear_modulus_doubled": Mutation(
@@ -277,44 +258,4 @@ MUTATIONS: dict[str, Mutation] = {
         "inverse * total + of(gravity",
         "inverse * total - of(gravity",
     ),
-    "finite_pressure_unscaled": Mutation(
-        "the pressure of finite strain is K ln J in place of K ln J / J",
-        "kernels/elements/kinematics.py",
-        "return K * theta * log_over(theta) / (R(1.0) + theta)",
-        "return K * theta * log_over(theta)",
-    ),
-    "finite_shear_unscaled": Mutation(
-        "shear off the axes of a large strain is not scaled by the divided difference of the logarithm",
-        "kernels/elements/kinematics.py",
-        "xy = T[0, 1] * log_over((d[0] - d[1]) / (one + d[1])) / (one + d[1])",
-        "xy = T[0, 1] / (one + d[0])",
-    ),
-    "hourglass_feels_strain": Mutation(
-        "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
-        "kernels/elements/hourglass.py",
-        "left = add_product(u[3 + m], H, -x[3 + m])",
-        "left = u[3 + m]",
-        element="hex8r",
-    ),
-    "hex8r_shear_low": Mutation(
-        "the deviatoric stress of hex8r is 1.99 G e in place of 2 G e",
-        "kernels/elements/hex8r.py",
-        "S = R(2.0) * G * strain",
-        "S = R(1.99) * G * strain",
-        element="hex8r",
-    ),
-    "tet4_shear_low": Mutation(
-        "the deviatoric stress of tet4 is 1.99 G e in place of 2 G e",
-        "kernels/elements/tet4.py",
-        "S = R(2.0) * G * strain",
-        "S = R(1.99) * G * strain",
-        element="tet4",
-    ),
-    "tet4_forces_not_turned_back": Mutation(
-        "forces of tetrahedra stay in the element's own frame",
-        "kernels/elements/tet4.py",
-        "add_matrices(P, W, P)",
-        "P",
-        element="tet4",
-    ),
-}
+} | ELEMENT_MUTATIONS

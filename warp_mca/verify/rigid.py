@@ -198,15 +198,7 @@ def handoff_conservation(setup: Setup) -> list[Row]:
     mass = sum(masses[name].sum() for name in names)
     mismatch = result.summary["handoff_mismatch"]
     rows = [
-        Row(
-            quantity=f"hand-off: change of {key.replace('_', ' ')}",
-            exact=0.0,
-            measured=(float(mismatch[key]),),
-            unit="-",
-            scale=1.0,
-            tolerance=ROUND_OFF,
-            why="round-off of sums over the nodes",
-        )
+        _kept(f"hand-off: change of {key.replace('_', ' ')}", mismatch[key], 0.0, "-", scale=1.0)
         for key in ("momentum", "angular_momentum", "kinetic_energy")
     ]
     known = {
@@ -224,18 +216,21 @@ def handoff_conservation(setup: Setup) -> list[Row]:
         ),
         "with 0.3 m/s across the plane: energy that does not fit": (drift.vibration_energy, 0.5 * mass * 0.3**2, "J"),
     }
-    rows += [
-        Row(
-            quantity=name,
-            exact=float(exact),
-            measured=(float(measured),),
-            unit=unit,
-            tolerance=ROUND_OFF,
-            why="round-off of sums over the nodes",
-        )
-        for name, (measured, exact, unit) in known.items()
-    ]
-    return rows
+    return rows + [_kept(name, *figures) for name, figures in known.items()]
+
+
+def _kept(quantity: str, measured: float, exact: float, unit: str, scale: float | None = None) -> Row:
+    """A figure that is kept to round-off."""
+    why = "round-off of sums over the nodes"
+    return Row(
+        quantity=quantity,
+        exact=float(exact),
+        measured=(float(measured),),
+        unit=unit,
+        scale=scale,
+        tolerance=ROUND_OFF,
+        why=why,
+    )
 
 
 def vibration(points: Array) -> Array:

@@ -1,9 +1,9 @@
-"""Owns how a kernel of a captured graph begins while the one before it ends: programmatic dependent launch.
+"""Owns programmatic dependent launch: a kernel of a captured graph begins while the one before it ends.
 
-CUDA C++ Programming Guide, "Programmatic Dependent Launch and Synchronization". Such a kernel is launched when all
-blocks of threads of the one before it have said so, or have ended; no other such kernel writes what it reads then. It
-waits before it touches anything else, until all that the other wrote can be seen. Where a graph is not told of it
-(`warp_mca.solve.early_launch`), and on a CPU, both functions do nothing.
+CUDA C++ Programming Guide, "Programmatic Dependent Launch and Synchronization". The kernel starts when every block of
+the one before it has called `let_next_begin` or has ended. Before `wait_for_previous` it may read only what no such
+kernel writes; after that call all writes of the kernel before it are visible. Both functions do nothing on a CPU, and
+in graphs whose edges were not changed (`warp_mca.solve.early_launch`).
 """
 
 from typing import Any
