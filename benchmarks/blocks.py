@@ -108,7 +108,7 @@ def without(model: Model, case: Case) -> Model:
     changes: dict[str, object] = {"blocks": blocks}
     changes["passes"] = tuple(replace(p, mu=case.mu) for p in model.passes) if case.contact else ()
     if not case.joint:
-        pairs = "joint_first", "joint_second", "joint_tied", "joint_slides", "hinges"
+        pairs = "joint_first", "joint_second", "joint_tied", "joint_slides", "joints"
         changes |= {name: getattr(model, name)[:0] for name in pairs}
     if case.driven:
         _, v = motion(model, case)

@@ -56,5 +56,5 @@ def flops(element: str, precision: str, plastic: bool, patches: bool) -> dict[st
     law = J2Bilinear.law if plastic else Elastic.law
     total: Counter[str] = Counter(count(kernels.force_kernel(precision, law)))
     if element == "tet4":
-        total.update(count(kernels.dilation_kernel(precision, False)))
+        total.update(count(kernels.dilatation_kernel(precision, False)))
     return dict(total)

@@ -54,9 +54,9 @@ def step_bytes(held: Held) -> float:
             total += size(own.yielded) + 2.0 * held.case.yielding * size(own.history)
         if hasattr(stage, "group"):  # two kernels more: dilatation, and its mean at nodes
             total += size(stage.conn) + 2 * 24 * nodes + 2 * size(stage.growth) + size(stage.element)
-            total += size(stage.offset) + size(stage.inverse_volume) + 2 * size(stage.dilation)
+            total += size(stage.offset) + size(stage.inverse_volume) + 2 * size(stage.dilatation)
             total += size(stage.group)
-    total += size(work.force) + size(work.near) + size(work.more)
+    total += size(work.force) + size(work.first_slots) + size(work.more_slots)
     return total + (8 + 4 * 24) * nodes  # inverse mass; u and v read and written
 
 

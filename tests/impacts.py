@@ -13,19 +13,19 @@ import warp as wp
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.kernels.hardware.lanes import LANES
+from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.prepare import Clock, Prepared, prepare
 from warp_mca.solve.solver import Solver
 
 # least lengths of ranges that threads take, so short that small models are cut
 SHORT_RANGES = {
-    "warp_mca.solve.node_stage.NODES": LANES,
-    "warp_mca.solve.solver.RANGE": LANES,
-    "warp_mca.elements.stage.ELEMENTS": LANES,
-    "warp_mca.elements.tet4_stage.ELEMENTS": LANES,
-    "warp_mca.elements.tet4_stage.NODES": LANES,
-    "warp_mca.solve.contact_stage.CONTACT": LANES // 2,
+    "warp_mca.solve.node_stage.NODES": RANGE_MULTIPLE,
+    "warp_mca.solve.solver.RANGE": RANGE_MULTIPLE,
+    "warp_mca.elements.stage.ELEMENTS": RANGE_MULTIPLE,
+    "warp_mca.elements.tet4_stage.ELEMENTS": RANGE_MULTIPLE,
+    "warp_mca.elements.tet4_stage.NODES": RANGE_MULTIPLE,
+    "warp_mca.solve.contact_stage.CONTACT": RANGE_MULTIPLE // 2,
 }
 
 

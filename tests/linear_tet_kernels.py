@@ -29,7 +29,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     read_parameters, return_map = functions.parameters, functions.return_map
     keep_strain, keep_volume, _ = keep_functions(R)
     k = kinematics(precision, finite)
-    dilation, deviator, pressure_of, nominal = k.dilation, k.deviator, k.pressure, k.nominal
+    dilatation, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def linear_tet_force(
@@ -62,7 +62,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             if p_new > p:
                 write_plastic_strain(history_out, 0, e, eps_new, p_new)
                 yielded_out[e] = 1
-        P = nominal(H, S, N, d, pressure_of(law[m, 0], dilation(H)))
+        P = nominal(H, S, N, d, pressure_of(law[m, 0], dilatation(H)))
         P = R(-0.5) * R(THIRD) * (P + W * P)
         for i in range(3):
             f0 = wp.dot(P[i], c[0])
@@ -86,7 +86,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
     k = kinematics(precision, finite)
-    dilation, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
+    dilatation, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def linear_tet_energy(
@@ -111,7 +111,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
                 dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
-        elastic = volumetric_energy(law[m, 0], dilation(H)) + law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
+        elastic = volumetric_energy(law[m, 0], dilatation(H)) + law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
         square = wp.max(wp.ddot(strain, strain), extreme[STRAIN_SQUARE, e])
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
@@ -131,7 +131,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     read_plastic_strain, _ = history_functions(precision)
     plastic, write_stress = bool(law_name), stress_function(precision)
     k = kinematics(precision, finite)
-    dilation, deviator, pressure_of, cauchy = k.dilation, k.deviator, k.pressure, k.cauchy
+    dilatation, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
 
     @wp.kernel(enable_backward=False, module="unique")
     def linear_tet_stress(
@@ -156,7 +156,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
         strain, N, d = deviator(H)
-        pressure = pressure_of(law[m, 0], dilation(H))
+        pressure = pressure_of(law[m, 0], dilatation(H))
         Q = wp.identity(n=3, dtype=R) + W
         sigma = Q * cauchy(H, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure) * wp.transpose(Q)
         for a in range(4):

@@ -7,7 +7,7 @@ import pytest
 from impacts import begun
 
 import warp_mca as mca
-from warp_mca.kernels.hardware.lanes import LANES
+from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
 from warp_mca.model.patches import PATCH, make_patches
 from warp_mca.results.storage import ALL_FILES
 from warp_mca.runs.batch import check_alike
@@ -80,7 +80,7 @@ def test_histories_are_those_of_each_scene_alone_bit_for_bit():
     results = mca.run_batch(scenes)
     for k, (scene, result) in enumerate(zip(scenes, results, strict=True)):
         one = alone(scene, result, "mixed")
-        assert one.summary["n_elements"] % LANES == 0
+        assert one.summary["n_elements"] % RANGE_MULTIPLE == 0
         assert one.F_n.max() > 1e3
         for name in one.history:
             assert np.array_equal(one[name], result[name], equal_nan=True), name

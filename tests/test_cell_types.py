@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
-from warp_mca.geometry.cell_types import CELL_TYPES, MOST_CORNERS, STORED_TYPES, is_triangle
+from warp_mca.geometry.cell_types import CELL_TYPES, MAX_CORNERS, STORED_TYPES, is_triangle
 from warp_mca.geometry.degenerate import cell_names, stored
 from warp_mca.geometry.integrals import INTEGRALS
 
@@ -61,7 +61,7 @@ def test_a_mirrored_cell_is_stored_upright(name: str):
     for given in [nodes] if name == "hexahedron" else [nodes, mirrored]:  # checks must find inverted hexahedra
         kept = stored(x, given, name)
         assert INTEGRALS[cell.stored_as].volumes(x[kept])[0] == pytest.approx(VOLUME[name], rel=1e-12)
-        padded = np.pad(kept, ((0, 0), (0, MOST_CORNERS - kept.shape[1])), constant_values=-1)
+        padded = np.pad(kept, ((0, 0), (0, MAX_CORNERS - kept.shape[1])), constant_values=-1)
         assert cell_names(padded).tolist() == [name]
         assert np.array_equal(kept[0, cell.own_corners], nodes[0])
     reflected = (x * [-1.0, 1.0, 1.0])[list(cell.stored_corners)][None]

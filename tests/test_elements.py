@@ -237,13 +237,13 @@ def test_cutting_keeps_volume_boundary_and_sets():
 
 @wp.kernel(enable_backward=False, module="unique")
 def gather_all(
-    near: wp.array(dtype=wp.vec2i),
-    more: wp.array(dtype=wp.vec4i),
+    first_slots: wp.array(dtype=wp.vec2i),
+    more_slots: wp.array(dtype=wp.vec4i),
     force: wp.array(dtype=wp.vec3d),
     total_out: wp.array(dtype=wp.vec3d),
 ):
     i = wp.tid()
-    total_out[i] = gather(near[i], more, force)
+    total_out[i] = gather(first_slots[i], more_slots, force)
 
 
 def test_nodes_gather_each_of_their_slots_in_rising_order():
@@ -251,11 +251,13 @@ def test_nodes_gather_each_of_their_slots_in_rising_order():
     rng = np.random.default_rng(0)
     node = rng.permutation(np.repeat(np.arange(66), np.tile(np.arange(1, 12), 6))).astype(np.int32)
     stages = [SimpleNamespace(slot_node=part, slot=0) for part in np.split(node, [150])]
-    near, more = gather_lists(stages, 66)  # type: ignore[arg-type]
+    first_slots, more_slots = gather_lists(stages, 66)  # type: ignore[arg-type]
     assert [stage.slot for stage in stages] == [0, 150]
     force = rng.normal(size=(len(node), 3)) * 10.0 ** rng.integers(-8, 8, (len(node), 1))
     out = wp.full(66, np.nan, dtype=wp.vec3d, device="cpu")
-    inputs = [wp.array(array, dtype=kind, device="cpu") for array, kind in ((near, wp.vec2i), (more, wp.vec4i))]
+    inputs = [
+        wp.array(array, dtype=kind, device="cpu") for array, kind in ((first_slots, wp.vec2i), (more_slots, wp.vec4i))
+    ]
     inputs.append(wp.array(force, dtype=wp.vec3d, device="cpu"))
     wp.launch(gather_all, 66, inputs=inputs, outputs=[out], device="cpu")
     expected = np.zeros((66, 3))

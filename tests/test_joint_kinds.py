@@ -8,7 +8,7 @@ from impacts import begun, finished, momentum, result_of
 from test_joint import BAR, SIZE, SOFT
 
 import warp_mca as mca
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.model import nodal_masses
 from warp_mca.scene import model_file
 
@@ -92,7 +92,7 @@ def test_a_rod_on_a_ball_joint_precesses():
     assert spin[1] == pytest.approx(spin[0], rel=1e-11)
     middle = mass @ x / mass.sum()
     angle = omega * (summary["simulated_time"] + summary["dt"])
-    expected = turn((0.0, angle, 0.0)) @ turn(rotation) @ (0.05, 0.0, 0.0)
+    expected = rotation_matrix((0.0, angle, 0.0)) @ rotation_matrix(rotation) @ (0.05, 0.0, 0.0)
     assert middle == pytest.approx(expected, abs=1e-4)
     weight = np.array([0.0, -gravity, 0.0]) * mass.sum() * (angle / omega)
     change = mass @ v - mass @ model.V
@@ -127,7 +127,7 @@ def test_a_block_slides_on_its_rail_by_the_gravity_along_it():
     scene = mca.Scene(
         name="slide",
         bodies=(mca.Body(name="block", geometry=HALF, material=SOFT, rotation=rotation),),
-        joints=(mca.Prismatic(name="P", body="block", nodes="ymin", axis=tuple(turn(rotation).T @ axis)),),
+        joints=(mca.Prismatic(name="P", body="block", nodes="ymin", axis=tuple(rotation_matrix(rotation).T @ axis)),),
         gravity=tuple(gravity),
         impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-5),
     )

@@ -6,8 +6,8 @@ import warp as wp
 
 from warp_mca.kernels.elements.kinematics import eigen_function
 from warp_mca.kernels.elements.logarithm import log_function
-from warp_mca.kernels.hardware.lanes import side_by_side
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.simd import vectorised
 
 PRECISIONS = ("mixed", "float64")
 
@@ -27,7 +27,7 @@ def test_logarithm_to_three_units_in_the_last_place(precision):
     none = [0.0, -1.0, np.inf, np.nan]
     y = np.concatenate([none, far, 1.0 + np.linspace(-0.6, 1.5, 4001), 1.0 + np.logspace(-15, -1, 500)]).astype(kind)
     out = wp.full(len(y), np.nan, dtype=R, device="cpu")
-    wp.launch(side_by_side(take_log), len(y), inputs=[wp.array(y, dtype=R, device="cpu")], outputs=[out], device="cpu")
+    wp.launch(vectorised(take_log), len(y), inputs=[wp.array(y, dtype=R, device="cpu")], outputs=[out], device="cpu")
     found, y = out.numpy(), y[len(none) :]
     assert np.isnan(found[: len(none)]).all()
     found, exact = found[len(none) :], np.log(y.astype(np.longdouble))

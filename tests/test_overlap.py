@@ -10,7 +10,7 @@ import warp as wp
 
 from warp_mca.kernels.contact import contact, sides
 from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
-from warp_mca.kernels.hardware.overlap import EARLY, LEAST_ARCH
+from warp_mca.kernels.hardware.overlap import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import constraint, node
 from warp_mca.scene.materials import Elastic, J2Bilinear
 from warp_mca.solve import early_launch as module
@@ -27,7 +27,7 @@ VARIANTS = {
     "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
     "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
-    "tet4_dilation": [tet4.dilation_kernel(p, m) for p, m in TWO],
+    "tet4_dilatation": [tet4.dilatation_kernel(p, m) for p, m in TWO],
     "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],
     "tet4_force": [tet4.force_kernel(p, LAWS[m], False) for p, m in TWO],
     "hex8_patch_force": [hex8_patch.force_kernel(p, LAWS[not m]) for p, m in TWO],
@@ -45,7 +45,7 @@ BRANCH = re.compile(r"\bbra\b")
 def test_kernel_touches_nothing_that_changes_before_it_waits(name, k, tmp_path):
     kernel = VARIANTS[name][k]
     assert kernel.key in EARLY
-    wp.compile_aot_module(kernel.module, device=None, arch=LEAST_ARCH, module_dir=tmp_path, use_ptx=True)
+    wp.compile_aot_module(kernel.module, device=None, arch=MIN_ARCH, module_dir=tmp_path, use_ptx=True)
     (source,) = tmp_path.glob("*.ptx")
     text = source.read_text(encoding="utf-8", errors="replace")
     assert text.count(WAIT) == 1
@@ -93,7 +93,7 @@ class Driver:
             self.changes.append((what, pairs, ports))
 
 
-def changed(monkeypatch, arch=LEAST_ARCH, driver=(13, 0)):
+def changed(monkeypatch, arch=MIN_ARCH, driver=(13, 0)):
     """Edges that `overlap` asks the driver to change, in a graph of two steps with a copy behind the first."""
     patches = VARIANTS["hex8_patch_force"][0].key
     keys = [patch.schedule.key, patches, patches, VARIANTS["integrate"][0].key, None, patches]

@@ -16,7 +16,7 @@ from test_elements import held_of
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.kernels.elements import hex8_patch, hex8r_patch
-from warp_mca.kernels.hardware.overlap import LEAST_ARCH
+from warp_mca.kernels.hardware.overlap import MIN_ARCH
 from warp_mca.recorders.colours import ColourScale
 from warp_mca.scene import model_file as scene_file
 from warp_mca.scene.materials import MATERIALS
@@ -138,7 +138,7 @@ def test_bars_of_three_materials_each_go_by_their_own():
 @pytest.mark.parametrize("kernels", [hex8_patch, hex8r_patch])
 def test_kernels_of_a_gpu_compile_for_it(kernels: ModuleType, tmp_path: Path):
     kernel = kernels.force_kernel("mixed", VOCE.law)
-    wp.compile_aot_module(kernel.module, device=None, arch=LEAST_ARCH, module_dir=tmp_path, use_ptx=True)
+    wp.compile_aot_module(kernel.module, device=None, arch=MIN_ARCH, module_dir=tmp_path, use_ptx=True)
     (source,) = tmp_path.glob("*.ptx")
     assert "ex2.approx" in source.read_text(encoding="utf-8", errors="replace")  # the exponential of the law
 

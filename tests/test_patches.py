@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.model.patches import LOT, NOWHERE, PATCH, SLOTS, Patches, compact_order, grid_points, make_patches
+from warp_mca.model.patches import NOWHERE, PATCH, SLOTS, SORT_CHUNK, Patches, compact_order, grid_points, make_patches
 
 
 def patch_of_elements(patches: Patches) -> np.ndarray:
@@ -126,7 +126,7 @@ def test_order_does_not_hang_on_rounding(divisions: tuple[int, int, int]):
 def test_grids_are_those_of_each_scene_alone():
     """Also where patches are halved for their grids, and beyond the elements that are computed together."""
     rng = np.random.default_rng(5)
-    counts, node_counts = (LOT + 300, 700, 2 * LOT - 50), (3000, 400, 5000)
+    counts, node_counts = (SORT_CHUNK + 300, 700, 2 * SORT_CHUNK - 50), (3000, 400, 5000)
     ends, nodes = np.cumsum(counts), np.cumsum([0, *node_counts])
     Xs = [rng.normal(size=(n, 3)) * 10.0 ** rng.uniform(-4, 1, (n, 1)) for n in node_counts]
     conns = [rng.integers(0, n, (8, count)).astype(np.int32) for n, count in zip(node_counts, counts, strict=True)]
@@ -180,9 +180,11 @@ def test_elements_leave_room_for_contact():
 
 def test_patches_are_those_of_each_scene_alone():
     """Scenes of a batch begin new patches, wherever the ranges that are computed together end."""
-    count, ends = 3 * LOT + 40, (LOT - 5, 2 * LOT + 77, 3 * LOT + 40)
+    count, ends = 3 * SORT_CHUNK + 40, (SORT_CHUNK - 5, 2 * SORT_CHUNK + 77, 3 * SORT_CHUNK + 40)
     conn = np.random.default_rng(4).integers(0, 5000, (8, count)).astype(np.int32)
-    conn[:, LOT:] = np.arange(8)[:, None] + np.arange(count - LOT) // 3  # patches with few nodes, and with too many
+    conn[:, SORT_CHUNK:] = (
+        np.arange(8)[:, None] + np.arange(count - SORT_CHUNK) // 3
+    )  # patches with few nodes, and with too many
     joined = make_patches(conn, ends)
     first = slots = 0
     for begin, end in zip((0, *ends), ends, strict=False):

@@ -8,7 +8,7 @@ from impacts import begun, finished, momentum, result_of
 from sharp_edges import HARD, SOFT, STEEL, H, bars, frame, in_frame, roof
 
 import warp_mca as mca
-from warp_mca.model.sides import MOST, find_sides, stiffest_fold
+from warp_mca.model.sides import MAX_SIDES, find_sides, stiffest_fold
 from warp_mca.model.surfaces import face_geometry
 
 
@@ -45,7 +45,7 @@ def test_sides_of_tetrahedra_and_of_a_surface_as_rough_as_can_be():
     assert all(len(set(side[np.abs(normal[:, k]) > 0.9])) == 1 for k in range(3))
     fan = np.random.default_rng(1).normal(size=(40, 3))
     rough = find_sides(np.array([[0, k + 1, k + 2, k + 2] for k in range(40)], np.int32), fan)
-    assert rough.max() < MOST
+    assert rough.max() < MAX_SIDES
 
 
 @pytest.mark.parametrize(("kind", "expected"), [("L", 1.0), ("U", 1.0)])

@@ -193,7 +193,7 @@ def test_odd_element_is_found_among_many_alike(key: np.ndarray, monkeypatch: pyt
     Nor where all have one key.
     """
     monkeypatch.setattr(timestep, "KEY", key)
-    n, odd = timestep.MOST + 1000, timestep.MOST + 500
+    n, odd = timestep.MAX_EXACT + 1000, timestep.MAX_EXACT + 500
     conn, mass, contact = np.arange(8 * n).reshape(n, 8), np.full((n, 8), 2e3 * H**3 / 8.0), np.zeros(n)
     for larger, stiffer in ((1.001, 1.0), (1.0, 1.001)):
         x, K = np.tile(H * CUBE, (n, 1, 1)), np.full(n, 1e11)

@@ -10,8 +10,8 @@ from warp_mca.kernels.contact.nearest import Master, nearest_face, passes_by, re
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.spring import Spring, open_function, rest_function, spring_function
-from warp_mca.kernels.hardware.each import kind, value_function
 from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.records.extremes import add_normal_force
 

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.projection import project_on_face
-from warp_mca.kernels.hardware.each import kind, value_function
+from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 wp.set_module_options({"enable_backward": False})
 

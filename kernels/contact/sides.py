@@ -23,8 +23,8 @@ from warp_mca.kernels.contact.side_choice import (
     springs_function,
 )
 from warp_mca.kernels.contact.spring import Spring
-from warp_mca.kernels.hardware.each import kind, value_function
 from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 wp.set_module_options({"enable_backward": False})
 

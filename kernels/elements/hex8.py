@@ -81,7 +81,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
     """
     k = kinematics(precision, finite)
-    dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
+    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     gauss_lines = gauss_line_function(precision, scaled=True)
@@ -112,7 +112,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         m = material[e]
         identity = wp.identity(n=3, dtype=R)
         volume = R(0.0)
-        dilation = R(0.0)
+        dilatation = R(0.0)
         elastic = R(0.0)
         dissipated = R(0.0)
         largest = extreme[STRAIN_SQUARE, e]
@@ -120,7 +120,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         for g in range(8):
             det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             volume += det
-            dilation += dilation_of(grad) * det
+            dilatation += dilatation_of(grad) * det
             strain, _N, _d = deviator(grad)
             largest = wp.max(largest, wp.ddot(strain, strain))
             eps_p = mat33()
@@ -130,7 +130,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                     dissipated += det * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
             elastic += det * law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
             smallest = wp.min(smallest, wp.determinant(identity + grad))
-        energy_out[0, first + e] = elastic + volume * volumetric_energy(law[m, 0], dilation / volume)
+        energy_out[0, first + e] = elastic + volume * volumetric_energy(law[m, 0], dilatation / volume)
         energy_out[1, first + e] = dissipated
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         energy_out[4, first + e] = R(0.0)

@@ -29,17 +29,17 @@ def pressure_function(precision: str, finite: bool) -> Any:
     t = scalars(precision)
     R, mat43 = t.real, t.mat43
     point_gradient, k = gradient_function(precision), kinematics(precision, finite)
-    dilation_of, pressure_of = k.dilation, k.pressure
+    dilatation_of, pressure_of = k.dilatation, k.pressure
 
     @wp.func
     def element_pressure(gx: mat43, gy: mat43, gz: mat43, lx: mat43, ly: mat43, lz: mat43, K: R):
         volume = R(0.0)
-        dilation = R(0.0)
+        dilatation = R(0.0)
         for g in range(8):
             det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
             volume += det
-            dilation += dilation_of(grad) * det
-        return pressure_of(K, dilation / volume)
+            dilatation += dilatation_of(grad) * det
+        return pressure_of(K, dilatation / volume)
 
     return element_pressure
 

@@ -145,7 +145,7 @@ def small_strain_function(precision: str, law_name: str) -> Any:
         By = mat43(R(NOTHING))
         Bz = mat43(R(NOTHING))
         volume = R(NOTHING)
-        dilation = R(NOTHING)
+        dilatation = R(NOTHING)
         largest = R(0.0)
         if wp.static(plastic):
             flag = yielded_out[e]
@@ -159,7 +159,7 @@ def small_strain_function(precision: str, law_name: str) -> Any:
             xx, yy, zz, xy, yz, xz = symmetric_gradient(lx[jx], ly[jy], lz[jz], b0, b1, b2)
             trace = xx + yy + zz
             volume += det
-            dilation += trace
+            dilatation += trace
             shear = G / det
             direct = shear + shear
             mean = R(THIRD) * trace
@@ -176,7 +176,7 @@ def small_strain_function(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
-        pressure = K * dilation / volume
+        pressure = K * dilatation / volume
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)
         Fz = to_lines(Sz + pressure * Bz)

@@ -48,7 +48,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
-    dilation_of, deviator, nominal, pressure_of = k.dilation, k.deviator, k.nominal, k.pressure
+    dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
 
     @wp.func
     def shape_and_strain(x: mat73, du: mat73):
@@ -95,7 +95,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
                 write_amplitudes(history_out, e, q_p + (R(1.0) - kept) * q)
                 if flag == 0:
                     yielded_out[e] = int(1)
-        P = nominal(H, S, N, d, pressure_of(K, dilation_of(H)))
+        P = nominal(H, S, N, d, pressure_of(K, dilatation_of(H)))
         Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):
             if kept < R(1.0):
@@ -177,7 +177,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
     k = kinematics(precision, finite)
-    dilation_of, deviator, volumetric_energy = k.dilation, k.deviator, k.volumetric_energy
+    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
     def hex8r_energy(
@@ -217,7 +217,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                 q_p = read_amplitudes(history, e)
             q = q - q_p
         _Q, stored = hourglass(q, x, volume, K, G)
-        elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilation_of(H))
+        elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilatation_of(H))
         energy_out[0, first + e] = volume * elastic
         energy_out[1, first + e] = dissipated
         identity = wp.identity(n=3, dtype=R)
@@ -243,7 +243,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     plastic = bool(law_name)
     write_stress = stress_function(precision)
     k = kinematics(precision, finite)
-    dilation_of, deviator, pressure_of, cauchy = k.dilation, k.deviator, k.pressure, k.cauchy
+    dilatation_of, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
 
     @wp.kernel(enable_backward=False, module="unique")
     def hex8r_stress(
@@ -272,7 +272,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             if yielded[e] != 0:
                 eps_p, p = read_plastic_strain(history, 0, e)
         strain, N, d = deviator(H)
-        pressure = pressure_of(law[m, 0], dilation_of(H))
+        pressure = pressure_of(law[m, 0], dilatation_of(H))
         local = cauchy(H, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure)
         Q = wp.identity(n=3, dtype=R) + W
         sigma = Q * local * wp.transpose(Q)

@@ -94,7 +94,7 @@ class Kinematics:
     """Functions of a strain measure.
 
     Attributes:
-        dilation: H -> J - 1 [-], change of volume over volume.
+        dilatation: H -> J - 1 [-], change of volume over volume.
         deviator: H -> (deviatoric strain e, principal directions N, eigenvalues d of F^T F - I).
         nominal: (H, S, N, d, pressure) -> first Piola-Kirchhoff stress [Pa] of the stress S conjugate to e, and of the
             pressure, which goes with the derivative of J with respect to F.
@@ -103,7 +103,7 @@ class Kinematics:
         cauchy: (H, S, N, d, pressure) -> Cauchy stress in the rotated frame [Pa].
     """
 
-    dilation: Any
+    dilatation: Any
     deviator: Any
     nominal: Any
     pressure: Any
@@ -122,7 +122,7 @@ def _small(precision: str) -> Kinematics:
     R, vec3, mat33 = t.real, t.vec3, t.mat33
 
     @wp.func
-    def small_dilation(H: mat33):
+    def small_dilatation(H: mat33):
         return wp.trace(H)
 
     @wp.func
@@ -149,7 +149,7 @@ def _small(precision: str) -> Kinematics:
     def small_volumetric(K: R, theta: R):
         return R(0.5) * K * theta * theta
 
-    return Kinematics(small_dilation, small_deviator, small_stress, small_pressure, small_volumetric, small_stress)
+    return Kinematics(small_dilatation, small_deviator, small_stress, small_pressure, small_volumetric, small_stress)
 
 
 def _logarithmic(precision: str) -> Kinematics:
@@ -167,7 +167,7 @@ def _logarithmic(precision: str) -> Kinematics:
         return wp.where(none, one, natural_log(y) / wp.where(none, one, exact))
 
     @wp.func
-    def log_dilation(H: mat33):
+    def log_dilatation(H: mat33):
         trace = wp.trace(H)
         second = R(0.5) * (trace * trace - wp.trace(H * H))
         return trace + second + wp.determinant(H)
@@ -224,7 +224,7 @@ def _logarithmic(precision: str) -> Kinematics:
     @wp.func
     def log_cauchy(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
         P = log_deviatoric(H, S, N, d)
-        sigma = (P + P * wp.transpose(H)) / (R(1.0) + log_dilation(H))
+        sigma = (P + P * wp.transpose(H)) / (R(1.0) + log_dilatation(H))
         return R(0.5) * (sigma + wp.transpose(sigma)) + pressure * wp.identity(n=3, dtype=R)
 
-    return Kinematics(log_dilation, log_deviator, log_nominal, log_pressure, log_volumetric, log_cauchy)
+    return Kinematics(log_dilatation, log_deviator, log_nominal, log_pressure, log_volumetric, log_cauchy)

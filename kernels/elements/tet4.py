@@ -60,14 +60,14 @@ def gradient_function(precision: str, finite: bool) -> Any:
 
 
 @cache
-def dilation_kernel(precision: str, finite: bool) -> Any:
+def dilatation_kernel(precision: str, finite: bool) -> Any:
     """Kernel: change of volume of each element [m^3]."""
     R = scalars(precision).real
     tet_gradient = gradient_function(precision, finite)
-    dilation_of = kinematics(precision, finite).dilation
+    dilatation_of = kinematics(precision, finite).dilatation
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
-    def tet4_dilation(
+    def tet4_dilatation(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
         u: wp.array(dtype=wp.vec3d),
@@ -76,9 +76,9 @@ def dilation_kernel(precision: str, finite: bool) -> Any:
         wait_for_previous()
         e = wp.tid()
         _W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
-        growth_out[e] = volume * dilation_of(H)
+        growth_out[e] = volume * dilatation_of(H)
 
-    return begins_early(tet4_dilation)
+    return begins_early(tet4_dilatation)
 
 
 @cache
@@ -92,14 +92,14 @@ def average_kernel(precision: str) -> Any:
         element: wp.array(dtype=wp.int32),
         inverse_volume: wp.array(dtype=R),
         growth: wp.array(dtype=R),
-        dilation_out: wp.array(dtype=R),
+        dilatation_out: wp.array(dtype=R),
     ):
         wait_for_previous()
         i = wp.tid()
         total = R(0.0)
         for j in range(offset[i], offset[i + 1]):
             total += growth[element[j]]
-        dilation_out[i] = inverse_volume[i] * total
+        dilatation_out[i] = inverse_volume[i] * total
 
     return begins_early(tet4_average)
 
@@ -129,7 +129,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         slot: int,
         count: int,
         group: wp.array2d(dtype=wp.int32),
-        dilation: wp.array(dtype=R),
+        dilatation: wp.array(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -142,7 +142,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         G = law[m, 1]
         pressure = R(0.0)
         for a in range(4):
-            pressure += R(0.25) * pressure_of(law[m, 0], dilation[group[a, e]])
+            pressure += R(0.25) * pressure_of(law[m, 0], dilatation[group[a, e]])
         strain, N, d = deviator(H)
         S = R(2.0) * G * strain
         keep_strain(e, wp.ddot(strain, strain), extreme_out)
@@ -196,7 +196,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         u: wp.array(dtype=wp.vec3d),
         first: int,
         group: wp.array2d(dtype=wp.int32),
-        dilation: wp.array(dtype=R),
+        dilatation: wp.array(dtype=R),
         energy_out: wp.array2d(dtype=R),
     ):
         e = wp.tid()
@@ -204,7 +204,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         m = material[e]
         elastic = R(0.0)
         for a in range(4):
-            elastic += R(0.25) * volumetric_energy(law[m, 0], dilation[group[a, e]])
+            elastic += R(0.25) * volumetric_energy(law[m, 0], dilatation[group[a, e]])
         strain, _N, _d = deviator(H)
         eps_p = mat33()
         dissipated = R(0.0)
@@ -249,7 +249,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         element: wp.array(dtype=wp.int32),
         first: int,
         group: wp.array2d(dtype=wp.int32),
-        dilation: wp.array(dtype=R),
+        dilatation: wp.array(dtype=R),
         stress_out: wp.array2d(dtype=wp.float32),
     ):
         item = wp.tid()
@@ -258,7 +258,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         m = material[e]
         pressure = R(0.0)
         for a in range(4):
-            pressure += R(0.25) * pressure_of(law[m, 0], dilation[group[a, e]])
+            pressure += R(0.25) * pressure_of(law[m, 0], dilatation[group[a, e]])
         eps_p = mat33()
         p = R(0.0)
         if wp.static(plastic):

@@ -12,7 +12,7 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-LEAST_ARCH = 90  # compute capability, times ten, that knows of it
+MIN_ARCH = 90  # compute capability times ten of the first devices that support it
 
 EARLY: set[str] = set()  # keys of kernels that wait
 
@@ -25,7 +25,7 @@ def begins_early(kernel: Any) -> Any:
 
 def _on_gpu(instruction: str) -> str:
     return f"""
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= {10 * LEAST_ARCH}
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= {10 * MIN_ARCH}
 asm volatile("{instruction};" ::: "memory");
 #endif
 """

@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.each import kind, value_function
 from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
@@ -111,8 +111,8 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
     def advance_bound(
         mass: wp.array(dtype=wp.float64),
         inverse_mass: wp.array(dtype=wp.float64),
-        near: wp.array(dtype=wp.vec2i),
-        more: wp.array(dtype=wp.vec4i),
+        first_slots: wp.array(dtype=wp.vec2i),
+        more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
         scene: Index,
@@ -138,7 +138,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
             i = bonds.first[k]
         else:
             i = bonds.node[k - pairs]
-        total = gather(near[i], more, force)
+        total = gather(first_slots[i], more_slots, force)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
@@ -153,7 +153,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
             if j >= 0:
                 if v_before_out.shape[0] > 0:
                     v_before_out[j] = v_out[j]
-                total = gather(near[j], more, force)
+                total = gather(first_slots[j], more_slots, force)
                 if wp.static(contact):
                     total += take_contact(j, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))

@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.each import kind, value_function
 from warp_mca.kernels.hardware.overlap import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
 
@@ -21,7 +21,7 @@ KEEPERS = 32  # threads that keep the greatest normal force of each scene
 
 @cache
 def gather_function(precision: str) -> Any:
-    """The function that sums the forces of elements on a node, in the slots that `near` and `more` list.
+    """The function that sums the forces of elements on a node, in the slots that `first_slots` and `more_slots` list.
 
     Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`.
     """
@@ -33,7 +33,7 @@ def gather_function(precision: str) -> Any:
         return wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
 
     @wp.func
-    def gather(pair: wp.vec2i, more: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
+    def gather(pair: wp.vec2i, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
         total = force_at(pair[0], force)
         second = force_at(wp.max(pair[1], 0), force)
         if pair[1] >= 0:
@@ -41,9 +41,9 @@ def gather_function(precision: str) -> Any:
         row = -2 - pair[1]
         end = row
         if row >= 0:
-            end += more[row][3]
+            end += more_slots[row][3]
         while row < end:
-            r = more[row]
+            r = more_slots[row]
             total += force_at(r[0], force)
             if r[1] >= 0:
                 total += force_at(r[1], force)
@@ -97,8 +97,8 @@ def integrate_kernel(
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
         inverse_mass: wp.array(dtype=wp.float64),
-        near: wp.array(dtype=wp.vec2i),
-        more: wp.array(dtype=wp.vec4i),
+        first_slots: wp.array(dtype=wp.vec2i),
+        more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
         scene: Index,
@@ -118,7 +118,7 @@ def integrate_kernel(
         beyond = i - u_out.shape[0]
         if wp.static(contact):
             i = wp.min(i, u_out.shape[0] - 1)
-        pair = near[i]
+        pair = first_slots[i]
         inverse = inverse_mass[i]
         wait_for_previous()
         if wp.static(contact):
@@ -128,7 +128,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(pair, more, force)
+        total = gather(pair, more_slots, force)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

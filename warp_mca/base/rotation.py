@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def turn(vector: Sequence[float] | Array) -> Array:
-    """Matrix of the rotation about `vector` by its length [rad], shape (3, 3), float64."""
-    if not np.any(vector):
+def rotation_matrix(rotation_vector: Sequence[float] | Array) -> Array:
+    """Matrix of the rotation about `rotation_vector` by its length [rad], shape (3, 3), float64."""
+    if not np.any(rotation_vector):
         return np.eye(3)
     from scipy.spatial.transform import Rotation  # whose import takes a fifth of a second
 
-    return Rotation.from_rotvec(vector).as_matrix()
+    return Rotation.from_rotvec(rotation_vector).as_matrix()

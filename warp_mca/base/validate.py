@@ -42,7 +42,7 @@ DAMAGE = (
     zlib.error,
 )
 
-MOST = 1_000_000_000  # of anything that is counted; memory ends before
+MAX_COUNT = 1_000_000_000  # upper limit of every count that users give; memory runs out before
 
 
 def plain(item: Any) -> None:
@@ -87,14 +87,14 @@ def counts(owner: str, /, **values: int) -> None:
     """Each value must be a whole number above 0."""
     for name, value in values.items():
         if not _is_count(value):
-            raise bad_value(f"{owner}.{name}", value, f"give a whole number above 0, at most {MOST:,}")
+            raise bad_value(f"{owner}.{name}", value, f"give a whole number above 0, at most {MAX_COUNT:,}")
 
 
 def even_counts(owner: str, /, **values: int) -> None:
     """Each value must be an even number above 0, so that the middle is a grid line."""
     for name, value in values.items():
         if not (_is_count(value) and value % 2 == 0):
-            raise bad_value(f"{owner}.{name}", value, f"give an even number above 0, at most {MOST:,}")
+            raise bad_value(f"{owner}.{name}", value, f"give an even number above 0, at most {MAX_COUNT:,}")
 
 
 def flags(owner: str, /, **values: bool) -> None:
@@ -194,4 +194,4 @@ def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
 
 
 def _is_count(value: object) -> bool:
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 < int(value) <= MOST
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 < int(value) <= MAX_COUNT

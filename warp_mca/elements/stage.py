@@ -10,8 +10,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.elements.state import ElementState
-from warp_mca.kernels.hardware.lanes import side_by_side
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.kernels.materials.laws import HISTORY_SIZE
 from warp_mca.model.patches import PATCH
 from warp_mca.solve.threads import ELEMENTS, Split, whole
@@ -64,9 +64,9 @@ class ElementStage:
         self.vectors: int = getattr(kernels, "VECTORS", 0)
         self.real = scalars(precision).real
         kind = (precision, block.law, block.finite)
-        self.force_kernel = side_by_side(kernels.force_kernel(*kind), large=block.finite)
-        self.energy_kernel = side_by_side(kernels.energy_kernel(*kind), large=block.finite)
-        self.stress_kernel = side_by_side(kernels.stress_kernel(*kind), large=block.finite)
+        self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite)
+        self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
+        self.stress_kernel = vectorised(kernels.stress_kernel(*kind), large=block.finite)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -170,17 +170,17 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
     node = np.concatenate([stage.slot_node for stage in stages])
     slot, count = np.argsort(node, kind="stable").astype(np.int32), np.bincount(node, minlength=node_count)
     begin = np.cumsum(count) - count
-    near = np.full((node_count, 2), -1, dtype=np.int32)
-    near[:, 0] = slot[begin]
-    near[count == 2, 1] = slot[begin[count == 2] + 1]
+    first_slots = np.full((node_count, 2), -1, dtype=np.int32)
+    first_slots[:, 0] = slot[begin]
+    first_slots[count == 2, 1] = slot[begin[count == 2] + 1]
     many = np.flatnonzero(count > 2)
     others = count[many] - 1
     rows = (others + 2) // 3
     first_row = np.cumsum(rows) - rows
-    near[many, 1] = -2 - first_row
-    more = np.full((int(rows.sum()), 4), -1, dtype=np.int32)
-    more[:, 3] = np.repeat(rows, rows)
+    first_slots[many, 1] = -2 - first_row
+    more_slots = np.full((int(rows.sum()), 4), -1, dtype=np.int32)
+    more_slots[:, 3] = np.repeat(rows, rows)
     k = np.arange(others.sum()) - np.repeat(np.cumsum(others) - others, others)
     row, column = np.divmod(k, 3)
-    more[np.repeat(first_row, others) + row, column] = slot[np.repeat(begin[many], others) + 1 + k]
-    return near, more
+    more_slots[np.repeat(first_row, others) + row, column] = slot[np.repeat(begin[many], others) + 1 + k]
+    return first_slots, more_slots

@@ -10,8 +10,8 @@ import warp as wp
 from warp_mca.elements.element import Array
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.kernels.elements import tet4
-from warp_mca.kernels.hardware.lanes import side_by_side
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.solve.threads import ELEMENTS, NODES, Split, whole
 
 if TYPE_CHECKING:
@@ -37,30 +37,30 @@ class Tet4Stage(ElementStage):
         self.element = wp.array(order % self.count, dtype=wp.int32)
         self.inverse_volume = wp.array(1.0 / around, dtype=real)
         self.growth = wp.zeros(self.count, dtype=real)
-        self.dilation = wp.zeros(len(found), dtype=real)
-        self.dilation_kernel = side_by_side(tet4.dilation_kernel(precision, block.finite))
+        self.dilatation = wp.zeros(len(found), dtype=real)
+        self.dilatation_kernel = vectorised(tet4.dilatation_kernel(precision, block.finite))
         self.average_kernel = tet4.average_kernel(precision)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [*super().kernels(), self.dilation_kernel, self.average_kernel]
+        return [*super().kernels(), self.dilatation_kernel, self.average_kernel]
 
     def more(self, part: slice) -> list[Any]:
         """Pressure nodes of each element of a range, and the dilatation of all."""
-        return [self.group[:, part], self.dilation]
+        return [self.group[:, part], self.dilatation]
 
     def launch(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Forces of each element on its nodes [N], after the dilatation at the pressure nodes."""
 
         def grow(part: slice) -> None:
             count, inputs = part.stop - part.start, [work.X, self.conn[:, part], state.u]
-            wp.launch(self.dilation_kernel, count, inputs=inputs, outputs=[self.growth[part]], block_dim=BLOCK_DIM)
+            wp.launch(self.dilatation_kernel, count, inputs=inputs, outputs=[self.growth[part]], block_dim=BLOCK_DIM)
 
         def average(part: slice) -> None:
             ends = self.offset[part.start : part.stop + 1]
             count, inputs = part.stop - part.start, [ends, self.element, self.inverse_volume[part], self.growth]
-            wp.launch(self.average_kernel, count, inputs=inputs, outputs=[self.dilation[part]], block_dim=BLOCK_DIM)
+            wp.launch(self.average_kernel, count, inputs=inputs, outputs=[self.dilatation[part]], block_dim=BLOCK_DIM)
 
         split(self.count, grow, ELEMENTS)
-        split(len(self.dilation), average, NODES)
+        split(len(self.dilatation), average, NODES)
         super().launch(work, state, split)

@@ -116,7 +116,7 @@ TETRAHEDRON = CellType(
 # In the order in which a mesh counts its cells.
 CELL_TYPES = {cell.name: cell for cell in (HEXAHEDRON, WEDGE, PYRAMID, TETRAHEDRON)}
 STORED_TYPES = {name: cell for name, cell in CELL_TYPES.items() if cell.stored_as == name}
-MOST_CORNERS = max(cell.corners for cell in CELL_TYPES.values())
+MAX_CORNERS = max(cell.corners for cell in CELL_TYPES.values())
 
 
 def is_triangle(faces: Index) -> NDArray[np.bool_]:

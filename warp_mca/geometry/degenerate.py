@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MOST_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
+from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MAX_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
 from warp_mca.geometry.integrals import INTEGRALS
 from warp_mca.geometry.mesh import Mesh
 
@@ -38,14 +38,14 @@ def cell_names(nodes: NDArray[np.integer]) -> NDArray[np.str_]:
     A hexahedron that collapsed in another way than a wedge or a pyramid is stored stays a hexahedron.
 
     Args:
-        nodes: of each cell, shape (cell_count, MOST_CORNERS), -1 beyond its last corner.
+        nodes: of each cell, shape (cell_count, MAX_CORNERS), -1 beyond its last corner.
     """
     names = np.full(len(nodes), HEXAHEDRON.name, dtype=f"<U{max(map(len, CELL_TYPES))}")
     different = 1 + (np.diff(np.sort(nodes, axis=1), axis=1) != 0).sum(axis=1)
     for cell in (WEDGE, PYRAMID):
         first = [cell.own_corners[corner] for corner in cell.stored_corners]
         names[(nodes == nodes[:, first]).all(axis=1) & (different == cell.corners)] = cell.name
-    names[(nodes[:, TETRAHEDRON.corners : MOST_CORNERS] < 0).all(axis=1)] = TETRAHEDRON.name
+    names[(nodes[:, TETRAHEDRON.corners : MAX_CORNERS] < 0).all(axis=1)] = TETRAHEDRON.name
     return names
 
 

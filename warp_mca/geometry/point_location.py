@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warp_mca.geometry import tetrahedron
 from warp_mca.geometry.boxes import Boxes
-from warp_mca.geometry.cell_types import HEXAHEDRON, MOST_CORNERS, TETRAHEDRON
+from warp_mca.geometry.cell_types import HEXAHEDRON, MAX_CORNERS, TETRAHEDRON
 from warp_mca.geometry.hexahedron import shape_functions
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ Index = NDArray[np.int32]
 CANDIDATES = 64  # cells near a point that are tried: long thin ones have their centres far away
 OUTSIDE = 0.05  # of a cell's diagonal that a point may lie outside: curved surfaces have flat faces
 
-# For each point: nodes of its cell, shape (point_count, MOST_CORNERS), int32; shape functions there [-], of that shape;
+# For each point: nodes of its cell, shape (point_count, MAX_CORNERS), int32; shape functions there [-], of that shape;
 # distance between point and cell [m], and the largest distance at which the point still counts as inside [m], both
 # shape (point_count,).
 Located = tuple[Index, Array, Array, Array]
@@ -93,7 +93,7 @@ def in_tetrahedra(at: Array, points: Array, cells: Index, boxes: Boxes) -> Locat
     apart = np.linalg.norm(at[:, None] - np.einsum("pca,pcai->pci", weight, x), axis=-1)
     best, rows = apart.argmin(axis=1), np.arange(len(at))
     allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
-    missing = (0, 0), (0, MOST_CORNERS - TETRAHEDRON.corners)
+    missing = (0, 0), (0, MAX_CORNERS - TETRAHEDRON.corners)
     nodes = np.pad(cells[near[rows, best]], missing, mode="edge")
     return nodes, np.pad(weight[rows, best], missing), apart[rows, best], allowed
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Rails, Side
@@ -76,7 +76,7 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
 
 def _side(parts: Assembly, body: str) -> Side:
     mesh, start = parts.meshes[body], parts.node_start[body]
-    return Side(body, mesh, parts.X[start : start + len(mesh.points)], turn(parts.scene.body(body).rotation))
+    return Side(body, mesh, parts.X[start : start + len(mesh.points)], rotation_matrix(parts.scene.body(body).rotation))
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,14 @@ def _nodes_of(pairs: dict[str, NDArray]) -> Index:
     """All nodes of the pairs, without the ground."""
     both = np.concatenate([pairs["joint_first"], pairs["joint_second"]])
     return both[both != GROUND]
+
+
+def free_nodes(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> NDArray[np.bool_]:
+    """Nodes that no joint ties and nothing holds or drives, shape (node_count,)."""
+    free = held["fixed_axes"] == 0
+    free[held["prescribed_node"]] = False
+    free[_nodes_of(pairs)] = False
+    return free
 
 
 def check_bindings(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> None:

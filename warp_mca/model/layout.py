@@ -21,13 +21,13 @@ class Layout:
 
     Attributes:
         nodes: first node of each scene, and the number of all, shape (scene_count + 1,), int32.
-        hinges: first hinge of each scene, and the number of all, shape (scene_count + 1,), int32.
+        joints: first joint of each scene, and the number of all, shape (scene_count + 1,), int32.
         elements: first and end of each scene's elements in each block, in the model's order, shape
             (scene_count, block_count, 2), int32.
     """
 
     nodes: Index
-    hinges: Index
+    joints: Index
     elements: Index
 
     @property
@@ -57,6 +57,6 @@ def layout_of(model: Model) -> Layout:
     ends = [[block.first, block.first + block.conn.shape[1]] for block in model.blocks]
     return Layout(
         nodes=offsets([model.node_count]),
-        hinges=offsets([len(model.hinges)]),
+        joints=offsets([len(model.joints)]),
         elements=np.array([ends], dtype=np.int32),
     )

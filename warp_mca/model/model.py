@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,16 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.constraints import JointPairs, check_bindings, constraints, join_bodies
+from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
 from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.scene import Contact, RigidPlane, Scene
+
+if TYPE_CHECKING:
+    from warp_mca.rigid.chain import Chain
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -49,7 +54,9 @@ class Model:
             float64.
         joint_slides: of each rail the first of its sliders, the first of its own nodes and the end of these in
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
-        hinges: the joints that own the pairs.
+        joints: name of each joint and its pairs.
+        hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
+        bases: of chains, that move or slide; their pairs count as tied in no direction.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
@@ -78,7 +85,9 @@ class Model:
     joint_second: Index
     joint_tied: Array
     joint_slides: Index
-    hinges: tuple[JointPairs, ...]
+    joints: tuple[JointPairs, ...]
+    hinge_loads: tuple[HingeLoad, ...]
+    bases: tuple[MovableBase, ...]
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -212,10 +221,14 @@ def build_model(
     X: Mapping[str, Array],
     V: Mapping[str, Array],
     watched: Sequence[tuple[str, int]] = (),
+    *,
+    chain: Chain | None = None,
+    start: float = 0.0,
 ) -> Model:
     """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
 
-    `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh.
+    `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh. What
+    acts in the joints of a `chain` and moves its base goes on, from `start` on [s], counted from the release.
 
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
@@ -223,6 +236,9 @@ def build_model(
     parts = Assembly(scene, meshes, X)
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints = join_bodies(parts)
+    bases = movable_bases(parts, joints, chain, start)
+    for base in bases:
+        pairs["joint_tied"][base.start : base.end] = 0.0
     blocks, order = parts.blocks()
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
@@ -237,7 +253,9 @@ def build_model(
         law=parts.law(),
         **held,
         **pairs,
-        hinges=joints,
+        joints=joints,
+        hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
+        bases=bases,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

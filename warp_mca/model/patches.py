@@ -21,7 +21,7 @@ SLOT_BITS, MATERIAL_BITS = 9, 14
 SECOND_SLOT = SLOT_BITS + MATERIAL_BITS
 GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners just fit 32
 LARGEST = 128.0  # extent of a patch over that of its smallest element, where the grid rounds 4 times as much as float32
-LOT = 1 << 13  # elements that are sorted at a time, where parts are smaller
+SORT_CHUNK = 1 << 13  # elements that are sorted at a time, where parts are smaller
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -54,7 +54,7 @@ def compact_order(X: Array, conn: Index, size: int) -> Index:
         half = size * np.rint((end - begin) / size / 2).astype(np.int64)
         for length in np.unique(end - begin):
             alike = np.flatnonzero(end - begin == length)
-            for lot in chunks(len(alike), max(1, LOT // int(length))):
+            for lot in chunks(len(alike), max(1, SORT_CHUNK // int(length))):
                 _cut(box, order, begin[alike[lot]], int(length), int(half[alike[0]]))
         begin, end = np.stack([begin, begin + half]).ravel(), np.stack([begin + half, end]).ravel()
     full = count // size * size
@@ -183,7 +183,7 @@ def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixe
     count = conn.shape[1]
     ends = sorted({0, *ends, count})
     start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
-    lots = chunks(len(start) - 1, LOT // PATCH)
+    lots = chunks(len(start) - 1, SORT_CHUNK // PATCH)
     made = []
     for lot in lots:
         part = slice(start[lot.start], start[lot.stop])

@@ -12,7 +12,7 @@ Index = NDArray[np.int32]
 
 SHARP = math.cos(math.radians(50.0))  # between the normals of faces that meet at a sharp edge, at most
 BENT = math.cos(math.radians(0.1))  # between the normals of neighbouring faces of a flat surface, at least
-MOST = 6  # sides; faces of a surface as rough as to need more share them
+MAX_SIDES = 6  # of a surface; where rough faces need more, sides share numbers
 
 
 def _neighbours(face: Index) -> tuple[Index, Index]:
@@ -40,7 +40,7 @@ def find_sides(face: Index, normal: Array) -> Index:
 
     Faces that share an edge are on one side, unless their normals differ by more than 50 degrees. Parts that meet at
     such an edge get different numbers; those that do not meet may get the same, as opposite ones of a box do, so that
-    three or four numbers are enough, and never more than `MOST`.
+    three or four numbers are enough, and never more than `MAX_SIDES`.
 
     Args:
         face: corners of each face, shape (face_count, 4), int32; triangles have their last one twice.
@@ -63,7 +63,7 @@ def find_sides(face: Index, normal: Array) -> Index:
     number = np.full(count, -1, dtype=np.int32)
     for p in np.argsort(-np.bincount(part), kind="stable"):
         taken = {int(number[q]) for q in meets[p]}
-        number[p] = next((k for k in range(MOST) if k not in taken), p % MOST)
+        number[p] = next((k for k in range(MAX_SIDES) if k not in taken), p % MAX_SIDES)
     return number[part]
 
 

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
-MOST = 100 * BATCH  # of them: 24 x 24 problems cost 50 us each
+MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem takes 50 us
 # Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring alone
 # holds the node, up to SUPPORT more where the element does; measured, see docs/theory.md.
 BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9
@@ -85,7 +85,7 @@ def stable_step(
     worst, element = float(value.max()), int(first[value.argmax()])
     bound[first] = 0.0
     left = np.flatnonzero(bound > worst)
-    if len(left) > MOST:
+    if len(left) > MAX_EXACT:
         left = left[_different(X, conn[left], bound[left])]
     for part in chunks(len(left), CHUNK):
         bound[left[part]] = bounds(left[part], False)
@@ -95,7 +95,7 @@ def stable_step(
         part = left[start : start + BATCH]
         if bound[part[0]] <= worst:
             break
-        if start >= MOST:  # the bound of what is left does as well
+        if start >= MAX_EXACT:  # the bound of what is left does as well
             worst, element = float(bound[part[0]]), int(part[0])
             break
         value = exact(part)

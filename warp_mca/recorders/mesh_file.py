@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.base.errors import McaError, RequestError, bad_value
-from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MOST_CORNERS, CellType
+from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MAX_CORNERS, CellType
 from warp_mca.geometry.degenerate import cell_names
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file, file_path
 
@@ -96,7 +96,7 @@ def cells(model: Model) -> tuple[list[tuple[CellType, NDArray[np.int64]]], NDArr
 
     Cells come in the order of the concatenated meshes, which is not the model's.
     """
-    nodes = np.full((model.element_count, MOST_CORNERS), -1, dtype=np.int64)
+    nodes = np.full((model.element_count, MAX_CORNERS), -1, dtype=np.int64)
     material = np.empty(model.element_count, dtype=np.int32)
     for block in model.blocks:
         index = model.element_of[block.first : block.first + block.conn.shape[1]]

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boxes import Boxes, cell_boxes
-from warp_mca.geometry.cell_types import MOST_CORNERS
+from warp_mca.geometry.cell_types import MAX_CORNERS
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
+from warp_mca.model.layout import offsets
 from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Line, Path, Scene
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MOST_PROBES = 100_000  # of a line
+MAX_PROBES = 100_000  # of a line
 
 
 @dataclass(frozen=True)
@@ -83,14 +84,14 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
         RequestError: a probe lies outside its body.
     """
     position: dict[str, Array] = {}
-    corner, weight = [np.zeros((0, MOST_CORNERS), np.int32)], [np.zeros((0, MOST_CORNERS))]
+    corner, weight = [np.zeros((0, MAX_CORNERS), np.int32)], [np.zeros((0, MAX_CORNERS))]
     found = {} if found is None else found
     boxes: dict[str, dict[str, Boxes]] = {}
     for path in scene.paths:
         along = []
         for line in path.lines:
             mesh = meshes[line.body]
-            if not line.length < MOST_PROBES * path.spacing:
+            if not line.length < MAX_PROBES * path.spacing:
                 count = line.length / path.spacing
                 remedy = f"a line of {line.length:g} m would have {count:.3g} probes; give a larger one"
                 raise bad_value(f"Path {path.name}.spacing", path.spacing, remedy)
@@ -110,7 +111,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
 
 
 def _elements_around(at: Array, mesh: Mesh, boxes: Mapping[str, Boxes], path: Path) -> Place:
-    """Corners of the cell around each point, shape (point_count, MOST_CORNERS), and their weights there.
+    """Corners of the cell around each point, shape (point_count, MAX_CORNERS), and their weights there.
 
     Raises:
         RequestError: a point lies outside the mesh.
@@ -149,3 +150,14 @@ def load_paths(file: str | os.PathLike[str]) -> tuple[PathHistory, ...]:
     """The paths that `save_paths` wrote."""
     found = load_histories(file, "position_m", "stress_Pa")
     return tuple(PathHistory(name, *columns) for name, columns in found.items())
+
+
+def join_probes(parts: Sequence[tuple[Probes, int]]) -> Probes:
+    """Probes of all scenes, scene by scene, in the node numbers of the batch model; positions are left out.
+
+    Args:
+        parts: probes and node count of each scene.
+    """
+    nodes = offsets([count for _, count in parts])
+    corner = [probes.corner + start for (probes, _), start in zip(parts, nodes, strict=False)]
+    return Probes({}, np.concatenate(corner), np.concatenate([probes.weight for probes, _ in parts]))

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array
 from warp_mca.rigid.placement import Placement
@@ -72,7 +72,7 @@ def body_motion(
     for _ in range(MAX_ITERATIONS):
         motion = Motions(placement.place(points)[0], placement.origin, masses, held)
         step = motion.fit(positions - motion.shape)[0]
-        rotation = turn(step[3:]) @ placement.rotation
+        rotation = rotation_matrix(step[3:]) @ placement.rotation
         placement = replace(placement, origin=placement.origin + step[:3], rotation=rotation)
         if max(np.abs(step[:3]).max() / motion.radius, np.abs(step[3:]).max()) <= 4.0 * np.finfo(np.float64).eps:
             break

@@ -24,7 +24,7 @@ Forces = Callable[[Array], Array]
 TOLERANCE = 1e-6  # share of the elastic energy that may still be free to leave
 PROBES = 12  # products with random signs for the diagonal
 DIFFERENCE = 1e-8  # largest displacement of a difference quotient, over the body's radius of inertia
-LEAST_DELAY = 50  # iterations that tell what is still free to leave
+MIN_DELAY = 50  # iterations that tell what is still free to leave
 MAX_NEWTON = 20
 MAX_ITERATIONS = 20_000  # of conjugate gradients, in each linear step
 MAX_HALVINGS = 10
@@ -77,7 +77,7 @@ def equilibrium(
     """
     search = _Search(forces, u, points, masses, held, name)
     u, residual = u.copy(), search.residual(u)
-    released, drop, delay = 0.0, np.inf, LEAST_DELAY
+    released, drop, delay = 0.0, np.inf, MIN_DELAY
     for _ in range(MAX_NEWTON):
         if not residual.any():
             return Equilibrium(u=u, released=released, remaining=0.0, evaluations=search.evaluations)

@@ -12,8 +12,8 @@ from warp_mca.base.errors import bad_value
 from warp_mca.rigid.chain import Array, Chain
 from warp_mca.rigid.loads import Loads, joint_rates, link_torques
 
-MOST_TURN = 1e4  # of a chain at its own pace [rad]: some minutes of computing
-MOST_DECAYS = 1e6  # of joint rates by friction at rest, in a swing: some minutes of computing
+MAX_TURN = 1e4  # angle through which a chain may turn in a swing [rad]; it takes minutes to compute
+MAX_DECAYS = 1e6  # decay times of joint friction at rest in a swing; it takes minutes to compute
 
 
 def flow(chain: Chain, middle: float) -> Callable[[float, Array], Array]:
@@ -71,8 +71,8 @@ def own_pace(chain: Chain, y: Array, span: float, field: str) -> float:
                 slopes = [chain.loads.base_velocity.slope(t) for t in chain.loads.corners]
                 square += float(np.linalg.norm(slopes, axis=1).max()) / reach(chain)
         pace = math.sqrt(square)
-    if not pace * span < MOST_TURN:
-        remedy = f"links that turn at {pace:.3g} rad/s would turn by more than {MOST_TURN:g} rad; give a shorter time"
+    if not pace * span < MAX_TURN:
+        remedy = f"links that turn at {pace:.3g} rad/s would turn by more than {MAX_TURN:g} rad; give a shorter time"
         raise bad_value(field, span, remedy)
     return pace
 
@@ -84,7 +84,7 @@ def _check_stiffness(loads: Loads, inertia: float, span: float) -> None:
         RequestError: so it does.
     """
     rate = float((loads.friction / loads.friction_rate + loads.damping).max()) / inertia
-    if not rate * span < MOST_DECAYS:
+    if not rate * span < MAX_DECAYS:
         remedy = (
             f"friction at rest would decay {rate * span:.3g} times in {span:g} s; give a larger rate or less friction"
         )

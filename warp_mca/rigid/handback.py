@@ -106,6 +106,23 @@ def hand_back(
     )
 
 
+def carriage_motion(chain: Chain, t: float, points: Array, positions: Array, velocities: Array) -> Vec2:
+    """Way [m] and velocity [m/s] of the carriage along its slide, from the nodes that it carries; 0 without a slide.
+
+    Args:
+        chain: with base and slide as at the release.
+        t: time from release [s].
+        points: of the first link in its body's frame, without deformation [m], shape (node_count, 3), float64.
+        positions, velocities: of its nodes in the world [m], [m/s], shape (node_count, 3), float64.
+    """
+    if chain.slide is None:
+        return (0.0, 0.0)
+    on_axis, placed, e = _on_axis(points, np.asarray(chain.links[0].hinge_in)), chain.moved_to(t), np.array(chain.slide)
+    way = positions[on_axis, :2].mean(axis=0) - np.asarray(placed.origin)
+    rate = velocities[on_axis, :2].mean(axis=0) - np.asarray(placed.origin_velocity)
+    return (float(way @ e), float(rate @ e))
+
+
 def deformed_chain(chain: Chain, reference: Mapping[str, Array], points: Mapping[str, Array]) -> Chain:
     """The chain with each hinge where the nodes on it have moved in their body's frame.
 
@@ -131,9 +148,13 @@ def _pair(vector: Array) -> Vec2:
 
 def _moved(reference: Array, points: Array, hinge: Array) -> Array:
     """Mean displacement of the nodes on a hinge axis [m], shape (2,), float64; 0 if there are none."""
-    away = np.linalg.norm(reference[:, :2] - hinge, axis=1)
-    on_axis = away <= 1e-6 * np.ptp(reference, axis=0).max()
+    on_axis = _on_axis(reference, hinge)
     return (points - reference)[on_axis, :2].mean(axis=0) if on_axis.any() else np.zeros(2)
+
+
+def _on_axis(reference: Array, hinge: Array) -> NDArray[np.bool_]:
+    """Which nodes lie on a hinge's axis."""
+    return np.linalg.norm(reference[:, :2] - hinge, axis=1) <= 1e-6 * np.ptp(reference, axis=0).max()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array, Chain
 from warp_mca.rigid.placement import Placement, link_placements
@@ -134,7 +134,7 @@ def _own_placement(body: Body, t: float) -> Placement:
     return Placement(
         pivot=np.zeros(3),
         origin=np.array(body.position) + velocity * t,
-        rotation=turn(omega * t) @ turn(body.rotation),
+        rotation=rotation_matrix(omega * t) @ rotation_matrix(body.rotation),
         velocity=velocity,
         angular_velocity=omega,
     )

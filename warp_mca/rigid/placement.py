@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.rigid.chain import Array, Chain, link_axes
 
 
@@ -46,7 +46,7 @@ class Placement:
 
     def after(self, span: float) -> Placement:
         """The placement after a time [s] at the same velocity of the pivot and the same angular velocity."""
-        rotation = turn(self.angular_velocity * span) @ self.rotation
+        rotation = rotation_matrix(self.angular_velocity * span) @ self.rotation
         return replace(self, origin=self.origin + self.velocity * span, rotation=rotation)
 
     def to_body(self, positions: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array, Chain, Link, Vec2, mesh_link, slender_link
 from warp_mca.rigid.loads import Loads, Table
@@ -127,7 +127,7 @@ def _apex(tip: Tip, hinge: Vec2) -> Vec2:
 def _ground_hinge(scene: Scene, name: str, hinge: Vec2) -> Vec2:
     """World position of the first hinge [m]: position + R(rotation) hinge, in the plane."""
     body = scene.body(name)
-    turned = turn(body.rotation) @ (*hinge, 0.0)
+    turned = rotation_matrix(body.rotation) @ (*hinge, 0.0)
     return (body.position[0] + float(turned[0]), body.position[1] + float(turned[1]))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.rotation import turn
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array, Chain, link_axes
 from warp_mca.rigid.placement import Placement
@@ -106,7 +106,7 @@ def target_plane(scene: Scene, target: Surface | RigidPlane, meshes: Mapping[str
                 f"Body {body.name}.angular_velocity", body.angular_velocity, "a target must not turn; give 0"
             )
         point, normal = _mean_plane(meshes[target.body], target)
-        turned = turn(body.rotation)
+        turned = rotation_matrix(body.rotation)
         point, normal = np.asarray(body.position) + turned @ point, turned @ normal
         velocity = np.array(body.velocity, dtype=np.float64)
     normal = normal / np.linalg.norm(normal)

@@ -65,6 +65,7 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
     with np.errstate(over="ignore"):
         speed = float(np.linalg.norm(model.V, axis=1).max())
     driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
+    driven = max([driven, *(float(np.abs(base.velocities).sum(axis=1).max()) for base in model.bases)])
     fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
     far = float(np.abs(model.X).max())
     spacing = float(np.spacing(far))

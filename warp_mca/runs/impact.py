@@ -11,8 +11,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
-from warp_mca.model.join import join_models, join_probes
+from warp_mca.model.batch_model import join_models
 from warp_mca.model.layout import offsets
+from warp_mca.results.paths import join_probes
 from warp_mca.runs.account import Account
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import (
+    CARRIAGE,
     DRIVE_WORK,
     ELASTIC,
     FRICTION,
@@ -17,7 +18,9 @@ from warp_mca.kernels.records.columns import (
     HOURGLASS,
     IMPULSE,
     JACOBIAN,
+    JOINT_HEAT,
     KINETIC,
+    LOAD_WORK,
     LOST,
     NORMAL_ENERGY,
     NORMAL_FORCE,
@@ -41,7 +44,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-LEAST = 1e-7  # of all energy, that counts as exchanged at least
+MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not counted
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 
 _FLAGS = (
@@ -136,9 +139,14 @@ class Ledger:
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
         springs = self.springs(sums)
-        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + springs[..., PLANE_WORK].sum(axis=-1)
+        work = (
+            sums[..., GRAVITY_WORK]
+            + sums[..., DRIVE_WORK]
+            + sums[..., LOAD_WORK]
+            + springs[..., PLANE_WORK].sum(axis=-1)
+        )
         return {
-            "kinetic": sums[..., KINETIC],
+            "kinetic": sums[..., KINETIC] + sums[..., CARRIAGE],
             "elastic": sums[..., ELASTIC],
             "plastic": sums[..., PLASTIC],
             "hourglass": sums[..., HOURGLASS],
@@ -146,7 +154,7 @@ class Ledger:
             "friction": springs[..., FRICTION].sum(axis=-1),
             "contact_loss": springs[..., LOST].sum(axis=-1),
             "damping": np.zeros(sums.shape[:-1]),
-            "joint": np.zeros(sums.shape[:-1]),
+            "joint": sums[..., JOINT_HEAT],
             "external_work": work - self.kept.initial_work,
         }
 
@@ -192,7 +200,7 @@ class Ledger:
     @property
     def exchanges(self) -> bool:
         """Whether bodies exchanged energy worth a word, by contact, joints or external work."""
-        all_energy = LEAST * self.kept.energy_scale
+        all_energy = MIN_EXCHANGE * self.kept.energy_scale
         met = self.kept.touched or len(self.model.joint_first) > 0 or self.kept.worked > all_energy
         return met and self.kept.exchanged > max(all_energy, self.rounding)
 
@@ -200,17 +208,17 @@ class Ledger:
     def exchange_error(self) -> float:
         """Largest imbalance as a share of `exchanged` [-]: the same for all who watch, however fast bodies move along.
 
-        What is exchanged counts as LEAST of the initial energy and external work at least, and as the energy of
+        What is exchanged counts as MIN_EXCHANGE of the initial energy and external work at least, and as the energy of
         rounding, so that the rounding of motion alone counts for little.
         """
-        scale = max(self.kept.exchanged, LEAST * self.kept.energy_scale, self.rounding)
+        scale = max(self.kept.exchanged, MIN_EXCHANGE * self.kept.energy_scale, self.rounding)
         return self.kept.imbalance / scale if scale > 0.0 else 0.0
 
     @property
     def greatest_contact_share(self) -> float:
         """Greatest energy of all contact springs in a record as a share of `exchanged` [-]; 0 where hardly any was."""
         kept = self.kept
-        return kept.contact_energy / kept.exchanged if kept.exchanged > LEAST * kept.energy_scale else 0.0
+        return kept.contact_energy / kept.exchanged if kept.exchanged > MIN_EXCHANGE * kept.energy_scale else 0.0
 
     def nodes_at_peak(self, k: int) -> float:
         """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""

@@ -45,3 +45,8 @@ class Motion:
     def points(self, name: str, points: Array) -> Array:
         """Shape of a body in its frame, from its nodes without displacement [m], each shape (node_count, 3)."""
         return points + self.shapes[name] if self.shapes else points
+
+    @property
+    def strain_energy(self) -> float:
+        """Of the elements, plastic work included [J]."""
+        return self.elastic + self.plastic + self.hourglass

@@ -74,7 +74,8 @@ def prepare(
     tell("rigid", 0.0)
     start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})
     clock.lap("rigid")
-    model = build_model(scene, meshes, start.positions, start.velocities)
+    X, V = start.positions, start.velocities
+    model = build_model(scene, meshes, X, V, chain=start.chain, start=start.t_contact or 0.0)
     probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
     return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model)))

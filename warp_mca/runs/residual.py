@@ -1,7 +1,7 @@
 """Owns the shape that bodies keep between two impacts: the equilibrium of their elements with the plastic strain.
 
-The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground or on held axes stay where
-they are. Forces are those of the elements in float64, whatever the precision of the run.
+The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground, on a base or on held axes
+stay where they are. Forces are those of the elements in float64, whatever the precision of the run.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.model.assembly import GROUND
 from warp_mca.model.model import Model
 from warp_mca.rigid.equilibrium import equilibrium
+from warp_mca.runs.settings import Settings
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
 
@@ -29,7 +30,6 @@ class Shape:
         u: displacements [m], shape (node_count, 3), float64.
         state: of the elements then, in float64.
         elastic, plastic, hourglass: energies then [J].
-        lost: elastic and hourglass energy that vibrated, and left [J].
     """
 
     u: Array
@@ -37,16 +37,28 @@ class Shape:
     elastic: float
     plastic: float
     hourglass: float
-    lost: float
+
+    @property
+    def strain_energy(self) -> float:
+        """Of the elements, plastic work included [J]."""
+        return self.elastic + self.plastic + self.hourglass
+
+    def give(self, state: State) -> None:
+        """Let a state of the same model have this shape, and the history that its elements have then."""
+        state.u.assign(self.u)
+        for own, kept in zip(state.elements, self.state.elements, strict=True):
+            own.yielded.assign(kept.yielded.numpy())
+            own.history.assign(kept.history.numpy())
 
 
 class Relaxation:
     """Relaxes states of one model of one scene."""
 
-    def __init__(self, model: Model, *, device: str, threads: int, dt: float) -> None:
-        """Allocate a solver in float64; its time step `dt` [s] plays no part."""
+    def __init__(self, model: Model, settings: Settings) -> None:
+        """Allocate a solver in float64 on the device of the `settings`."""
         self.model = model
-        self.solver = Solver(model, device=device, precision="float64", dt=dt, threads=threads)
+        dt = model.stable.dt  # of any length: no step is taken
+        self.solver = Solver(model, device=settings.device, precision="float64", dt=dt, threads=settings.threads)
         self.solver.compile()
         self.base, self.trial = self.solver.new_state(), self.solver.new_state()
         second = model.joint_second
@@ -54,6 +66,7 @@ class Relaxation:
         self.held = np.stack([(model.fixed_axes >> axis & 1).astype(bool) for axis in range(3)], axis=1)
         self.held[model.prescribed_node, model.prescribed_axis] = True
         self.held[model.joint_first[second == GROUND]] = True
+        self.grounded = model.joint_first[(second == GROUND) & model.joint_tied.any(axis=(1, 2))]  # not on a base
         self.held[second[self.tied]] = True  # they follow the first node of their pair
         self.masses = model.mass.copy()
         np.add.at(self.masses, model.joint_first[self.tied], model.mass[second[self.tied]])
@@ -84,21 +97,24 @@ class Relaxation:
             held=self.held,
             name="the bodies",
         )
-        u = self._joined(found.u)
+        u = self._followed(found.u)
         self._evaluate(u)
         elastic, plastic, hourglass = self._energies()
-        lost = before[0] + before[2] - elastic - hourglass
-        return Shape(u=u, state=self.trial, elastic=elastic, plastic=plastic, hourglass=hourglass, lost=lost)
+        return Shape(u=u, state=self.trial, elastic=elastic, plastic=plastic, hourglass=hourglass)
 
     def _joined(self, u: Array) -> Array:
         """Displacements with tied nodes in one place, in the middle by mass, and nodes on the ground at theirs."""
         model, found = self.model, u.copy()
         first, second = model.joint_first[self.tied], model.joint_second[self.tied]
-        share = (model.mass[first] / (model.mass[first] + model.mass[second]))[:, None]
-        follows = np.abs(u[first] - u[second]).max(initial=0.0) > 0.0
-        found[first] = share * u[first] + (1.0 - share) * u[second] if follows else u[first]
-        found[second] = found[first]
+        share = (model.mass[second] / (model.mass[first] + model.mass[second]))[:, None]
+        found[first] += share * (u[second] - u[first])
         found[model.joint_first[model.joint_second == GROUND]] = 0.0
+        return self._followed(found)
+
+    def _followed(self, u: Array) -> Array:
+        """Displacements with the second node of each tied pair where the first one is."""
+        found = u.copy()
+        found[self.model.joint_second[self.tied]] = u[self.model.joint_first[self.tied]]
         return found
 
     def _evaluate(self, u: Array) -> None:
@@ -113,10 +129,8 @@ class Relaxation:
 
     def _forces(self, u: Array) -> Array:
         """Forces of the elements on the nodes [N], those on second nodes of tied pairs given to the first."""
-        full = u.copy()
         first, second = self.model.joint_first[self.tied], self.model.joint_second[self.tied]
-        full[second] = full[first]
-        self._evaluate(full)
+        self._evaluate(self._followed(u))
         with wp.ScopedDevice(self.solver.device):
             self.trial.v.zero_()
             self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.bonds.at_rest)

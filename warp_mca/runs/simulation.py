@@ -101,15 +101,14 @@ def _cycle(
         RequestError: the request cannot be carried out.
         GuardError: an impact lost its footing.
     """
-    from warp_mca.runs.cycle import Cycle
+    from warp_mca.runs.cycle import begin_cycle, run_cycle
     from warp_mca.runs.cycle_result import cycle_result
 
     if recorders:
         remedy = "recorders show a single impact; leave t_end out, or the recorders"
         raise bad_value("Scene.t_end", scene.t_end, remedy)
-    cycle = Cycle(scene, meshes, span, settings, Clock(), tell)
-    cycle.run()
-    return cycle_result(cycle)
+    setup = begin_cycle(scene, meshes, span, settings, tell)
+    return cycle_result(setup, run_cycle(setup))
 
 
 def simulate(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def per_scene(first: NDArray[np.int32]) -> Any:
-    """Scene of each entry for kernels: 0 where there is one scene, else an array; see `kernels.hardware.each`."""
+    """Scene of each entry for kernels: 0 where there is one scene, else an array; see `kernels.hardware.per_scene`."""
     if len(first) == 2:
         return 0
     return wp.array(np.repeat(np.arange(len(first) - 1), np.diff(first)), dtype=wp.int32)

@@ -12,9 +12,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.overlap import EARLY, LEAST_ARCH
+from warp_mca.kernels.hardware.overlap import EARLY, MIN_ARCH
 
-LEAST_DRIVER = (12, 3)
+MIN_DRIVER = (12, 3)
 
 _KERNEL = 0  # CU_GRAPH_NODE_TYPE_KERNEL
 _PROGRAMMATIC = 1  # CU_GRAPH_DEPENDENCY_TYPE_PROGRAMMATIC and CU_GRAPH_KERNEL_NODE_PORT_PROGRAMMATIC
@@ -80,9 +80,9 @@ def overlap(graph: Any) -> int:
         RuntimeError: the driver failed.
     """
     device = graph.device
-    if not device.is_cuda or tuple(wp.get_cuda_driver_version() or ()) < LEAST_DRIVER:
+    if not device.is_cuda or tuple(wp.get_cuda_driver_version() or ()) < MIN_DRIVER:
         return 0
-    if device.get_cuda_compile_arch() < LEAST_ARCH:  # of the code, which may be older than the device's own
+    if device.get_cuda_compile_arch() < MIN_ARCH:  # of the code, which may be older than the device's own
         return 0
     count = ctypes.c_size_t()
     _call("cuGraphGetEdges_v2", graph.graph, None, None, None, ctypes.byref(count))

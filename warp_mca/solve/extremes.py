@@ -20,7 +20,7 @@ class NormalForce:
     """How normal forces of all springs of a step are summed for each scene: `State.normal_force` holds the sums.
 
     Attributes:
-        per_newton: what the sums count for a newton [1/N], a power of two; see `kernels.hardware.each`.
+        per_newton: what the sums count for a newton [1/N], a power of two; see `kernels.hardware.per_scene`.
     """
 
     def __init__(self, scenes: Sequence[Sequence[ContactPass]], threads: int) -> None:

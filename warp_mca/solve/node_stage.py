@@ -54,7 +54,15 @@ class NodeStage:
     def advance_bound(self, step: Step) -> None:
         """Nodes in joints and driven ones."""
         work, state, own = self.work, step.state, step.state.constraints
-        inputs = [work.mass, work.inverse_mass, work.near, work.more, self.bonds.role, work.force, self.scene]
+        inputs = [
+            work.mass,
+            work.inverse_mass,
+            work.first_slots,
+            work.more_slots,
+            self.bonds.role,
+            work.force,
+            self.scene,
+        ]
         inputs += [self.gravity, self.bonds.bonds, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
@@ -82,7 +90,7 @@ class NodeStage:
         def launch(part: slice) -> None:
             scene = 0 if isinstance(self.scene, int) else self.scene[part]
             contact_force = work.contact_force[part] if self.touched else work.contact_force
-            inputs = [work.inverse_mass[part], work.near[part], work.more]
+            inputs = [work.inverse_mass[part], work.first_slots[part], work.more_slots]
             inputs += [role[part] if len(role) else role, work.force, scene, self.gravity, kick, drift]
             outputs = [contact_force, state.u[part], state.v[part], None if before is None else before[part]]
             keepers = node.KEEPERS if self.touched and part.start == 0 else 0

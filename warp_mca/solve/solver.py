@@ -33,6 +33,7 @@ from warp_mca.solve.bonds import BondStage
 from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.early_launch import overlap
 from warp_mca.solve.extremes import NormalForce
+from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.node_stage import NodeStage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
@@ -70,6 +71,7 @@ class Solver:
         work: the model on the device, and what a step computes and forgets.
         elements, contacts: stages of the model's blocks and contact passes.
         bonds: what binds nodes.
+        loads: what acts in the joints of chains, and moves their bases.
         output: what is read off the state for paths and recorders, or None.
     """
 
@@ -97,9 +99,9 @@ class Solver:
         self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
         for index, stage in enumerate(self.elements):
             stage.index = index
-        near, more = gather_lists(self.elements, model.node_count)
+        first_slots, more_slots = gather_lists(self.elements, model.node_count)
         slots = sum(len(stage.slot_node) for stage in self.elements)
-        self.work = Workspace(model, self.layout, self.precision, near, more, slots)
+        self.work = Workspace(model, self.layout, self.precision, first_slots, more_slots, slots)
         scenes = [model.passes[k * passes : (k + 1) * passes] for k in range(self.layout.count)]
         self.normal_force = NormalForce(scenes if passes else [], self.threads)
         self.contacts = [ContactStage(model.passes[k::passes], model, k, self.normal_force) for k in range(passes)]
@@ -108,6 +110,7 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.bonds = BondStage(model, self.layout)
+        self.loads = LoadStage(model, self.layout.count, self.work, self.bonds, self.dt)
         self.nodes = NodeStage(model, self.work, self.bonds, self.precision, self.dt, self._early)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
@@ -144,12 +147,16 @@ class Solver:
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
         advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.bonds.count else []
         advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.bonds.rails) else []
+        advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
         advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
             Stage("motion sums", lambda s: self.records.sum_motion(s, self.bonds, self.dt), only_records=True),
             Stage("frames: velocity", self._after_step, only_records=True),
         ]
-        return [forces, energies, sums, advance, motion]
+        if self.loads.kernels():
+            motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
+        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
+        return [forces, energies, sums, advance, *([torques] if self.model.hinge_loads else []), motion]
 
     def _before_step(self, step: Step) -> None:
         if self.output and step.is_row:
@@ -173,6 +180,7 @@ class Solver:
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],
                 constraints=self.bonds.new_state(),
+                loads=self.loads.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
@@ -218,7 +226,7 @@ class Solver:
     def _kernels(self) -> list[tuple[list[Any], int | None]]:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
-        sums = self.records.kernels()
+        sums = self.records.kernels() + self.loads.kernels()
         sums += [slide.slide] if len(self.bonds.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
@@ -256,11 +264,13 @@ class Solver:
     def start(self, state: State) -> None:
         """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
 
-        Bodies are free of stress then.
+        Bodies are free of stress then, so that gravity and the drives of joints alone accelerate them.
         """
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
             self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.bonds.at_rest)
+            if self.model.hinge_loads:
+                self.loads.torques(state, -0.5 * self.dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
@@ -355,8 +365,8 @@ class Solver:
     def joint_impulses(self, state: State, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each joint of a scene gave to its first body [N s], by name."""
         impulse = state.constraints.impulse.numpy()
-        hinges = self.model.hinges[self.layout.hinges[scene] : self.layout.hinges[scene + 1]]
-        return {h.name: impulse[h.start : h.end].sum(axis=0).tolist() for h in hinges}
+        joints = self.model.joints[self.layout.joints[scene] : self.layout.joints[scene + 1]]
+        return {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
 
     def device_name(self) -> str:
         """The device, with what it is."""

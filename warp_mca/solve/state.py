@@ -25,6 +25,7 @@ from warp_mca.base.validate import DAMAGE
 from warp_mca.elements.state import ElementState
 from warp_mca.solve.bonds import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class State:
         elements: of each block, `ElementState`.
         contacts: of each contact pass, `ContactState`.
         constraints: of joints and driven nodes, `ConstraintState`.
+        loads: of torques in hinges and of movable bases, `LoadState`.
         steps: steps taken since the start of the phase [-].
         scenes: what each scene has recorded so far, `records.SceneRecords`.
     """
@@ -60,6 +62,7 @@ class State:
     elements: list[ElementState]
     contacts: list[ContactState]
     constraints: ConstraintState
+    loads: LoadState
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
 

@@ -21,7 +21,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.base.errors import bad_value
-from warp_mca.kernels.hardware.lanes import LANES
+from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
 from warp_mca.kernels.hardware.subnormals import begin_flush, end_flush
 
 Task = Callable[[], object]
@@ -200,7 +200,7 @@ class Stages:
             return
         self._end()
         stage: list[Task] = []
-        ends = [count * k // parts // LANES * LANES for k in range(parts)] + [count]
+        ends = [count * k // parts // RANGE_MULTIPLE * RANGE_MULTIPLE for k in range(parts)] + [count]
         for start, end in pairwise(ends):
             with wp.ScopedCapture() as capture:
                 launch(slice(start, end))

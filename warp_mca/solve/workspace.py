@@ -22,7 +22,7 @@ class Workspace:
         X: reference positions [m], shape (node_count,), vec3d.
         mass, inverse_mass: lumped masses [kg], [1/kg], shape (node_count,), float64.
         law: parameters of each material, see `Model.law`, in the scalars of the precision.
-        near, more: slots of the forces on each node, see `gather_lists`.
+        first_slots, more_slots: slots of the forces on each node, see `gather_lists`.
         force: of each element on its nodes, by slot [N], vec3 in the scalars of the precision.
         contact_force: other forces on nodes [N], shape (node_count,), vec3d, zero between steps; empty without contact.
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
@@ -34,14 +34,16 @@ class Workspace:
         gravity: of each scene [m/s^2], shape (scene_count,), vec3d.
     """
 
-    def __init__(self, model: Model, layout: Layout, precision: str, near: np.ndarray, more: np.ndarray, slots: int):
+    def __init__(
+        self, model: Model, layout: Layout, precision: str, first_slots: np.ndarray, more_slots: np.ndarray, slots: int
+    ):
         """Allocate on the current device; `slots` are those of the forces."""
         t, passes = scalars(precision), len(model.passes) // layout.count
         self.X = wp.array(model.X, dtype=wp.vec3d)
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
         self.law = wp.array(limited(model.law, precision), dtype=t.real)
-        self.near, self.more = wp.array(near, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)
+        self.first_slots, self.more_slots = wp.array(first_slots, dtype=wp.vec2i), wp.array(more_slots, dtype=wp.vec4i)
         self.force = wp.zeros(slots, dtype=t.vec3)
         self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)

@@ -1,4 +1,4 @@
-"""Owns the joining of models: the scenes of a batch one after the other in one model, each as it would be alone."""
+"""Owns the model of a batch: the models of its scenes concatenated; each scene computes what it would compute alone."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.model import Model
-from warp_mca.results.paths import Probes
 
 Index = NDArray[np.int32]
 
 
 def join_models(models: Sequence[Model]) -> Model:
-    """One model of several scenes; a scene alone is its own model.
+    """Concatenate the models of several scenes; the model of a single scene is returned as it is.
 
-    Contact passes stay apart, those of each scene in turn: the solver runs the first of each scene in one launch, then
-    the second.
+    Contact passes are not merged: they are listed scene by scene, and the solver launches the k-th passes of all scenes
+    together.
     """
     if len(models) == 1:
         return models[0]
@@ -32,7 +31,7 @@ def join_models(models: Sequence[Model]) -> Model:
     stable = models[fastest].stable
 
     def shifted(name: str, start: Index) -> Index:
-        """Numbers of what begins at `start` in each scene; GROUND stays."""
+        """Indices of a field of all scenes, raised by the `start` of each scene; GROUND is kept."""
         values = [getattr(model, name) for model in models]
         return np.concatenate([np.where(v == GROUND, v, v + s) for v, s in zip(values, start, strict=False)])
 
@@ -50,10 +49,20 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_second=shifted("joint_second", nodes),
         joint_tied=np.concatenate([model.joint_tied for model in models]),
         joint_slides=shifted("joint_slides", pairs),
-        hinges=tuple(
-            replace(hinge, start=hinge.start + int(start), end=hinge.end + int(start))
+        joints=tuple(
+            replace(joint, start=joint.start + int(start), end=joint.end + int(start))
             for model, start in zip(models, pairs, strict=False)
-            for hinge in model.hinges
+            for joint in model.joints
+        ),
+        hinge_loads=tuple(
+            replace(item, inner=item.inner + first, outer=item.outer + first, scene=k)
+            for k, (model, first) in enumerate(zip(models, nodes, strict=False))
+            for item in model.hinge_loads
+        ),
+        bases=tuple(
+            replace(item, start=item.start + int(start), end=item.end + int(start), scene=k)
+            for k, (model, start) in enumerate(zip(models, pairs, strict=False))
+            for item in model.bases
         ),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
@@ -69,7 +78,7 @@ def join_models(models: Sequence[Model]) -> Model:
         stable=replace(stable, element=stable.element + int(elements[fastest])),
         batch=Layout(
             nodes=nodes,
-            hinges=offsets([len(model.hinges) for model in models]),
+            joints=offsets([len(model.joints) for model in models]),
             elements=ranges,
         ),
     )
@@ -137,14 +146,3 @@ def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:
         for k, model in enumerate(models)
         for body, start in getattr(model, name).items()
     }
-
-
-def join_probes(parts: Sequence[tuple[Probes, int]]) -> Probes:
-    """Probes of all scenes in turn, in the numbering of the joined model; where paths run is left to the scenes.
-
-    Args:
-        parts: probes and node count of each scene.
-    """
-    nodes = offsets([count for _, count in parts])
-    corner = [probes.corner + start for (probes, _), start in zip(parts, nodes, strict=False)]
-    return Probes({}, np.concatenate(corner), np.concatenate([probes.weight for probes, _ in parts]))

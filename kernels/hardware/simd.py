@@ -1,0 +1,34 @@
+"""Owns the vectorisation of element kernels on a CPU: the compiler turns the loop over threads into SIMD instructions.
+
+The pragma below applies to every `for` of a module; the source that Warp generates for these kernels holds only the
+loop over threads. Each thread writes to entries of its own and reads none that another thread writes, so that the
+compiler need not prove that arrays do not overlap. It does not vectorise a loop that stores a vector of three in one
+piece; kernels therefore store forces by components.
+"""
+
+import re
+from typing import Any
+
+import warp as wp
+
+RANGE_MULTIPLE = 64  # ranges of threads begin at multiples of it: results do not depend on how elements are divided
+
+_INLINE_THRESHOLD = 60_000  # cost by LLVM's count; `hex8` at finite strain costs 47,000, Warp's own limit is 9,000
+
+_PREAMBLE = """
+#pragma clang diagnostic ignored "-Wpass-failed"
+#define for _Pragma("clang loop vectorize(assume_safety) vectorize_width(8) interleave(disable)") for
+"""
+
+
+def vectorised(kernel: Any, large: bool = False) -> Any:
+    """The kernel, with options of its module that vectorise it on the CPU.
+
+    A `large` kernel would remain a function call, which prevents vectorisation: the limit of inlining is raised for it.
+    """
+    options: dict[str, object] = {"extra_build_options": wp.ModuleBuildOptions(extra_cpu_preamble=_PREAMBLE)}
+    flags = wp.config.cpu_compiler_flags
+    if large and flags:
+        options["cpu_compiler_flags"] = re.sub(r"(-inline-threshold=)\d+", rf"\g<1>{_INLINE_THRESHOLD}", flags)
+    wp.set_module_options(options, module=kernel.module)
+    return kernel

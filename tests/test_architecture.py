@@ -1,0 +1,128 @@
+"""docs/architecture.md says what the code is: folders and their imports, stages of a step, arrays of the state."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from pathlib import Path
+
+from impacts import prepared
+from test_structure import imported, modules, tree_of
+from test_style import entries
+
+import warp_mca as mca
+from warp_mca.elements.state import ElementState
+from warp_mca.solve.bonds import ConstraintState
+from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.solver import Solver
+from warp_mca.solve.state import State
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
+
+
+def section(title: str) -> str:
+    return PAGE.split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def table(title: str) -> list[list[str]]:
+    """Cells of the rows of the section's first table."""
+    rows = re.findall(r"^\|(.*)\|$", section(title), flags=re.M)
+    return [[cell.strip() for cell in row.split("|")] for row in rows[2:]]
+
+
+def folder(module: str) -> str:
+    """The part of the package that a module belongs to; empty for modules beside the folders."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 2 else ""
+
+
+def imports_of_folders() -> dict[str, set[str]]:
+    names = modules()
+    packages = {folder(name) for name in names} - {"", "scenes"}
+    found: dict[str, set[str]] = {name: set() for name in packages}
+    for name, path in names.items():
+        part = folder(name) or name.removeprefix("warp_mca.")
+        if part in packages:
+            found[part] |= {folder(other) or other.split(".")[-1] for other in imported(tree_of(path), set(names))}
+    return {name: others & packages - {name} for name, others in found.items()}
+
+
+def test_folders_are_those_of_the_page_and_import_what_it_says():
+    listed = {cells[0].strip("`/"): set(re.findall(r"`(\w+)`", cells[2])) for cells in table("Folders")}
+    assert listed == imports_of_folders()
+
+
+def defined(tree: ast.Module) -> set[str]:
+    """Functions and classes of a file, and fields and methods of its classes as `Class.name`."""
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    found = {node.name for node in nodes}
+    for owner in nodes:
+        for item in owner.body if isinstance(owner, ast.ClassDef) else ():
+            if isinstance(item, ast.FunctionDef):
+                found.add(f"{owner.name}.{item.name}")
+            if isinstance(item, ast.AnnAssign):
+                found.add(f"{owner.name}.{ast.unparse(item.target)}")
+    return found
+
+
+def test_functions_that_the_page_names_exist():
+    """Every `file.py`, `Name` of the page is a file with that name defined in it."""
+    named = re.findall(r"`([\w/]+\.py)`, `([\w.]+)`", PAGE)
+    assert len(named) > 12
+    for file, name in named:
+        path = ROOT / file if file.startswith("kernels/") else ROOT / "warp_mca" / file
+        defined = {
+            f"{owner.name}.{item.target.id if isinstance(item, ast.AnnAssign) else item.name}"
+            for owner in ast.walk(tree_of(path))
+            if isinstance(owner, ast.ClassDef)
+            for item in owner.body
+            if isinstance(item, ast.FunctionDef)
+            or (isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name))
+        }
+        defined |= {n.name for n in ast.walk(tree_of(path)) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+        assert name in defined, f"{file} has no {name}"
+
+
+def everything() -> mca.Scene:
+    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node."""
+    rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
+    cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
+    wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
+    on_rail = {"body": "cart", "nodes": "zmin", "other": "rail", "other_nodes": "zmax", "axis": (1.0, 0.0, 0.0)}
+    return mca.Scene(
+        name="everything",
+        bodies=tuple(
+            mca.Body(name=name, geometry=box, material=STEEL, position=(0.0, 0.0, z))
+            for name, box, z in (("rail", rail, 0.0), ("cart", cart, 0.0), ("driven", cart, 0.1))
+        ),
+        joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
+        prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
+        contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
+        impact=mca.ImpactPhase(duration=1e-5),
+    )
+
+
+def test_stages_of_a_step_are_those_of_the_page_in_this_order():
+    solver = Solver(prepared(everything()).model, device="cpu", precision="mixed", dt=1e-8)
+    found = [
+        [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
+        for number, group in enumerate(solver.groups, 1)
+        for stage in group
+    ]
+    assert [cells[:4] for cells in table("Stages of a step")] == found
+
+
+STATE_PARTS = {"": State, "elements/0/": ElementState, "contacts/0/": ContactState, "constraints/": ConstraintState}
+
+
+def test_the_page_says_of_each_array_of_the_state_what_its_docstring_says():
+    rows = [
+        [f"`{prefix}{name}`", text.strip()]
+        for prefix, cls in STATE_PARTS.items()
+        for name, text in entries(inspect.cleandoc(cls.__doc__ or "")).items()
+    ]
+    assert len(rows) > 20
+    assert table("State") == rows
