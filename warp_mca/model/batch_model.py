@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +55,7 @@ def join_models(models: Sequence[Model]) -> Model:
             for model, start in zip(models, pairs, strict=False)
             for joint in model.joints
         ),
-        hinge_loads=tuple(
-            replace(item, inner=item.inner + first, outer=item.outer + first, scene=k)
-            for k, (model, first) in enumerate(zip(models, nodes, strict=False))
-            for item in model.hinge_loads
-        ),
-        bases=tuple(
-            replace(item, start=item.start + int(start), end=item.end + int(start), scene=k)
-            for k, (model, start) in enumerate(zip(models, pairs, strict=False))
-            for item in model.bases
-        ),
+        **_loads(models, nodes, pairs),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)
@@ -136,6 +128,22 @@ def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
         "table_offset": np.append(np.concatenate(starts), entries[-1]).astype(np.int32),
         "table_time": np.concatenate([model.table_time for model in models]),
         "table_value": np.concatenate([model.table_value for model in models]),
+    }
+
+
+def _loads(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any]:
+    """Loads of hinges and bases that move, of all scenes, from the first node and pair of each."""
+    return {
+        "hinge_loads": tuple(
+            replace(item, inner=item.inner + first, outer=item.outer + first, scene=k)
+            for k, (model, first) in enumerate(zip(models, nodes, strict=False))
+            for item in model.hinge_loads
+        ),
+        "bases": tuple(
+            replace(item, start=item.start + int(start), end=item.end + int(start), scene=k)
+            for k, (model, start) in enumerate(zip(models, pairs, strict=False))
+            for item in model.bases
+        ),
     }
 
 
