@@ -127,8 +127,8 @@ def friction_torque(
 ) -> wp.float64:
     """tau = -c w' - tau_C tanh(w' / w_0) at the rate w' = w + step (drive + tau) at the end of the step.
 
-    w is the rate there without this hinge's torque, step = dt / S_outer + dt / S_inner [rad/s per N m]. Friction stops a
-    hinge in a step but never turns it back, however small w_0 is (backward Euler). Newton's method from 0 approaches
+    w is the rate there without this hinge's torque, step = dt / S_outer + dt / S_inner [rad/s per N m]. Friction stops
+    a hinge in a step but never turns it back, however small w_0 is (backward Euler). Newton's method from 0 approaches
     |w'| from below, since tanh is concave there.
     """
     free = w + step * drive
@@ -191,10 +191,10 @@ def joint_torques(
     """Let torques act on nodes that all other forces have advanced; a block of threads takes a scene's hinges in turn.
 
     The torque at t(n) works over half a step before t(n), which completes work_out [J], and over half a step after it,
-    which work_after_out [J] holds for the next step; see `constraint.drive`. spin_out [kg m^2/s] keeps the spins of the
-    inner and outer nodes, which are the same about their mass centre with the arms of t(n) and of t(n+1). `first`: first
-    hinge of each scene, and the number of all. Where drift is 0, velocities are taken to the half step before the start,
-    by the torques of drives alone, and no step is counted.
+    which work_after_out [J] holds for the next step; see `constraint.drive`. spin_out [kg m^2/s] keeps the spins of
+    the inner and outer nodes, which are the same about their mass centre with the arms of t(n) and of t(n+1). `first`:
+    first hinge of each scene, and the number of all. Where drift is 0, velocities are taken to the half step before the
+    start, by the torques of drives alone, and no step is counted.
     """
     scene, lane = wp.tid()
     for j in range(first[scene], first[scene + 1]):

@@ -28,8 +28,8 @@ class HingeLoad:
     """Torque and friction in a hinge about z; the laws are those of `rigid.loads.Loads`.
 
     Attributes:
-        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground) and of
-            the link that it carries, shape (count,), int32.
+        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground) and
+            of the link that it carries, shape (count,), int32.
         friction: Coulomb torque tau_C [N m].
         damping: viscous coefficient c [N m s/rad].
         friction_rate: w_0 [rad/s].
@@ -113,7 +113,7 @@ def hinge_loads(parts: Assembly, free: NDArray[np.bool_], chain: Chain | None, s
 
 
 def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> Index:
-    """Free nodes of a body as near to a hinge's axis as the body is thick there; more where these are on a line along z.
+    """Free nodes of a body as near to a hinge's axis as the body is thick there; more where these lie on a line in z.
 
     Raises:
         RequestError: all free nodes are.

@@ -124,7 +124,7 @@ class LoadStage:
         return [*found, loads.sum_loads] if found else []
 
     def torques(self, state: State, kick: float, drift: float) -> None:
-        """Let torques act for `kick` [s] on nodes that all else has advanced by `drift` [s]; 0 before the first step."""
+        """Torques act for `kick` [s] on nodes that all else has advanced by `drift` [s], 0 before the first step."""
         own = state.loads
         inputs = [self.first_hinge, self.loads, self.work.X, self.work.mass, kick, drift]
         outputs = [state.u, state.v, state.speed_square, own.spin, own.work, own.work_after, own.clock]
