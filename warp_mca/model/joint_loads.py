@@ -28,8 +28,8 @@ class HingeLoad:
     """Torque and friction in a hinge about z; the laws are those of `rigid.loads.Loads`.
 
     Attributes:
-        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground) and
-            of the link that it carries, shape (count,), int32.
+        inner, outer: free nodes near the hinge that the torque acts on, of the body before it (empty for the ground)
+            and of the link that it carries, shape (count,), int32.
         friction: Coulomb torque tau_C [N m].
         damping: viscous coefficient c [N m s/rad].
         friction_rate: w_0 [rad/s].
