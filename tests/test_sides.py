@@ -115,21 +115,28 @@ def test_nodes_that_slide_over_an_edge_keep_the_energy(degrees: float):
     assert v[1] == pytest.approx(2.52, abs=0.01)
 
 
+@pytest.mark.parametrize("speed", [20.0, 100.0])
 @pytest.mark.parametrize("mu", [0.0, 0.3])
-def test_a_node_in_front_of_one_side_is_let_go_by_all_others(mu: float):
-    """Nodes that slid over the edge were still as deep in the side before it, and were pressed on it 20 um away."""
-    impact = begun(roof(60.0, position=(0.012, 1e-5, 0.0), velocity=(20.0, -3.0, 0.0), mu=mu))
+def test_a_node_in_front_of_one_side_is_let_go_by_all_others(mu: float, speed: float):
+    """Nodes that slid over the edge were still as deep in the side before it, and were pressed on it 20 um away.
+
+    Slow ones are still beside a face of that side then; of fast ones it has no face near them any more.
+    """
+    impact = begun(roof(60.0, position=(0.012, 1e-5, 0.0), velocity=(speed, -3.0, 0.0), mu=mu))
     slave, spring = impact.solver.contacts[0].slave.numpy(), impact.state.contacts[0].spring
     across = np.array([np.cos(np.radians(30.0)), np.sin(np.radians(30.0)), 0.0])  # normal of the flank
+    pressed_after = np.zeros(len(slave), dtype=int)
     passed = np.zeros(len(slave), dtype=bool)
     for step in range(60):
         x = (impact.solver.model.X + impact.state.u.numpy())[slave]  # that the springs of this step are for
         impact.advance(step + 1)
         outside = (x[:, 1] < 0.0) & ((x - [0.02, 0.0, 0.0]) @ across > 1e-6)
-        assert (spring.face.numpy().reshape(len(slave), -1)[outside] == -1).all()
-        assert (spring.held.numpy().reshape(len(slave), -1)[outside] == 0.0).all()
+        presses = spring.face.numpy().reshape(len(slave), -1)[outside] >= 0
+        assert (spring.held.numpy().reshape(len(slave), -1)[outside][~presses] == 0.0).all()
+        pressed_after[outside] += presses.any(axis=1)
         passed |= outside
     assert passed.sum() >= 5
+    assert pressed_after.max() <= 1  # step, in which a fast node comes over the edge
 
 
 @pytest.mark.parametrize(("degrees", "told"), [(48.0, True), (55.0, False)])
