@@ -116,8 +116,8 @@ class RigidPhase:
 
     The links and their hinges are read off the scene's revolute joints, from the ground outwards. Angles are
     measured from the downward vertical, positive clockwise about z seen from +z (the paper's convention):
-    a link at angle theta points along (-sin theta, -cos theta, 0). Base motion, slide, torques, friction and damping act
-    during impacts too, see docs/theory.md.
+    a link at angle theta points along (-sin theta, -cos theta, 0). Base motion, slide, torques, friction and damping
+    act during impacts too, see docs/theory.md.
 
     Attributes:
         theta: initial angle of each link [rad].
