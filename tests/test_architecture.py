@@ -7,6 +7,8 @@ import inspect
 import re
 from pathlib import Path
 
+from chains import BASE, TORQUE, bars
+from chains import ready as chain_ready
 from impacts import prepared
 from test_structure import imported, modules, tree_of
 from test_style import entries
@@ -15,6 +17,7 @@ import warp_mca as mca
 from warp_mca.elements.state import ElementState
 from warp_mca.solve.bonds import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
 
@@ -106,16 +109,28 @@ def everything() -> mca.Scene:
 
 
 def test_stages_of_a_step_are_those_of_the_page_in_this_order():
-    solver = Solver(prepared(everything()).model, device="cpu", precision="mixed", dt=1e-8)
-    found = [
-        [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
-        for number, group in enumerate(solver.groups, 1)
-        for stage in group
-    ]
-    assert [cells[:4] for cells in table("Stages of a step")] == found
+    page = [cells[:4] for cells in table("Stages of a step")]
+    driven = bars(torques=(TORQUE,), base_motion=BASE)
+    seen = set()
+    for ready in (prepared(everything()), chain_ready(driven)):
+        solver = Solver(ready.model, device="cpu", precision="mixed", dt=1e-8)
+        found = [
+            [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
+            for number, group in enumerate(solver.groups, 1)
+            for stage in group
+        ]
+        assert [cells for cells in page if cells in found] == found
+        seen |= {tuple(cells) for cells in found}
+    assert seen == {tuple(cells) for cells in page}
 
 
-STATE_PARTS = {"": State, "elements/0/": ElementState, "contacts/0/": ContactState, "constraints/": ConstraintState}
+STATE_PARTS = {
+    "": State,
+    "elements/0/": ElementState,
+    "contacts/0/": ContactState,
+    "constraints/": ConstraintState,
+    "loads/": LoadState,
+}
 
 
 def test_the_page_says_of_each_array_of_the_state_what_its_docstring_says():

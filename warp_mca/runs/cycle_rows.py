@@ -155,7 +155,6 @@ def _add_impact(setup: Setup, part: ImpactPart, story: Story) -> None:
     totals.contact_loss += last["contact_loss"]
     totals.joint += last["joint"]
     totals.lost += part.lost
-    totals.external_work -= part.back.drive_work if part.back else 0.0
     totals.hand_off += part.jump_back
     energy = {key: last[key] for key in STORED}
     phase = _phase("impact", part.start, part.end, part.ended_by, energy, totals)

@@ -156,7 +156,7 @@ class Solver:
         if self.loads.kernels():
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
         torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
-        return [forces, energies, sums, advance, *([torques] if self.model.hinge_loads else []), motion]
+        return [forces, energies, sums, advance, torques if self.model.hinge_loads else [], motion]
 
     def _before_step(self, step: Step) -> None:
         if self.output and step.is_row:
