@@ -14,7 +14,7 @@ from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.cycle_rows import Columns, Story, tell_story
 from warp_mca.runs.cycle_setup import Setup
-from warp_mca.runs.parts import ImpactPart, Part, SwingPart
+from warp_mca.runs.parts import ImpactPart, Part
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     warnings = [NOTHING] if not impacts else []
     for k, result in enumerate(results, 1):
         warnings += [w if len(results) == 1 else f"impact {k}: {w}" for w in result.warnings]
-    stopped = [part.stopped for part in parts if isinstance(part, SwingPart) and part.stopped]
+    stopped = [part.stopped for part in parts if part.stopped]
     summary = results[0].summary if results else _without_impact(setup, history)
     summary = {**summary, **_of_all(setup, impacts, story, results, contacts, t_contact)}
     return Result(summary, history, None, (*warnings, *stopped), _paths(results, story), contacts=contacts)
