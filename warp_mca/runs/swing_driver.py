@@ -95,6 +95,6 @@ def _unknown(t: float, body: str, at: Array) -> str:
     """Why a run ends at time t [s], when a body touches at this point [m] and no contact says what happens there."""
     x, y, z = at
     return (
-        f"the run ends at t = {t:.4g} s: {body} touches the target at ({x:.4g}, {y:.4g}, {z:.4g}) m, where no contact of "
-        "the scene keeps it out; add these nodes to a Contact"
+        f"the run ends at t = {t:.4g} s: {body} touches the target at ({x:.4g}, {y:.4g}, {z:.4g}) m, where no contact "
+        "of the scene keeps it out; add these nodes to a Contact"
     )
