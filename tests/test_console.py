@@ -46,13 +46,15 @@ def test_phases_are_listed_with_what_ended_them_and_what_was_lost(capsys):
     phases = [
         _phase("rigid", 0.0, 0.25, "touch"),
         _phase("impact", 0.25, 0.251, "separation", 0.24592),
-        _phase("rigid", 0.251, 1.0, "t_end"),
+        _phase("rigid", 0.251, 0.9, "touch"),
+        _phase("impact", 0.9, 0.9002, "t_end"),
     ]
     lines = _printed(capsys, _summary(phases))
     first = next(k for k, line in enumerate(lines) if line.startswith("phases"))
     assert lines[first].split(maxsplit=1)[1] == "rigid  0.000000 to 0.250000 s, ended by touch"
     assert lines[first + 1].strip() == "impact 0.250000 to 0.251000 s, ended by separation, 0.246 J of vibration lost"
-    assert lines[first + 2].strip() == "rigid  0.251000 to 1.000000 s, ended by t_end"
+    assert lines[first + 2].strip() == "rigid  0.251000 to 0.900000 s, ended by touch"
+    assert lines[first + 3].strip() == "impact 0.900000 to 0.900200 s, ended by t_end"
 
 
 def test_a_long_list_of_phases_is_cut(capsys):

@@ -131,7 +131,7 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 def _phases(phases: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
     """A line for each phase: kind, start and end from the release, what ended it, vibration that was left out."""
     for k, phase in enumerate(phases[:MAX_PHASES]):
-        lost = f", {phase['lost']:.3g} J of vibration lost" if phase["kind"] == "impact" else ""
+        lost = f", {phase['lost']:.3g} J of vibration lost" if phase["lost"] else ""
         span = f"{phase['start']:.6f} to {phase['end']:.6f} s"
         yield "" if k else "phases", f"{phase['kind']:6} {span}, ended by {phase['ended_by']}{lost}"
     if len(phases) > MAX_PHASES:
