@@ -44,9 +44,18 @@ def build(
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "mesh",
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     t_end: Annotated[
-        float | None, Param("end of a run through all impacts, from the release", unit="s", low=0.0, exclusive=True)
+        float | None,
+        Param(
+            "end of a run of swings and impacts in turn, from the release; None: one impact",
+            unit="s",
+            low=0.0,
+            exclusive=True,
+        ),
     ] = None,
-    duration: Annotated[float, Param("simulated time after contact", unit="s", low=0.0, exclusive=True)] = 0.6e-3,
+    duration: Annotated[
+        float,
+        Param("simulated time after contact, with t_end of each impact at most", unit="s", low=0.0, exclusive=True),
+    ] = 0.6e-3,
     output_interval: Annotated[
         float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)
     ] = 1e-6,

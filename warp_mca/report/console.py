@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from warp_mca.scene.catalogue import SceneSource
 
 PIPED_WIDTH = 120  # characters in a line when the output is not a terminal
+MAX_PHASES = 20  # that the summary lists
 
 
 class _Console(Console):
@@ -111,6 +112,7 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             "hand-off",
             f"t = {summary['t_contact']:.6f} s, v_n = {summary['v_n']:.4f}, v_t = {summary['v_t']:.4f} m/s",
         )
+    yield from _phases(summary.get("phases", ()))
     peaks = ", ".join(f"{_force(F)} at {1e3 * t:.3f} ms" for t, F in summary["F_n_peaks"])
     yield "F_n peaks", peaks or "none"
     yield "F_t", f"{_force(summary['F_t_min'])} to {_force(summary['F_t_max'])}"
@@ -118,12 +120,22 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "sticking", _spans(summary["sticks"])
     yield "plastic strain", f"{summary['max_plastic_strain']:.3g} at most"
     yield "energy error", f"{100.0 * summary['energy_error']:.2g} %"
-    size = f"{summary['n_elements']:,} elements, {summary['n_steps']:,} steps of {summary['dt']:.3g} s"
-    yield "model", f"{size}, {1e3 * summary['simulated_time']:g} ms"
+    steps = f"{summary['n_steps']:,} steps of {summary['dt']:.3g} s, {1e3 * summary['simulated_time']:g} ms"
+    yield "model", f"{summary['n_elements']:,} elements, {steps if summary['n_steps'] else 'no impact'}"
     yield "wall time", ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in summary["wall"].items())
     rate = summary["element_steps_per_s"]
     if rate is not None:
         yield "rate", f"{rate / 1e6:.2f} M element-steps/s on {summary['device']}, {summary['precision']}"
+
+
+def _phases(phases: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    """A line for each phase: kind, start and end from the release, what ended it, vibration that was left out."""
+    for k, phase in enumerate(phases[:MAX_PHASES]):
+        lost = f", {phase['lost']:.3g} J of vibration lost" if phase["lost"] else ""
+        span = f"{phase['start']:.6f} to {phase['end']:.6f} s"
+        yield "" if k else "phases", f"{phase['kind']:6} {span}, ended by {phase['ended_by']}{lost}"
+    if len(phases) > MAX_PHASES:
+        yield "", f"and {len(phases) - MAX_PHASES} more, see summary.json"
 
 
 def _force(value: float) -> str:
