@@ -139,7 +139,7 @@ def _add_impact(setup: Setup, part: ImpactPart, story: Story) -> None:
     account, totals = part.impact.scene_runs[0], story.totals
     totals.hand_off += part.jump
     totals.lost += part.settled
-    rows, energies = account.ledger.history(), account.ledger.energies()
+    rows, energies = account.history(), account.ledger.energies()
     stored = np.sum([energies[key] for key in STORED], axis=0)
     spent = energies["friction"] + energies["contact_loss"] + energies["joint"]
     rows["t"] = part.start + rows.pop("time_s")

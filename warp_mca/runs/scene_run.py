@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
@@ -13,6 +14,7 @@ from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.contact_warnings import resolution_warnings
+from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
 from warp_mca.solve.state_figures import (
     joint_impulses,
@@ -35,7 +37,7 @@ class SceneRun:
     """Takes in the records of one scene of an impact, and makes its result of them.
 
     Attributes:
-        ledger: histories and guards.
+        ledger: rows of its history, energy balance and guards.
     """
 
     def __init__(
@@ -69,10 +71,14 @@ class SceneRun:
             if self.ready.scene.paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
+    def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
+        """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
+        return history_columns(self.ledger, first)
+
     def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
-        history = self.ledger.history()
-        contacts = self.ledger.contacts(contact_names(self.ready.scene.contacts))
+        history = self.history()
+        contacts = contact_histories(self.ledger, contact_names(self.ready.scene.contacts))
         facts = self._facts(wall, stopped is not None)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)

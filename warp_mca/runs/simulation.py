@@ -174,7 +174,7 @@ def _advance(impact: Impact, tell: Progress) -> None:
         nonlocal passed
         if impact.recording and impact.rows > passed:
             first, passed = passed, impact.rows
-            impact.recording.history(lambda: impact.scene_runs[0].ledger.history(first))
+            impact.recording.history(lambda: impact.scene_runs[0].history(first))
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
     try:

@@ -25,6 +25,7 @@ from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.node_stage import NodeStage
@@ -39,19 +40,6 @@ from warp_mca.solve.workspace import Workspace
 
 if TYPE_CHECKING:
     from warp_mca.solve.output import Output
-
-
-def check_device(name: str) -> str:
-    """The name of a device that this machine has.
-
-    Raises:
-        RequestError: there is no such device.
-    """
-    wp.init()
-    known = [str(device) for device in wp.get_devices()]
-    if name not in known:
-        raise bad_value("device", name, f"this machine has {', '.join(known)}")
-    return name
 
 
 class Solver:
