@@ -26,7 +26,7 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     story = tell_story(setup, parts)
     impacts = [part for part in parts if isinstance(part, ImpactPart)]
     wall = setup.clock.wall
-    results = [part.impact.accounts[0].result(wall) for part in impacts]
+    results = [part.impact.scene_runs[0].result(wall) for part in impacts]
     t_contact = impacts[0].start if impacts else 0.0
     names = list(dict.fromkeys(name for rows in story.rows for name in rows))
     history = {name: np.concatenate([rows[name] for rows in story.rows]) for name in names}

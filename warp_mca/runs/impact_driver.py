@@ -67,7 +67,7 @@ class ImpactDriver:
         setup.clock.lap("fe")
         if impact.stopped[0] is not None:
             raise GuardError(f"impact {self.count}: {impact.stopped[0]}")
-        rows = impact.accounts[0].ledger.kept.count - 1
+        rows = impact.scene_runs[0].ledger.kept.count - 1
         ended_by = "separation" if rows < impact.steps.intervals else "duration" if span == setup.span else "t_end"
         part = ImpactPart(
             start=motion.t,
@@ -124,7 +124,7 @@ class ImpactDriver:
 
     def _advance(self, impact: Impact) -> None:
         """Until all contacts have been open for a while, or to the end of its time."""
-        account, interval, wait = impact.accounts[0], impact.steps.interval, self.open_time
+        account, interval, wait = impact.scene_runs[0], impact.steps.interval, self.open_time
         ledger, contacts = account.ledger, len(account.ready.model.passes)
 
         def told() -> None:
