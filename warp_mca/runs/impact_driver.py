@@ -140,7 +140,7 @@ class ImpactDriver:
 
     def _pressed(self, impact: Impact, rows: int) -> bool:
         """Whether a contact was closed in the last rows of the history."""
-        ledger = impact.accounts[0].ledger
+        ledger = impact.scene_runs[0].ledger
         springs = ledger.springs(np.array(ledger.kept.sums[-rows:]))
         return bool((springs[..., NORMAL_IMPULSE] > 0.0).any())
 
