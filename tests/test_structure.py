@@ -14,8 +14,6 @@ LONG_FUNCTIONS = {
     "scenes/single_link.py build",
     "scenes/three_link.py build",
     "scenes/two_link.py build",
-    "kernels/contact/spring.py sum_springs",  # three lines for each of fifteen columns
-    "kernels/nodes/constraint.py advance_bound",  # to be split
 }
 
 
