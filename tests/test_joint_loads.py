@@ -15,7 +15,7 @@ from impacts import SHORT_RANGES, momentum
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.join import join_models
+from warp_mca.model.batch_model import join_models
 from warp_mca.model.joint_loads import hinge_loads
 from warp_mca.rigid.loads import Table
 from warp_mca.rigid.swing import swing_until
