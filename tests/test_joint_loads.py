@@ -15,7 +15,7 @@ from impacts import SHORT_RANGES, momentum
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.join import join_models
+from warp_mca.model.batch_model import join_models
 from warp_mca.model.joint_loads import hinge_loads
 from warp_mca.rigid.loads import Table
 from warp_mca.rigid.swing import swing_until
@@ -110,7 +110,7 @@ def test_damping_slows_a_bar_exponentially():
 def test_hinge_nodes_move_as_the_base_does_and_its_work_is_counted():
     found = impact(bars(base_motion=BASE))
     model, table = found.solver.model, Table(np.array(BASE.times), np.column_stack([BASE.vx, BASE.vy]))
-    nodes = model.joint_first[: found.ready[0].model.hinges[0].end]
+    nodes = model.joint_first[: found.ready[0].model.joints[0].end]
     np.testing.assert_allclose(model.V[nodes, :2], np.broadcast_to(table.at(START), (len(nodes), 2)), rtol=1e-14)
     found.advance(until=500)
     dt, v = found.solver.dt, found.state.v.numpy()[nodes]
@@ -133,7 +133,7 @@ def test_a_slide_keeps_the_momentum_along_it(base: mca.BaseMotion | None):
     before = along()
     found.solver.step(found.state, 500)
     assert along() == pytest.approx(before, rel=1e-12)
-    nodes = found.solver.model.joint_first[: found.ready[0].model.hinges[0].end]
+    nodes = found.solver.model.joint_first[: found.ready[0].model.joints[0].end]
     u, v = found.state.u.numpy()[nodes], found.state.v.numpy()[nodes]
     np.testing.assert_array_equal(v[:, 0], found.state.loads.carriage.numpy()[0, 0])
     assert not u[:, 1:].any() and np.ptp(u[:, 0]) < 1e-12 * abs(u[0, 0])
@@ -159,7 +159,7 @@ def test_torques_act_near_the_hinge_on_free_nodes():
     assert len(inner[0]) == 0 and len(inner[1]) > 0
     for nodes in (*inner, *outer):
         assert not np.isin(nodes, [model.joint_first, model.joint_second]).any()
-    hinge = model.X[model.joint_first[model.hinges[1].start]]
+    hinge = model.X[model.joint_first[model.joints[1].start]]
     for nodes in outer:
         away = np.linalg.norm(model.X[nodes, :2] - hinge[:2], axis=1)
         assert away.max() <= 0.0200001 and len(nodes) > 6

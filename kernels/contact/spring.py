@@ -203,6 +203,7 @@ def sum_springs(
     sums = Columns()
     impulse = wp.vec3d()
     pressed = wp.vec3d()
+    pressed_energy = wp.float64(0.0)  # apart from `sums`, so that a GPU fuses its product and sum
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         held = spring.energy[s]
@@ -214,9 +215,9 @@ def sum_springs(
             pressed += Fn
             sums[wp.static(PRESSURE)] += wp.sqrt(square)
             if spring.normal_energy.shape[0] > 0:
-                sums[wp.static(NORMAL_ENERGY)] += spring.normal_energy[s]
+                pressed_energy += spring.normal_energy[s]
             else:
-                sums[wp.static(NORMAL_ENERGY)] += held * (square / (square + wp.dot(Ft, Ft)))
+                pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
             sums[wp.static(SQUARES)] += square
         sums[wp.static(FRICTION)] += spring.friction[s]
         sums[wp.static(PLANE_WORK)] += spring.drive[s]
@@ -228,11 +229,13 @@ def sum_springs(
             spring.impulse[s] = wp.vec3d()
             spring.normal_impulse[s] = wp.float64(0.0)
             spring.stick_impulse[s] = wp.float64(0.0)
+    sums[wp.static(NORMAL_ENERGY)] = pressed_energy
     for c in range(3):
         sums[wp.static(IMPULSE.start) + c] = impulse[c]
         sums[wp.static(NORMAL_FORCE.start) + c] = pressed[c]
+    r = row[0]
     for c in range(wp.static(PASS_COLUMNS)):
         total = wp.tile_sum(wp.tile(sums[c]))
         value = total[0]  # by all threads: reading a tile waits for all
         if lane == 0:
-            partial_out[row[0], scene, column + c, k] = value
+            partial_out[r, scene, column + c, k] = value
