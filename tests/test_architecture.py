@@ -15,7 +15,7 @@ from test_style import entries
 
 import warp_mca as mca
 from warp_mca.elements.state import ElementState
-from warp_mca.solve.bonds import ConstraintState
+from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.solver import Solver

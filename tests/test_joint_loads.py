@@ -49,7 +49,7 @@ def test_finite_elements_go_on_as_the_rigid_phase_would(given: dict):
     """Coordinates and rates at the end are as near as the vibration of the bars lets them; energy is closed."""
     found = impact(bars(theta_dot=(-3.0, 4.0), **given))
     found.advance()
-    begin, ledger = found.ready[0].start, found.accounts[0].ledger
+    begin, ledger = found.ready[0].start, found.scene_runs[0].ledger
     end, back = rigid_end(begin), motion_at_end(found)
     chain = begin.chain
     plain = replace(chain, loads=None, slide=None)
@@ -91,7 +91,7 @@ def test_coulomb_friction_stops_a_bar_and_turns_its_energy_to_heat():
     inertia = float(item.start.chain.mass_matrix(item.start.theta)[0, 0])
     assert 5e-3 < inertia / 0.5 < 7e-3
     found.advance()
-    energy, back = found.accounts[0].ledger.energy(), motion_at_end(found, 8e-3)
+    energy, back = found.scene_runs[0].ledger.energy(), motion_at_end(found, 8e-3)
     assert abs(back.theta_dot[0]) < 0.05
     assert back.theta[0] - 1.0 == pytest.approx(inertia / (2.0 * 0.5), rel=0.02)
     assert energy["joint"] + energy["elastic"] + energy["kinetic"] == pytest.approx(energy["initial"], rel=CLOSED)
@@ -118,7 +118,7 @@ def test_hinge_nodes_move_as_the_base_does_and_its_work_is_counted():
     assert not v[:, 2].any()
     way = table.integral(START + 500 * dt) - table.integral(START)
     np.testing.assert_allclose(found.state.u.numpy()[nodes, :2], np.broadcast_to(way, (len(nodes), 2)), rtol=1e-5)
-    assert abs(found.accounts[0].ledger.energies()["external_work"][-1]) > 1e-4
+    assert abs(found.scene_runs[0].ledger.energies()["external_work"][-1]) > 1e-4
 
 
 @pytest.mark.parametrize("base", [None, replace(BASE, vy=(0.0, 0.0, 0.0))], ids=["at rest", "moving along"])
@@ -147,7 +147,7 @@ def test_a_carriage_falls_with_its_bars():
     back = motion_at_end(found, SPAN)
     np.testing.assert_allclose(back.theta[0], 0.5 * 9.8 * SPAN**2, rtol=1e-9)
     np.testing.assert_allclose(back.theta_dot, [9.8 * SPAN, 0.0, 0.0], atol=1e-11)
-    energy = found.accounts[0].ledger.energy()
+    energy = found.scene_runs[0].ledger.energy()
     mass = found.solver.model.mass.sum() + 0.3
     assert energy["kinetic"] == pytest.approx(0.5 * mass * (9.8 * SPAN) ** 2, rel=1e-6)  # less (g dt)^2 m / 8
     assert energy["external_work"] == pytest.approx(energy["kinetic"] - energy["initial"], rel=1e-9)
@@ -205,10 +205,10 @@ def test_a_gpu_gives_what_a_cpu_does_and_repeats_it():
     for found in (host, first, again):
         found.advance()
     assert again.state.differences(first.state) == []
-    known, energy = (found.accounts[0].ledger.energy() for found in (host, first))
+    known, energy = (found.scene_runs[0].ledger.energy() for found in (host, first))
     for key in ("kinetic", "external_work", "joint"):
         assert energy[key] == pytest.approx(known[key], rel=1e-6)
-    assert first.accounts[0].ledger.exchange_error < CLOSED
+    assert first.scene_runs[0].ledger.exchange_error < CLOSED
 
 
 def test_a_cycle_goes_through_an_impact_on_a_driven_sliding_base():
@@ -255,6 +255,6 @@ def test_scenes_of_a_batch_take_their_own_loads():
     for k, scene in enumerate(scenes):
         alone = Impact([batch.ready[k]], SPAN, device="cpu", precision="float64", threads=1)
         alone.advance()
-        mine, other = (account.ledger.energies() for account in (batch.accounts[k], alone.accounts[0]))
+        mine, other = (item.ledger.energies() for item in (batch.scene_runs[k], alone.scene_runs[0]))
         assert [key for key in mine if mine[key].tobytes() != other[key].tobytes()] == []
         assert bool(mine["joint"][-1]) == bool(scene.rigid.joint_friction)

@@ -28,11 +28,12 @@ from warp_mca.base.errors import RequestError
 from warp_mca.elements.state import ElementState
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.runs.impact import Impact
-from warp_mca.solve.bonds import ConstraintState
+from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.state import State
+from warp_mca.solve.state_figures import max_speed
 
 PRECISIONS = ["mixed", "float64"]
 
@@ -144,7 +145,7 @@ def test_a_state_crosses_to_another_device_and_back(precision: str, tmp_path: Pa
     back.load(tmp_path / "device")
     assert set(device.state.differences(host.state)) <= {"speed_square"}  # of all nodes on a GPU
     assert set(back.state.differences(host.state)) <= {"speed_square"}
-    assert back.solver.max_speed(back.state) == host.solver.max_speed(host.state)
+    assert max_speed(back.solver, back.state) == max_speed(host.solver, host.state)
     device.state.assign(whole(precision, 1, "cpu").state)
     assert set(device.state.differences(whole(precision, 1, "cpu").state)) <= {"speed_square"}
 

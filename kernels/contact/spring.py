@@ -7,12 +7,28 @@ import warp as wp
 
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.laws import LINEAR, law_functions
+from warp_mca.kernels.records.columns import (
+    FRICTION,
+    IMPULSE,
+    LOST,
+    NORMAL_ENERGY,
+    NORMAL_FORCE,
+    NORMAL_IMPULSE,
+    PASS_COLUMNS,
+    PLANE_WORK,
+    PRESSURE,
+    SPRING_ENERGY,
+    SQUARES,
+    STICK_IMPULSE,
+)
 from warp_mca.kernels.records.ledger import run_of
 
 wp.set_module_options({"enable_backward": False})
 
 FAR = 1e30  # further than anything [m]
 ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
+
+Columns = wp.types.vector(length=PASS_COLUMNS, dtype=wp.float64)
 
 
 @wp.struct
@@ -178,78 +194,45 @@ def sum_springs(
     spring: Spring,
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Sums over the slaves of each scene, which begin at `first`, into PASS_COLUMNS columns, as `records.ledger` sums.
+    """Sums over the slaves of each scene, which begin at `first`, into the columns of a pass, from `column` on.
 
-    With `afresh`, what is summed over an output interval then starts again from zero. The last columns are of the state
-    at the record: the vector sum of the normal forces [N], their sum [N], the energy that the normal springs hold [J],
-    the energy that springs lost as they became softer [J], and the sum of the squares of the normal forces [N^2].
+    `records.columns` names them; they are summed as in `records.ledger`. With `afresh`, what is summed over an output
+    interval then starts again from zero.
     """
     scene, k, lane = wp.tid()
-    energy = wp.float64(0.0)
-    friction = wp.float64(0.0)
-    drive = wp.float64(0.0)
+    sums = Columns()
     impulse = wp.vec3d()
-    normal = wp.float64(0.0)
-    stick = wp.float64(0.0)
     pressed = wp.vec3d()
-    pressure = wp.float64(0.0)
-    pressed_energy = wp.float64(0.0)
-    lost = wp.float64(0.0)
-    squares = wp.float64(0.0)
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         held = spring.energy[s]
-        energy += held
+        sums[wp.static(SPRING_ENERGY)] += held
         if held > wp.float64(0.0):
             Ft = spring.tangential[s]
             Fn = spring.force[s] - Ft
             square = wp.dot(Fn, Fn)
             pressed += Fn
-            pressure += wp.sqrt(square)
+            sums[wp.static(PRESSURE)] += wp.sqrt(square)
             if spring.normal_energy.shape[0] > 0:
-                pressed_energy += spring.normal_energy[s]
+                sums[wp.static(NORMAL_ENERGY)] += spring.normal_energy[s]
             else:
-                pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
-            squares += square
-        friction += spring.friction[s]
-        drive += spring.drive[s]
+                sums[wp.static(NORMAL_ENERGY)] += held * (square / (square + wp.dot(Ft, Ft)))
+            sums[wp.static(SQUARES)] += square
+        sums[wp.static(FRICTION)] += spring.friction[s]
+        sums[wp.static(PLANE_WORK)] += spring.drive[s]
         impulse += spring.impulse[s]
-        normal += spring.normal_impulse[s]
-        stick += spring.stick_impulse[s]
-        lost += spring.lost[s]
+        sums[wp.static(NORMAL_IMPULSE)] += spring.normal_impulse[s]
+        sums[wp.static(STICK_IMPULSE)] += spring.stick_impulse[s]
+        sums[wp.static(LOST)] += spring.lost[s]
         if afresh:
             spring.impulse[s] = wp.vec3d()
             spring.normal_impulse[s] = wp.float64(0.0)
             spring.stick_impulse[s] = wp.float64(0.0)
-    energy_sum = wp.tile_sum(wp.tile(energy))
-    friction_sum = wp.tile_sum(wp.tile(friction))
-    drive_sum = wp.tile_sum(wp.tile(drive))
-    x_sum = wp.tile_sum(wp.tile(impulse[0]))
-    y_sum = wp.tile_sum(wp.tile(impulse[1]))
-    z_sum = wp.tile_sum(wp.tile(impulse[2]))
-    normal_sum = wp.tile_sum(wp.tile(normal))
-    stick_sum = wp.tile_sum(wp.tile(stick))
-    pressed_x_sum = wp.tile_sum(wp.tile(pressed[0]))
-    pressed_y_sum = wp.tile_sum(wp.tile(pressed[1]))
-    pressed_z_sum = wp.tile_sum(wp.tile(pressed[2]))
-    pressure_sum = wp.tile_sum(wp.tile(pressure))
-    pressed_energy_sum = wp.tile_sum(wp.tile(pressed_energy))
-    lost_sum = wp.tile_sum(wp.tile(lost))
-    squares_sum = wp.tile_sum(wp.tile(squares))
-    if lane == 0:
-        r = row[0]
-        partial_out[r, scene, column, k] = energy_sum[0]
-        partial_out[r, scene, column + 1, k] = friction_sum[0]
-        partial_out[r, scene, column + 2, k] = drive_sum[0]
-        partial_out[r, scene, column + 3, k] = x_sum[0]
-        partial_out[r, scene, column + 4, k] = y_sum[0]
-        partial_out[r, scene, column + 5, k] = z_sum[0]
-        partial_out[r, scene, column + 6, k] = normal_sum[0]
-        partial_out[r, scene, column + 7, k] = stick_sum[0]
-        partial_out[r, scene, column + 8, k] = pressed_x_sum[0]
-        partial_out[r, scene, column + 9, k] = pressed_y_sum[0]
-        partial_out[r, scene, column + 10, k] = pressed_z_sum[0]
-        partial_out[r, scene, column + 11, k] = pressure_sum[0]
-        partial_out[r, scene, column + 12, k] = pressed_energy_sum[0]
-        partial_out[r, scene, column + 13, k] = lost_sum[0]
-        partial_out[r, scene, column + 14, k] = squares_sum[0]
+    for c in range(3):
+        sums[wp.static(IMPULSE.start) + c] = impulse[c]
+        sums[wp.static(NORMAL_FORCE.start) + c] = pressed[c]
+    for c in range(wp.static(PASS_COLUMNS)):
+        total = wp.tile_sum(wp.tile(sums[c]))
+        value = total[0]  # by all threads: reading a tile waits for all
+        if lane == 0:
+            partial_out[row[0], scene, column + c, k] = value

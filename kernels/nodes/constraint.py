@@ -95,6 +95,33 @@ def drive(
     return v
 
 
+@wp.func
+def bound_node(k: int, bonds: Bonds):
+    """First node of the k-th pair or, beyond the pairs, a driven node."""
+    pairs = bonds.first.shape[0]
+    i = int(-1)
+    if k < pairs:
+        i = bonds.first[k]
+    else:
+        i = bonds.node[k - pairs]
+    return i
+
+
+@wp.func
+def move(
+    i: int,
+    u: wp.vec3d,
+    v: wp.vec3d,
+    u_out: wp.array(dtype=wp.vec3d),
+    v_out: wp.array(dtype=wp.vec3d),
+    speed_square_out: wp.array(dtype=wp.float32),
+):
+    """Give a node its displacement [m] and velocity [m/s]."""
+    u_out[i] = u
+    v_out[i] = v
+    keep_speed(i, v, speed_square_out)
+
+
 @cache
 def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
@@ -106,6 +133,19 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision)
+
+    @wp.func
+    def total_force(
+        i: int,
+        first_slots: wp.array(dtype=wp.vec2i),
+        more_slots: wp.array(dtype=wp.vec4i),
+        force: wp.array(dtype=vec3),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+    ):
+        total = gather(first_slots[i], more_slots, force)
+        if wp.static(contact):
+            total += take_contact(i, contact_force_out)
+        return total
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_bound(
@@ -133,14 +173,8 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
         let_next_begin()
         k = wp.tid()
         pairs = bonds.first.shape[0]
-        i = int(-1)
-        if k < pairs:
-            i = bonds.first[k]
-        else:
-            i = bonds.node[k - pairs]
-        total = gather(first_slots[i], more_slots, force)
-        if wp.static(contact):
-            total += take_contact(i, contact_force_out)
+        i = bound_node(k, bonds)
+        total = total_force(i, first_slots, more_slots, force, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         free = v_out[i] + dt * a
         u_free = u_out[i] + dt * free
@@ -153,9 +187,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
             if j >= 0:
                 if v_before_out.shape[0] > 0:
                     v_before_out[j] = v_out[j]
-                total = gather(first_slots[j], more_slots, force)
-                if wp.static(contact):
-                    total += take_contact(j, contact_force_out)
+                total = total_force(j, first_slots, more_slots, force, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
                 u_j = u_out[j] + dt * v_j
                 u = weighted_mean(mass[i], u_free, mass[j], u_j)
@@ -166,9 +198,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
                 else:
                     u_j = u
                     v_j = v
-                u_out[j] = u_j
-                v_out[j] = v_j
-                keep_speed(j, v_j, speed_square_out)
+                move(j, u_j, v_j, u_out, v_out, speed_square_out)
             if wp.static(partial):
                 u = u_free + bonds.tied[k] * (u - u_free)
                 v = free + bonds.tied[k] * (v - free)
@@ -176,8 +206,6 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
         else:
             v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
             u = u_free + dt * (v - free)
-        u_out[i] = u
-        v_out[i] = v
-        keep_speed(i, v, speed_square_out)
+        move(i, u, v, u_out, v_out, speed_square_out)
 
     return begins_early(advance_bound)

@@ -22,6 +22,7 @@ from warp_mca.rigid.chain import Array
 Forces = Callable[[Array], Array]
 
 TOLERANCE = 1e-6  # share of the elastic energy that may still be free to leave
+CONDITION = 1e6  # of the stiffness over its diagonal, in slender bodies: what may leave is that times f^2 / diagonal
 PROBES = 12  # products with random signs for the diagonal
 DIFFERENCE = 1e-8  # largest displacement of a difference quotient, over the body's radius of inertia
 MIN_DELAY = 50  # iterations that tell what is still free to leave
@@ -82,7 +83,7 @@ def equilibrium(
     u, residual = u.copy(), search.residual(u)
     released, drop, delay = 0.0, np.inf, MIN_DELAY
     for _ in range(MAX_NEWTON):
-        if not residual.any():
+        if not residual.any() or search.rests(residual, elastic_energy):
             return Equilibrium(u=u, released=released, remaining=0.0, evaluations=search.evaluations)
         step, drop, iterations = search.linear_step(u, residual, 0.1 * TOLERANCE * elastic_energy, delay)
         delay = max(delay, iterations // 2)
@@ -138,6 +139,10 @@ class _Search:
             raise GuardError(f"the internal forces of {self._name} became infinite while its shape at rest was sought")
         net = self._gram @ np.einsum("nck,nc->k", self._rigid, force)
         return force - self._loose * self._masses * (self._rigid @ net)
+
+    def rests(self, residual: Array, elastic_energy: float) -> bool:
+        """Whether forces are so small that next to no energy [J] is free to leave, in however slender a body."""
+        return self._diagonal is not None and CONDITION * self._size(residual) <= TOLERANCE * elastic_energy
 
     def linear_step(self, u: Array, residual: Array, enough: float, delay: int) -> tuple[Array, float, int]:
         """Solve K p = f by conjugate gradients, until the last `delay` iterations released no more than `enough` [J].

@@ -135,6 +135,9 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
         raise bad_value("scenes", [], "give at least one scene")
     for k, scene in enumerate(scenes):
         check_scene(f"scenes[{k}]", scene)
+        if scene.t_end is not None:
+            remedy = "the scenes of a batch step together, for one impact each; leave t_end out, or use mca.run"
+            raise bad_value(f"scenes[{k}].t_end", scene.t_end, remedy)
     first = scenes[0]
     span = span_of(first, duration)
     for k, scene in enumerate(scenes[1:], 1):

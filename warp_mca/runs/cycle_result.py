@@ -14,7 +14,7 @@ from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.cycle_rows import Columns, Story, tell_story
 from warp_mca.runs.cycle_setup import Setup
-from warp_mca.runs.parts import ImpactPart, Part, SwingPart
+from warp_mca.runs.parts import ImpactPart, Part
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     story = tell_story(setup, parts)
     impacts = [part for part in parts if isinstance(part, ImpactPart)]
     wall = setup.clock.wall
-    results = [part.impact.accounts[0].result(wall) for part in impacts]
+    results = [part.impact.scene_runs[0].result(wall) for part in impacts]
     t_contact = impacts[0].start if impacts else 0.0
     names = list(dict.fromkeys(name for rows in story.rows for name in rows))
     history = {name: np.concatenate([rows[name] for rows in story.rows]) for name in names}
@@ -35,7 +35,7 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     warnings = [NOTHING] if not impacts else []
     for k, result in enumerate(results, 1):
         warnings += [w if len(results) == 1 else f"impact {k}: {w}" for w in result.warnings]
-    stopped = [part.stopped for part in parts if isinstance(part, SwingPart) and part.stopped]
+    stopped = [part.stopped for part in parts if part.stopped]
     summary = results[0].summary if results else _without_impact(setup, history)
     summary = {**summary, **_of_all(setup, impacts, story, results, contacts, t_contact)}
     return Result(summary, history, None, (*warnings, *stopped), _paths(results, story), contacts=contacts)

@@ -14,9 +14,9 @@ from warp_mca.base.errors import GuardError
 from warp_mca.model.batch_model import join_models
 from warp_mca.model.layout import offsets
 from warp_mca.results.paths import join_probes
-from warp_mca.runs.account import Account
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
+from warp_mca.runs.scene_run import SceneRun
 from warp_mca.solve.output import Output
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
@@ -43,7 +43,7 @@ class Impact:
         steps: how it is divided.
         solver: that advances it.
         state: all that changes.
-        accounts: what comes of each scene.
+        scene_runs: records and result of each scene.
         stopped: which guard stopped each scene, in one sentence, or None.
         recording: recorders of a lone scene, or None.
     """
@@ -91,12 +91,12 @@ class Impact:
         self.solver.start(self.state)
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
-        self._account()
+        self._begin_scenes()
 
-    def _account(self) -> None:
+    def _begin_scenes(self) -> None:
         first = offsets([len(item.probes.corner) for item in self.ready])
-        self.accounts = [
-            Account(item, self.steps, self.solver, self.state, k, int(first[k])) for k, item in enumerate(self.ready)
+        self.scene_runs = [
+            SceneRun(item, self.steps, self.solver, self.state, k, int(first[k])) for k, item in enumerate(self.ready)
         ]
 
     def load(self, path: str | os.PathLike[str]) -> None:
@@ -107,7 +107,7 @@ class Impact:
         """
         self.state.load(path, self.solver.model, self.solver.dt)
         self.stopped = [None] * len(self.ready)
-        self._account()
+        self._begin_scenes()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Store the state, between two calls of `advance`.
@@ -120,7 +120,7 @@ class Impact:
     @property
     def rows(self) -> int:
         """Rows of the history so far, the most of any scene."""
-        return max(account.ledger.kept.count for account in self.accounts)
+        return max(item.ledger.kept.count for item in self.scene_runs)
 
     def advance(
         self, until: int | None = None, told: Callable[[], None] = lambda: None, ended: Callable[[], bool] | None = None
@@ -151,10 +151,10 @@ class Impact:
         Raises:
             GuardError: a guard stops the last one.
         """
-        for k, account in enumerate(self.accounts):
+        for k, scene_run in enumerate(self.scene_runs):
             if self.stopped[k] is None:
                 try:
-                    account.read(written, records)
+                    scene_run.read(written, records)
                 except GuardError as error:
                     self.stopped[k] = str(error)
                     if None not in self.stopped:

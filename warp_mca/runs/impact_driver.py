@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ class ImpactDriver:
         setup.clock.lap("fe")
         if impact.stopped[0] is not None:
             raise GuardError(f"impact {self.count}: {impact.stopped[0]}")
-        rows = impact.accounts[0].ledger.kept.count - 1
+        rows = impact.scene_runs[0].ledger.kept.count - 1
         ended_by = "separation" if rows < impact.steps.intervals else "duration" if span == setup.span else "t_end"
         part = ImpactPart(
             start=motion.t,
@@ -79,6 +80,9 @@ class ImpactDriver:
         )
         if ended_by == "t_end":
             return None, part
+        if ended_by == "duration" and self._pressed(impact, 1):
+            why = f"impact {self.count} had not ended after duration = {span:g} s; give a longer one"
+            return None, replace(part, stopped=f"the run ends at t = {part.end:.4g} s: {why}")
         back = return_to_rigid(setup, motion, part, relaxation)
         setup.clock.lap("rigid")
         return back
@@ -120,7 +124,7 @@ class ImpactDriver:
 
     def _advance(self, impact: Impact) -> None:
         """Until all contacts have been open for a while, or to the end of its time."""
-        account, interval, wait = impact.accounts[0], impact.steps.interval, self.open_time
+        account, interval, wait = impact.scene_runs[0], impact.steps.interval, self.open_time
         ledger, contacts = account.ledger, len(account.ready.model.passes)
 
         def told() -> None:
@@ -130,10 +134,15 @@ class ImpactDriver:
             sums = ledger.kept.sums
             if (len(sums) - 1) * interval < wait or not contacts:
                 return False
-            recent = np.array(sums[-math.ceil(wait / interval) :])
-            return not (ledger.springs(recent)[..., NORMAL_IMPULSE] > 0.0).any()
+            return not self._pressed(impact, math.ceil(wait / interval))
 
         impact.advance(told=told, ended=ended)
+
+    def _pressed(self, impact: Impact, rows: int) -> bool:
+        """Whether a contact was closed in the last rows of the history."""
+        ledger = impact.scene_runs[0].ledger
+        springs = ledger.springs(np.array(ledger.kept.sums[-rows:]))
+        return bool((springs[..., NORMAL_IMPULSE] > 0.0).any())
 
 
 def open_time(setup: Setup) -> float:

@@ -54,7 +54,7 @@ def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: Sta
     Raises:
         RequestError: bodies of a contact with `initial_overlap="refuse"` overlap by more than rounding.
     """
-    for stage, (depth, energy) in zip(solver.contacts, solver.initial_depths(state), strict=True):
+    for stage, (depth, energy) in zip(solver.contacts, _initial_depths(solver, state), strict=True):
         slaves = np.concatenate([np.repeat(item.slave, stage.sides) for item in stage.items])
         for scene, item in enumerate(stage.items):
             mine = slice(int(stage.springs[scene]), int(stage.springs[scene + 1]))
@@ -67,6 +67,17 @@ def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: Sta
                 depth[mine] = 0.0
         if stage.stress_free:
             stage.rest_at(state, depth)
+
+
+def _initial_depths(solver: Solver, state: State) -> list[tuple[Array, Array]]:
+    """Of each contact pass, depth [m] and energy [J] of every spring at the start; the state does not change."""
+    with wp.ScopedDevice(solver.device):
+        tried = state.copy()
+        for stage in solver.contacts:
+            stage.launch(solver.work, tried, 0.0)
+        solver.work.contact_force.zero_()
+        springs = [own.spring for own in tried.contacts]
+        return [(spring.depth.numpy(), spring.energy.numpy()) for spring in springs]
 
 
 def _edge(stage: ContactStage, scene: int) -> float:

@@ -1,8 +1,8 @@
-"""Owns the records of a run: what the device summed, turned into histories, energies and guards."""
+"""Owns the energy balance of a run and the guards that stop it, from the records that the device summed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,14 +16,11 @@ from warp_mca.kernels.records.columns import (
     FRICTION,
     GRAVITY_WORK,
     HOURGLASS,
-    IMPULSE,
     JACOBIAN,
     JOINT_HEAT,
     KINETIC,
     LOAD_WORK,
     LOST,
-    NORMAL_ENERGY,
-    NORMAL_FORCE,
     NORMAL_IMPULSE,
     PASS,
     PASS_COLUMNS,
@@ -32,10 +29,8 @@ from warp_mca.kernels.records.columns import (
     PRESSURE,
     SPRING_ENERGY,
     SQUARES,
-    STICK_IMPULSE,
     STRAIN,
 )
-from warp_mca.results.contact_history import ContactHistory
 from warp_mca.solve.records import SceneRecords
 
 if TYPE_CHECKING:
@@ -57,7 +52,7 @@ _FLAGS = (
 
 
 class Ledger:
-    """Turns the records of one scene into rows of its history, and holds them to the guards.
+    """Takes in the records of one scene, keeps its rows and its energy balance, and stops it where a guard is broken.
 
     Attributes:
         kept: what it has taken in so far, a part of the run's state.
@@ -239,87 +234,13 @@ class Ledger:
         initial = self.initial_energy
         return {"initial": initial, **last, "error": error - last["external_work"] - initial}
 
-    def energies(self) -> dict[str, Array]:
-        """The ledger at each row of the history, see `energy` [J], each shape (row_count,), float64."""
-        return self._energies(np.array(self.kept.sums).reshape(-1, self._width))
+    def energies(self, first: int = 0) -> dict[str, Array]:
+        """The ledger [J] at each row of the history from row `first` on, see `energy`, each shape (row_count,)."""
+        return self._energies(self.table(first))
 
-    def history(self, first: int = 0) -> dict[str, Array]:
-        """The columns of history.csv from row `first` on, each shape (row_count,), float64.
-
-        Forces are means over the interval before.
-        """
-        table = np.array(self.kept.sums[first:]).reshape(-1, self._width)
-        energy, springs = self._energies(table), self.springs(table)
-        share = self.steps.dt / self.steps.interval
-        F_n, F_t = np.zeros(len(table)), np.zeros(len(table))
-        for k, item in enumerate(self.model.passes):
-            force = share * item.sign * springs[:, k, IMPULSE]
-            normal, tangent = self.model.contact_axes[item.contact]
-            F_n += force @ normal if normal.any() else share * springs[:, k, NORMAL_IMPULSE]  # see `Model.contact_axes`
-            F_t += force @ tangent
-        pressed, stuck = springs[:, :, NORMAL_IMPULSE].sum(axis=1), springs[:, :, STICK_IMPULSE].sum(axis=1)
-        stick: Array = np.zeros(len(table))
-        np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
-        velocity = np.array(self.kept.velocities[first:]).reshape(-1, len(self.model.points), 3)
-        velocity[:, self.model.points < 0] = np.nan
-        if self.model.points[1] < 0 and self.model.passes and self.model.passes[0].plane is not None:
-            velocity[:, 1] = self.model.passes[0].plane.velocity
-        stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
-        balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
-        return {
-            "time_s": self.steps.interval * np.arange(first, self.kept.count, dtype=np.float64),
-            "F_n_N": F_n,
-            "F_t_N": F_t,
-            "stick_fraction": stick,
-            "tip_vx": velocity[:, 0, 0],
-            "tip_vy": velocity[:, 0, 1],
-            "plate_vx": velocity[:, 1, 0],
-            "E_kinetic": energy["kinetic"],
-            "E_internal": stored,
-            "E_plastic": energy["plastic"],
-            "E_contact": energy["contact"],
-            "E_friction": energy["friction"],
-            "E_total_error": balance - self.initial_energy,
-            "tip_vz": velocity[:, 0, 2],
-            "plate_vy": velocity[:, 1, 1],
-            "plate_vz": velocity[:, 1, 2],
-            "closing_speed": self._closing_speed(first),
-        }
-
-    def contacts(self, names: Sequence[str]) -> tuple[ContactHistory, ...]:
-        """Each contact by itself, with these `names`."""
-        springs, share = (
-            self.springs(np.array(self.kept.sums).reshape(-1, self._width)),
-            self.steps.dt / self.steps.interval,
-        )
-        found: list[ContactHistory] = []
-        for index, name in enumerate(names):
-            own = [k for k, item in enumerate(self.model.passes) if item.contact == index]
-            sign = np.array([self.model.passes[k].sign for k in own])
-            found.append(
-                ContactHistory(
-                    name=name,
-                    force=share * np.einsum("p,rpc->rc", sign, springs[:, own, IMPULSE]),
-                    pressure=share * springs[:, own, NORMAL_IMPULSE].sum(axis=1),
-                    normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, NORMAL_FORCE]),
-                    closing_speed=self._closing_speed(0, own),
-                )
-            )
-        return tuple(found)
-
-    def _closing_speed(self, first: int, passes: Sequence[int] | slice = slice(None)) -> Array:
-        """As in `ContactHistory`, of some passes, from row `first` on.
-
-        Normal forces do the work dE = sum(F_n v dt) on their springs. So the gain of these in an interval, over the
-        normal impulse by the trapezoidal rule, is the mean of v over nodes and time that is weighted with F_n.
-        """
-        rows = np.array(self.kept.sums[max(first - 1, 0) :]).reshape(-1, self._width)
-        springs = self.springs(rows)[:, passes].sum(axis=1)
-        gain, rise = np.diff(springs[:, NORMAL_ENERGY]), np.diff(springs[:, PRESSURE])
-        impulse = self.steps.dt * (springs[1:, NORMAL_IMPULSE] - 0.5 * rise)
-        speed: Array = np.full(len(rows), np.nan)
-        np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
-        return speed[min(first, 1) :]
+    def table(self, first: int = 0) -> Array:
+        """Columns of each row of the history from row `first` on, shape (row_count, column_count), float64."""
+        return np.array(self.kept.sums[first:]).reshape(-1, self._width)
 
 
 def _spin(model: Model) -> float:

@@ -48,6 +48,7 @@ class ImpactPart:
         lost: energy of vibration that the way back leaves out [J].
         jump_back: kinetic energy of the chain that swings on, less that of its nodes' rigid motion [J].
         hinge_impulse: that each link's inbound hinge gave when the motion became rigid [N s], by joint, shape (2,).
+        stopped: why the run ends here, in one sentence, or None.
     """
 
     start: float
@@ -61,6 +62,7 @@ class ImpactPart:
     lost: float = 0.0
     jump_back: float = 0.0
     hinge_impulse: Mapping[str, Array] = field(default_factory=dict)
+    stopped: str | None = None
 
 
 Part = SwingPart | ImpactPart

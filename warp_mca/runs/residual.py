@@ -134,7 +134,7 @@ class Relaxation:
         self._evaluate(self._followed(u))
         with wp.ScopedDevice(self.solver.device):
             self.trial.v.zero_()
-            self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.bonds.at_rest)
+            self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.constraints.at_rest)
         force = self.model.mass[:, None] * (self.trial.v.numpy() - self.model.gravity[0])
         force[first] += force[second]
         force[second] = 0.0

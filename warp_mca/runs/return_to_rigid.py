@@ -94,7 +94,7 @@ def _fit(
 
 def _lost(part: ImpactPart, kept: Shape, back: HandBack) -> float:
     """Energy of vibration [J]: of motion, elements and contact springs at the end, less what goes on."""
-    energy = part.impact.accounts[0].ledger.energy()
+    energy = part.impact.scene_runs[0].ledger.energy()
     stored = sum(energy[key] for key in ("kinetic", "elastic", "plastic", "hourglass", "contact"))
     return stored - back.kinetic_energy - kept.strain_energy - back.drive_work
 

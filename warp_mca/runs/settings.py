@@ -26,7 +26,7 @@ def settings_of(device: str, precision: str, threads: int | None) -> Settings:
     Raises:
         RequestError: there is no such device, or no such number of threads.
     """
-    from warp_mca.solve.solver import check_device
+    from warp_mca.solve.device import check_device
     from warp_mca.solve.threads import thread_count
 
     return Settings(check_device(device), precision, thread_count(threads))

@@ -161,8 +161,7 @@ def simulate(
         clock.lap("output")
     tell("impact", 1.0)
     results = [
-        account.result(clock.wall, said, stopped)
-        for account, stopped in zip(impact.accounts, impact.stopped, strict=True)
+        item.result(clock.wall, said, stopped) for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)
     ]
     return [replace(result, failed=failed) for result in results]
 
@@ -175,7 +174,7 @@ def _advance(impact: Impact, tell: Progress) -> None:
         nonlocal passed
         if impact.recording and impact.rows > passed:
             first, passed = passed, impact.rows
-            impact.recording.history(lambda: impact.accounts[0].ledger.history(first))
+            impact.recording.history(lambda: impact.scene_runs[0].history(first))
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
     try:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warp_mca.rigid.chain import Array
 from warp_mca.rigid.placement import link_placements
 from warp_mca.rigid.swing import Swing, swing_until
 from warp_mca.rigid.target import TargetPlane, TurningPlane, moving_plane, node_gap, target_plane
@@ -35,7 +36,12 @@ class SwingDriver:
             placements=start.placements,
         )
         motion = replace(release, t=start.swing.t_end, theta=start.theta, theta_dot=start.theta_dot)
-        return motion, SwingPart(motion=release, swing=start.swing, kinetic=self.setup.others(start.placements))
+        tip, stopped = self.setup.rigid.tip.body, None
+        if start.swing.ended_by == "touch" and tip not in self.setup.slaves():
+            assert start.contact_point is not None
+            stopped = _unknown(motion.t, tip, start.contact_point)
+        kinetic = self.setup.others(start.placements)
+        return motion, SwingPart(motion=release, swing=start.swing, kinetic=kinetic, stopped=stopped)
 
     def run(self, motion: Motion) -> tuple[Motion, SwingPart]:
         """From a separation to the next touch of any link."""
@@ -82,8 +88,13 @@ class SwingDriver:
         node = int(((world - point) @ normal).argmin())
         if node in self.setup.slaves().get(name, ()):
             return None
-        x, y, z = world[node]
-        return (
-            f"the run ends at t = {run.t_end:.4g} s: {name} touches the target at ({x:.4g}, {y:.4g}, {z:.4g}) m, where "
-            "no contact of the scene keeps it out; add these nodes to a Contact"
-        )
+        return _unknown(run.t_end, name, world[node])
+
+
+def _unknown(t: float, body: str, at: Array) -> str:
+    """Why a run ends at time t [s], when a body touches at this point [m] and no contact says what happens there."""
+    x, y, z = at
+    return (
+        f"the run ends at t = {t:.4g} s: {body} touches the target at ({x:.4g}, {y:.4g}, {z:.4g}) m, where no contact "
+        "of the scene keeps it out; add these nodes to a Contact"
+    )

@@ -16,7 +16,7 @@ from warp_mca.model.layout import offsets
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
-    from warp_mca.solve.bonds import BondStage
+    from warp_mca.solve.constraint_stage import ConstraintStage
     from warp_mca.solve.stage import Step
     from warp_mca.solve.state import State
     from warp_mca.solve.workspace import Workspace
@@ -66,10 +66,10 @@ class LoadStage:
         hinges, bases: of the model.
     """
 
-    def __init__(self, model: Model, scenes: int, work: Workspace, bonds: BondStage, dt: float) -> None:
+    def __init__(self, model: Model, scenes: int, work: Workspace, constraints: ConstraintStage, dt: float) -> None:
         """Allocate on the current device."""
         self.hinges, self.bases, self.scenes = model.hinge_loads, model.bases, scenes
-        self.work, self.bonds, self.dt = work, bonds, dt
+        self.work, self.constraints, self.dt = work, constraints, dt
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not (self.hinges or self.bases):
             return
@@ -134,7 +134,7 @@ class LoadStage:
     def move_bases(self, step: Step) -> None:
         """Nodes of ground hinges that move, once all of them have moved as free ones, and their carriages."""
         state, own = step.state, step.state.loads
-        inputs = [self.device_bases, self.bonds.bonds.first, self.work.mass, self.dt]
+        inputs = [self.device_bases, self.constraints.bonds.first, self.work.mass, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse]
         outputs += [own.carriage, own.base_work, own.base_work_after, own.base_clock, self.kinetic]
         wp.launch(base.move_bases, len(self.bases), inputs=inputs, outputs=outputs)

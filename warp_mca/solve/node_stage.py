@@ -13,7 +13,7 @@ from warp_mca.solve.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
-    from warp_mca.solve.bonds import BondStage
+    from warp_mca.solve.constraint_stage import ConstraintStage
     from warp_mca.solve.stage import Step
     from warp_mca.solve.state import State
     from warp_mca.solve.workspace import Workspace
@@ -30,17 +30,21 @@ class NodeStage:
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
     """
 
-    def __init__(self, model: Model, work: Workspace, bonds: BondStage, precision: str, dt: float, rounds: int) -> None:
+    def __init__(
+        self, model: Model, work: Workspace, constraints: ConstraintStage, precision: str, dt: float, rounds: int
+    ) -> None:
         """Choose the kernels; `rounds` of elements that wait for nothing but the nodes."""
-        self.work, self.bonds, self.dt, self.node_count = work, bonds, dt, model.node_count
+        self.work, self.constraints, self.dt, self.node_count = work, constraints, dt, model.node_count
         each = bool((model.gravity != model.gravity[0]).any())
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
-        bound, early = bonds.count > 0, rounds >= EARLY_ROUNDS
+        bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
         self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
-        self.bound_kernel = constraint.bound_kernel(precision, self.touched, each, bonds.partial) if bound else None
+        self.bound_kernel = (
+            constraint.bound_kernel(precision, self.touched, each, constraints.partial) if bound else None
+        )
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -49,7 +53,7 @@ class NodeStage:
     def advance(self, step: Step) -> None:
         """Free nodes; where the step records, `work.v_before` takes the velocities before it."""
         before = self.work.v_before if step.records else None
-        self.integrate(step.state, self.dt, self.dt, self.bonds.role, step.split, before)
+        self.integrate(step.state, self.dt, self.dt, self.constraints.role, step.split, before)
 
     def advance_bound(self, step: Step) -> None:
         """Nodes in joints and driven ones."""
@@ -59,21 +63,21 @@ class NodeStage:
             work.inverse_mass,
             work.first_slots,
             work.more_slots,
-            self.bonds.role,
+            self.constraints.role,
             work.force,
             self.scene,
         ]
-        inputs += [self.gravity, self.bonds.bonds, self.dt]
+        inputs += [self.gravity, self.constraints.bonds, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
-        wp.launch(self.bound_kernel, self.bonds.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        wp.launch(self.bound_kernel, self.constraints.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def slide(self, step: Step) -> None:
         """Put sliders back on their rails, once all their nodes have moved as free ones."""
-        state, bonds = step.state, self.bonds
-        inputs = [self.work.X, self.work.mass, bonds.bonds.first, bonds.rails, self.dt]
+        state, constraints = step.state, self.constraints
+        inputs = [self.work.X, self.work.mass, constraints.bonds.first, constraints.rails, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse]
-        wp.launch(slide.slide, len(bonds.rails), inputs=inputs, outputs=outputs)
+        wp.launch(slide.slide, len(constraints.rails), inputs=inputs, outputs=outputs)
 
     def integrate(
         self,

@@ -16,7 +16,7 @@ class SceneRecords:
     """Rows of the history, and running sums and extremes over all check records. What has not begun is nan.
 
     Attributes:
-        sums: columns of each row of the history, `runs.ledger` names them, each shape (column_count,), float64.
+        sums: columns of each row of the history, see `kernels.records.columns`, each shape (column_count,), float64.
         velocities: of the recorded points at each row [m/s], each shape (point_count, 3), float64.
         path_stress: of the scene's probes [Pa], each shape (row_count, probe_count, 6), float32.
         peaks: of each contact pass at its greatest, sum of normal forces [N] and sum of their squares [N^2], shape

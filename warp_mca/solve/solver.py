@@ -8,15 +8,9 @@ while the one before them ends.
 
 from __future__ import annotations
 
-import math
-import weakref
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
@@ -29,35 +23,23 @@ from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
-from warp_mca.solve.bonds import BondStage
+from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
-from warp_mca.solve.early_launch import launch_early
+from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.node_stage import NodeStage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
+from warp_mca.solve.replay import Replay
 from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.threads import ELEMENTS as RANGE
-from warp_mca.solve.threads import Pool, Split, Stages, flushing, whole
+from warp_mca.solve.threads import Split, whole
 from warp_mca.solve.workspace import Workspace
 
 if TYPE_CHECKING:
     from warp_mca.solve.output import Output
-
-
-def check_device(name: str) -> str:
-    """The name of a device that this machine has.
-
-    Raises:
-        RequestError: there is no such device.
-    """
-    wp.init()
-    known = [str(device) for device in wp.get_devices()]
-    if name not in known:
-        raise bad_value("device", name, f"this machine has {', '.join(known)}")
-    return name
 
 
 class Solver:
@@ -70,7 +52,7 @@ class Solver:
         threads: that compute; one on a GPU, and for a model that is too small to gain from more.
         work: the model on the device, and what a step computes and forgets.
         elements, contacts: stages of the model's blocks and contact passes.
-        bonds: what binds nodes.
+        constraints: what binds nodes.
         loads: what acts in the joints of chains, and moves their bases.
         output: what is read off the state for paths and recorders, or None.
     """
@@ -90,9 +72,7 @@ class Solver:
         self.output: Output | None = None
         with wp.ScopedDevice(self.device):
             self._allocate()
-        self._graphs: weakref.WeakKeyDictionary[State, dict[str, Any]] = weakref.WeakKeyDictionary()
-        self._pool = Pool(self.threads) if self.threads > 1 else None
-        self._flushing: AbstractContextManager[object] | None = None
+        self._replay = Replay(self.device, self.threads)
 
     def _allocate(self) -> None:
         model, passes = self.model, len(self.model.passes) // self.layout.count
@@ -109,9 +89,9 @@ class Solver:
             blocks = max(stage.blocks for stage in self.contacts)
             for stage in self.elements:
                 stage.make_room(blocks)
-        self.bonds = BondStage(model, self.layout)
-        self.loads = LoadStage(model, self.layout.count, self.work, self.bonds, self.dt)
-        self.nodes = NodeStage(model, self.work, self.bonds, self.precision, self.dt, self._early)
+        self.constraints = ConstraintStage(model, self.layout)
+        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
+        self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
         self._streams = Streams(wp.get_device().is_cuda)
@@ -119,7 +99,7 @@ class Solver:
     @property
     def _early(self) -> int:
         """Rounds of patches that the elements take, where nothing else waits for the nodes."""
-        if self.contacts or self.bonds.count:
+        if self.contacts or self.constraints.count:
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
 
@@ -145,12 +125,12 @@ class Solver:
             for c in self.contacts
         ]
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
-        advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.bonds.count else []
-        advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.bonds.rails) else []
+        advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
+        advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
         advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
-            Stage("motion sums", lambda s: self.records.sum_motion(s, self.bonds, self.dt), only_records=True),
+            Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
             Stage("frames: velocity", self._after_step, only_records=True),
         ]
         if self.loads.kernels():
@@ -179,7 +159,7 @@ class Solver:
                 flag=wp.zeros((self.layout.count, len(FLAGS)), dtype=wp.int32),
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],
-                constraints=self.bonds.new_state(),
+                constraints=self.constraints.new_state(),
                 loads=self.loads.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
@@ -188,33 +168,6 @@ class Solver:
         """Forces of elements and contacts at the state's displacements, in `work`."""
         with wp.ScopedDevice(self.device):
             self._streams.run(self.groups[:1], Step(state))
-
-    def _launch(self, state: State, name: str, body: Callable[[], None]) -> None:
-        """Replay the graph `name` of a state, captured from `body` at its first use."""
-        with wp.ScopedDevice(self.device):
-            graphs = self._graphs.setdefault(state, {})
-            if name not in graphs:
-                with wp.ScopedCapture() as capture:
-                    body()
-                launch_early(capture.graph)
-                graphs[name] = capture.graph
-            with self._flush():
-                wp.capture_launch(graphs[name])
-
-    def _replay(self, state: State, pool: Pool, name: str, body: Callable[[Split], None], count: int = 1) -> None:
-        """Replay the stages `name`, captured from `body` at their first use, `count` times with all threads."""
-        with wp.ScopedDevice(self.device):
-            graphs = self._graphs.setdefault(state, {})
-            if name not in graphs:
-                graphs[name] = Stages(self.threads, body)
-            with self._flush():
-                for _ in range(count):
-                    graphs[name].replay(pool)
-
-    def _flush(self) -> AbstractContextManager[object]:
-        """Made at its first use, when `compile` has loaded what it needs."""
-        self._flushing = self._flushing or flushing(self.device)
-        return self._flushing
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
@@ -227,7 +180,7 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
         sums = self.records.kernels() + self.loads.kernels()
-        sums += [slide.slide] if len(self.bonds.rails) else []
+        sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
@@ -244,16 +197,6 @@ class Solver:
             for stage in self.contacts:
                 stage.search(self.work, state)
 
-    def initial_depths(self, state: State) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Of each contact, depth [m] and energy [J] of every spring at the start; the state does not change."""
-        with wp.ScopedDevice(self.device):
-            tried = state.copy()
-            for stage in self.contacts:
-                stage.launch(self.work, tried, 0.0)
-            self.work.contact_force.zero_()
-            springs = [own.spring for own in tried.contacts]
-            return [(spring.depth.numpy(), spring.energy.numpy()) for spring in springs]
-
     def begin(self, state: State) -> None:
         """First search of a new state, after `compile`."""
         self.search(state)
@@ -268,7 +211,7 @@ class Solver:
         """
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
-            self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.bonds.at_rest)
+            self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.constraints.at_rest)
             if self.model.hinge_loads:
                 self.loads.torques(state, -0.5 * self.dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
@@ -297,8 +240,8 @@ class Solver:
         def record(split: Split = whole) -> None:
             self._step(Step(state, split, True, is_row, needs))
 
-        if self._pool:
-            self._replay(state, self._pool, name, record)
+        if self._replay.pool:
+            self._replay.stages(state, name, record)
             state.steps += 1
             self.step(state, count - 1)
             return
@@ -309,7 +252,7 @@ class Solver:
             for _ in range(count - 1):
                 self._step(Step(state))
 
-        self._launch(state, f"{name} {count}", interval)
+        self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count
 
     def step(self, state: State, count: int) -> None:
@@ -318,8 +261,8 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
-        if self._pool:
-            self._replay(state, self._pool, "step", lambda split: self._step(Step(state, split)), count)
+        if self._replay.pool:
+            self._replay.stages(state, "step", lambda split: self._step(Step(state, split)), count)
         else:
 
             def steps() -> None:
@@ -327,7 +270,7 @@ class Solver:
                 for _ in range(count):
                     self._step(Step(state))
 
-            self._launch(state, f"step {count}", steps)
+            self._replay.graph(state, f"step {count}", steps)
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:
@@ -342,33 +285,3 @@ class Solver:
         if self.output and self.output.has_probes:
             found["path_stress"] = self.output.path_stress
         return found
-
-    def max_plastic_strain(self, state: State, scene: int = 0) -> float:
-        """Greatest equivalent plastic strain of any integration point of a scene [-]."""
-        ranges = zip(self.elements, self.layout.elements[scene].tolist(), strict=True)
-        return max(s.max_plastic_strain(state, slice(a - s.block.first, b - s.block.first)) for s, (a, b) in ranges)
-
-    def max_penetration(self, state: State, scene: int = 0) -> float:
-        """Greatest depth that a slave node of a scene reached below its master [m]."""
-        return max((float(stage.depths(state, scene).max()) for stage in self.contacts), default=0.0)
-
-    def max_normal_force(self, state: State, scene: int = 0) -> float:
-        """Greatest sum of the normal forces on all slave nodes of a scene in any step [N]."""
-        return self.normal_force.greatest(state.normal_force, scene)
-
-    def max_speed(self, state: State, scene: int = 0) -> float:
-        """Greatest speed of any node of a scene, from the start on [m/s]."""
-        first, end = self.layout.nodes[scene : scene + 2]
-        squares = state.speed_square.numpy()
-        return math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
-
-    def joint_impulses(self, state: State, scene: int = 0) -> dict[str, list[float]]:
-        """Impulse that each joint of a scene gave to its first body [N s], by name."""
-        impulse = state.constraints.impulse.numpy()
-        joints = self.model.joints[self.layout.joints[scene] : self.layout.joints[scene + 1]]
-        return {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
-
-    def device_name(self) -> str:
-        """The device, with what it is."""
-        device = wp.get_device(self.device)
-        return f"{self.device} ({device.name})"

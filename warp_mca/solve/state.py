@@ -23,7 +23,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.files import write_atomically
 from warp_mca.base.validate import DAMAGE
 from warp_mca.elements.state import ElementState
-from warp_mca.solve.bonds import ConstraintState
+from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords

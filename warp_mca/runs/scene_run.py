@@ -1,10 +1,12 @@
-"""Owns what the run of one scene adds up to: its records as they arrive, and its result at the end."""
+"""Owns the run of one scene of an impact phase: its records as they arrive, and its result at the end."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.model.model import body_materials
@@ -12,7 +14,15 @@ from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.contact_warnings import resolution_warnings
+from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
+from warp_mca.solve.state_figures import (
+    joint_impulses,
+    max_normal_force,
+    max_penetration,
+    max_plastic_strain,
+    max_speed,
+)
 
 if TYPE_CHECKING:
     from warp_mca.runs.prepare import Prepared
@@ -23,11 +33,11 @@ if TYPE_CHECKING:
 COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
 
 
-class Account:
-    """Takes in the records of one scene.
+class SceneRun:
+    """Takes in the records of one scene of an impact, and makes its result of them.
 
     Attributes:
-        ledger: histories and guards.
+        ledger: rows of its history, energy balance and guards.
     """
 
     def __init__(
@@ -61,10 +71,14 @@ class Account:
             if self.ready.scene.paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
+    def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
+        """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
+        return history_columns(self.ledger, first)
+
     def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
-        history = self.ledger.history()
-        contacts = self.ledger.contacts(contact_names(self.ready.scene.contacts))
+        history = self.history()
+        contacts = contact_histories(self.ledger, contact_names(self.ready.scene.contacts))
         facts = self._facts(wall, stopped is not None)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)
@@ -81,12 +95,12 @@ class Account:
                 "angular_momentum": start.angular_momentum_mismatch,
                 "kinetic_energy": start.energy_mismatch,
             },
-            "max_penetration": self.solver.max_penetration(self.state, self.index),
+            "max_penetration": max_penetration(self.solver, self.state, self.index),
             "max_strain": ledger.kept.max_strain,
             "extremes": self._extremes(),
             "energy_error_exchanged": ledger.exchange_error,
             "stable_dt": model.stable.dt,
-            "joint_impulse": self.solver.joint_impulses(self.state, self.index),
+            "joint_impulse": joint_impulses(self.solver, self.state, self.index),
             "threads": self.solver.threads,
         }
         if self.solver.layout.count > 1:
@@ -102,12 +116,12 @@ class Account:
             n_steps=count,
             simulated_time=self.steps.dt * count,
             wall=wall,
-            device=self.solver.device_name(),
+            device=f"{self.solver.device} ({wp.get_device(self.solver.device).name})",
             precision=self.solver.precision,
             element=" ".join(sorted({block.element for block in model.blocks})),
             energy_error=ledger.kept.energy_error,
             energy=ledger.energy(),
-            max_plastic_strain=self.solver.max_plastic_strain(self.state, self.index),
+            max_plastic_strain=max_plastic_strain(self.solver, self.state, self.index),
             parameters=scene.parameters,
             t_contact=start.t_contact if scene.rigid else None,
             v_n=start.v_n,
@@ -120,10 +134,10 @@ class Account:
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
         return {
-            "F_n_max": self.solver.max_normal_force(self.state, self.index),
+            "F_n_max": max_normal_force(self.solver, self.state, self.index),
             "max_strain": self.ledger.kept.max_strain,
             "min_jacobian": self.ledger.kept.min_jacobian,
-            "max_speed": self.solver.max_speed(self.state, self.index),
+            "max_speed": max_speed(self.solver, self.state, self.index),
             "energy_error": self.ledger.kept.energy_error,
         }
 

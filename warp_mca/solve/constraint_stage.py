@@ -33,7 +33,7 @@ class ConstraintState:
     clock: wp.array
 
 
-class BondStage:
+class ConstraintStage:
     """What `kernels.nodes.node` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
 
     Attributes:

@@ -1,0 +1,62 @@
+"""Owns the graphs of a solver: what it launches for a state is captured at its first use, and replayed from then on."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
+
+import warp as wp
+
+from warp_mca.solve.early_launch import launch_early
+from warp_mca.solve.threads import Pool, Split, Stages, flushing
+
+if TYPE_CHECKING:
+    from warp_mca.solve.state import State
+
+
+class Replay:
+    """Graphs by state and name; those of a state go with it.
+
+    Attributes:
+        pool: threads of a CPU that compute ranges of a launch side by side, or None where one thread computes.
+    """
+
+    def __init__(self, device: str, threads: int) -> None:
+        self.device, self.threads = device, threads
+        self.pool = Pool(threads) if threads > 1 else None
+        self._graphs: weakref.WeakKeyDictionary[State, dict[str, Any]] = weakref.WeakKeyDictionary()
+        self._flushing: AbstractContextManager[object] | None = None
+
+    def graph(self, state: State, name: str, body: Callable[[], None]) -> None:
+        """Replay the graph `name` of a state, captured from `body` at its first use."""
+        with wp.ScopedDevice(self.device):
+            graphs = self._graphs.setdefault(state, {})
+            if name not in graphs:
+                with wp.ScopedCapture() as capture:
+                    body()
+                launch_early(capture.graph)
+                graphs[name] = capture.graph
+            with self._flush():
+                wp.capture_launch(graphs[name])
+
+    def stages(self, state: State, name: str, body: Callable[[Split], None], count: int = 1) -> None:
+        """Replay the stages `name`, captured from `body` at their first use, `count` times with all threads of `pool`.
+
+        Raises:
+            Exception: what a thread raised.
+        """
+        assert self.pool is not None
+        with wp.ScopedDevice(self.device):
+            graphs = self._graphs.setdefault(state, {})
+            if name not in graphs:
+                graphs[name] = Stages(self.threads, body)
+            with self._flush():
+                for _ in range(count):
+                    graphs[name].replay(self.pool)
+
+    def _flush(self) -> AbstractContextManager[object]:
+        """Made at its first use, when `Solver.compile` has loaded what it needs."""
+        self._flushing = self._flushing or flushing(self.device)
+        return self._flushing
