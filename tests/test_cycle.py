@@ -245,3 +245,14 @@ def test_a_saved_cycle_is_loaded_as_it_was(tmp_path):
     loaded = mca.load(tmp_path / "run")
     assert loaded.summary["phases"] == result.summary["phases"]
     assert all(np.array_equal(loaded[name], result[name], equal_nan=True) for name in result.history)
+
+
+@NAMES
+def test_each_impact_can_be_looked_at_by_itself(name: str):
+    _, _, result = cycle(name)
+    for k, part in enumerate(impacts(name)):
+        own, alone = result.impact(k), part.impact.scene_runs[0].history()
+        assert own.time == pytest.approx(alone["time_s"], abs=1e-12)
+        assert np.array_equal(own.F_n, alone["F_n_N"]) and len(own.contacts[0].pressure) == len(own.time)
+    with pytest.raises(mca.RequestError, match="the run has 2"):
+        result.impact(2)

@@ -203,13 +203,13 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
     """Against the same graphs whose kernels begin when the one before them has ended."""
     from benchmarks.blocks import FULL, Case, Held, assemble
     from warp_mca.kernels.nodes import node
-    from warp_mca.solve import solver
+    from warp_mca.solve import replay
 
     monkeypatch.setattr("warp_mca.solve.node_stage.EARLY_ROUNDS", 0)
     model, case = assemble(element, 90_000), {"elastic": Case(), "flows": Case(0.3), "everything": FULL}[name]
-    own, changed, states = solver.launch_early, [], []
+    own, changed, states = replay.launch_early, [], []
     for change in (lambda graph: changed.append(own(graph)), lambda graph: None):
-        monkeypatch.setattr(solver, "launch_early", change)
+        monkeypatch.setattr(replay, "launch_early", change)
         held = Held(model, case, "cuda:0", precision)
         if name == "elastic":
             early = node.integrate_kernel(precision, False, False, False, False, True)

@@ -56,7 +56,7 @@ def plot_energies(result: Result) -> Figure:
     balance.plot(time, scale * error, color=PURPLE, label="sum less\nwork done", linewidth=1.2)
     balance.set_ylabel(f"error [{unit}]")
     balance.set_xlabel("time after first contact [ms]")
-    balance.set_xlim(0.0, 1e3 * float(result.time[-1]) if len(result.time) else 1.0)
+    balance.set_xlim(*(1e3 * result.time[[0, -1]] if len(result.time) else (0.0, 1.0)))
     figure.align_ylabels()
     for axes in (energies, balance):
         tidy(axes)
@@ -72,5 +72,6 @@ def save_energies(path: str | os.PathLike[str], result: Result) -> Path:
 
 def _title(result: Result) -> str:
     name = str(result.summary.get("scene") or "")
-    initial = float(result["E_kinetic"][0]) if len(result.time) else 0.0
+    after = np.flatnonzero(result.time >= 0.0)  # rows before it are those of a swing
+    initial = float(result["E_kinetic"][after[0]]) if len(after) else 0.0
     return f"{name}: kinetic energy at first contact {initial:.4g} J".removeprefix(": ")

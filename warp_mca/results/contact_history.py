@@ -49,6 +49,16 @@ class ContactHistory:
     normal_force: Array
     closing_speed: Array
 
+    def at(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> ContactHistory:
+        """The same in some output intervals: their numbers, shape (count,), or whether each is, shape (row_count,)."""
+        return ContactHistory(
+            name=self.name,
+            force=self.force[rows],
+            pressure=self.pressure[rows],
+            normal_force=self.normal_force[rows],
+            closing_speed=self.closing_speed[rows],
+        )
+
     @property
     def normal(self) -> Array | None:
         """Direction of the normal impulse on the slave [-], shape (3,), or None where it has none.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warp_mca.base.errors import bad_value
 from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.force_history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
 from warp_mca.results.paths import PathHistory
@@ -74,6 +75,28 @@ class Result:
         if column not in self.history:
             raise KeyError(f"{column}: the history has {', '.join(self.history)}")
         return self.history[column]
+
+    def impact(self, number: int = 0) -> Result:
+        """The rows of one impact of a run of many phases, in time from its start; all rows of a run of one impact.
+
+        Raises:
+            RequestError: the run has no impact of that number, counted from 0.
+        """
+        if "phases" not in self.summary:
+            return self
+        spans = [(phase["start"], phase["end"]) for phase in self.summary["phases"] if phase["kind"] == "impact"]
+        if not 0 <= number < len(spans):
+            raise bad_value("number of an impact", number, f"the run has {len(spans)}, counted from 0")
+        start, end = (t - spans[0][0] for t in spans[number])
+        slack = 1e-9 * max(end, 1e-3)
+        rows = (self.time >= start - slack) & (self.time <= end + slack)
+        history = {name: column[rows] for name, column in self.history.items()}
+        return replace(
+            self,
+            history={**history, "time_s": history["time_s"] - start},
+            paths=tuple(path.at(rows) for path in self.paths),
+            contacts=tuple(contact.at(rows) for contact in self.contacts),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -97,13 +97,14 @@ def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
             written.mkdir()
             begun = time.perf_counter()
             _write_history(written / "history.csv", result.history)
-            save_forces(written / "forces.png", result)
+            shown = result.impact() if result.summary.get("touched", True) else result  # of many, the first one
+            save_forces(written / "forces.png", shown)
             save_energies(written / "energies.png", result)
             if result.contacts:
                 save_contacts(written / "forces.npz", result.time, result.contacts)
             if result.paths:
                 save_paths(written / "paths.npz", result.time, result.paths)
-                save_path_figures(written, result)
+                save_path_figures(written, shown)
             digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
             result = _with_output_time(result, path, time.perf_counter() - begun)
             summary = {**result.summary, "warnings": list(result.warnings), DIGESTS: digests}

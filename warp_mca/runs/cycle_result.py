@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.results.contact_history import ContactHistory, contact_names
 from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result, RunFacts, summarise
-from warp_mca.runs.cycle_rows import Columns, Story, tell_story
+from warp_mca.runs.cycle_rows import STORED, Columns, Story, tell_story
 from warp_mca.runs.cycle_setup import Setup
 from warp_mca.runs.parts import ImpactPart, Part
 
@@ -128,7 +128,7 @@ def _of_all(
 
     last = story.phases[-1]["energy"]
     totals = story.totals
-    energy = {**last, "error": totals.error(sum(last[k] for k in ("kinetic", "elastic", "plastic", "hourglass")))}
+    energy = {**last, "error": totals.error(sum(last[k] for k in STORED))}
     steps = sum(summary["n_steps"] for summary in summaries)
     fe, elements = setup.clock.wall["fe"], summaries[0]["n_elements"] if summaries else 0
     pairs = [

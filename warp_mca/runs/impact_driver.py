@@ -106,7 +106,9 @@ class ImpactDriver:
         model = build_model(setup.scene, setup.meshes, X, V, watched, chain=setup.chain, start=motion.t)
         probes = locate(setup.scene, model, setup.meshes, self._places)
         warnings = tuple(mesh_warnings(setup.scene, setup.meshes, model)) if self.count == 1 else ()
-        return Prepared(setup.scene, setup.meshes, setup.first, model, probes, warnings), u, V
+        mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
+        start = setup.first if self.count == 1 else replace(setup.first, **mismatch)  # those are of the first hand-off
+        return Prepared(setup.scene, setup.meshes, start, model, probes, warnings), u, V
 
     def _shape(
         self, motion: Motion, relaxation: Relaxation, u: ByBody, settled: list[Shape]

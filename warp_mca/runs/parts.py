@@ -47,7 +47,8 @@ class ImpactPart:
         back: the way back to rigid bodies; None where the run ends with the impact.
         lost: energy of vibration that the way back leaves out [J].
         jump_back: kinetic energy of the chain that swings on, less that of its nodes' rigid motion [J].
-        hinge_impulse: that each link's inbound hinge gave when the motion became rigid [N s], by joint, shape (2,).
+        hinge_impulse: that the inbound hinge of each link, by its body, gave when the motion became rigid [N s], shape
+            (2,), float64.
         stopped: why the run ends here, in one sentence, or None.
     """
 

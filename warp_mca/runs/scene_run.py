@@ -167,7 +167,7 @@ class SceneRun:
         depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths)
         found += self.ready.warnings
-        if scene.rigid and scene.rigid.inertia == "slender":
+        if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
             found.append(
                 f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic "
                 f"energy by {start.energy_mismatch:.1%} at hand-off; rigid_inertia=mesh keeps both"
