@@ -136,10 +136,10 @@ def _add_swing(setup: Setup, part: SwingPart, story: Story, kept: slice) -> None
 
 def _add_impact(setup: Setup, part: ImpactPart, story: Story) -> None:
     """Rows of an impact, and what the ways there and back book."""
-    account, totals = part.impact.scene_runs[0], story.totals
+    scene_run, totals = part.impact.scene_runs[0], story.totals
     totals.hand_off += part.jump
     totals.lost += part.settled
-    rows, energies = account.history(), account.ledger.energies()
+    rows, energies = scene_run.history(), scene_run.ledger.energies()
     stored = np.sum([energies[key] for key in STORED], axis=0)
     spent = energies["friction"] + energies["contact_loss"] + energies["joint"]
     rows["t"] = part.start + rows.pop("time_s")
@@ -202,8 +202,8 @@ def _link_angles(setup: Setup, part: ImpactPart) -> Array:
     It is that of the line from a node at the inbound hinge to the node farthest from it, whose velocities are summed
     by the trapezoidal rule.
     """
-    account = part.impact.scene_runs[0]
-    model, velocity = account.ready.model, np.array(account.ledger.kept.velocities)
+    scene_run = part.impact.scene_runs[0]
+    model, velocity = scene_run.ready.model, np.array(scene_run.ledger.kept.velocities)
     u, _ = part.impact.at_last_record()
     found = []
     for k, link in enumerate(setup.chain.links):

@@ -126,8 +126,8 @@ class ImpactDriver:
 
     def _advance(self, impact: Impact) -> None:
         """Until all contacts have been open for a while, or to the end of its time."""
-        account, interval, wait = impact.scene_runs[0], impact.steps.interval, self.open_time
-        ledger, contacts = account.ledger, len(account.ready.model.passes)
+        scene_run, interval, wait = impact.scene_runs[0], impact.steps.interval, self.open_time
+        ledger, contacts = scene_run.ledger, len(scene_run.ready.model.passes)
 
         def told() -> None:
             self.setup.tell("impact", impact.rows / (impact.steps.intervals + 1))
