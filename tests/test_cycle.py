@@ -64,6 +64,9 @@ def test_impacts_follow_each_other_until_the_time_is_up(name: str):
         assert after["start"] == before["end"]
     assert phases[-1]["end"] == setup.t_end
     assert len(result.summary["contacts"]) >= 2
+    lasted = sum(part.end - part.start for part in impacts(name))
+    assert result.summary["simulated_time"] == pytest.approx(lasted, rel=1e-12)
+    assert result.summary["n_steps"] == sum(part.impact.state.steps - 1 for part in impacts(name))
     for (start, end), part in zip(result.summary["contacts"], impacts(name), strict=False):
         assert part.start - impacts(name)[0].start <= start < end
 

@@ -123,8 +123,8 @@ def _of_all(
     def spans(key: str) -> list[list[float]]:
         return list(_shifted(summaries, offsets, key))
 
-    def greatest(key: str, least: float = 0.0) -> float:
-        return max((summary[key] for summary in summaries), default=least)
+    def greatest(key: str) -> float:
+        return max((summary[key] for summary in summaries), default=0.0)
 
     last = story.phases[-1]["energy"]
     totals = story.totals

@@ -106,14 +106,14 @@ def _add_swing(setup: Setup, part: SwingPart, story: Story, kept: slice) -> None
         totals.initial = kinetic[0]
     work = np.asarray(potential[0]) - np.asarray(potential) + run.work_t[:, 0] + run.work_t[:, 2]
     heat = run.work_t[:, 1]
-    stored = np.asarray(kinetic) + motion.elastic + motion.plastic + motion.hourglass
+    stored = np.asarray(kinetic) + motion.strain_energy
     error = totals.error(stored) + heat - work
     rows = {name: np.zeros(len(run.t)) for name in ("t", *HISTORY_COLUMNS[1:], *MORE_COLUMNS)}
     rows |= {"t": run.t, "closing_speed": np.full(len(run.t), np.nan)}
     rows |= _velocities(np.array(tip), np.array(plate))
     rows |= {
         "E_kinetic": np.asarray(kinetic),
-        "E_internal": np.full(len(run.t), motion.elastic + motion.plastic + motion.hourglass),
+        "E_internal": np.full(len(run.t), motion.strain_energy),
         "E_plastic": np.full(len(run.t), motion.plastic),
         "E_friction": np.full(len(run.t), totals.friction),
         "E_total_error": error,

@@ -13,6 +13,7 @@ from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.model.assembly import body_materials
 from warp_mca.model.model import build_model
+from warp_mca.model.precision import check_range
 from warp_mca.results.paths import Found, locate
 from warp_mca.rigid.placement import link_placements
 from warp_mca.runs.advice import mesh_warnings
@@ -104,6 +105,7 @@ class ImpactDriver:
                 u[name] = deformed - X[name]
         watched = [(link.body, node) for link in setup.chain.links for node in setup.link_ends(link.body)]
         model = build_model(setup.scene, setup.meshes, X, V, watched, chain=setup.chain, start=motion.t)
+        check_range(model, setup.settings.precision)
         probes = locate(setup.scene, model, setup.meshes, self._places)
         warnings = tuple(mesh_warnings(setup.scene, setup.meshes, model)) if self.count == 1 else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)

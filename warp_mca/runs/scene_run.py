@@ -79,15 +79,15 @@ class SceneRun:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
         history = self.history()
         contacts = contact_histories(self.ledger, contact_names(self.ready.scene.contacts))
-        facts = self._facts(wall, stopped is not None)
+        facts = self._facts(wall)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)
         warnings = (*self._warnings(), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
         return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
 
-    def _facts(self, wall: Mapping[str, float], cut_short: bool) -> RunFacts:
+    def _facts(self, wall: Mapping[str, float]) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
-        count = self.steps.per_interval * max(ledger.kept.count - 1, 0) if cut_short else self.steps.count
+        count = self.steps.per_interval * max(ledger.kept.count - 1, 0)  # fewer than asked where it ended early
         more: dict[str, object] = {
             "energy_drift_rigid": start.energy_drift,
             "handoff_mismatch": {
