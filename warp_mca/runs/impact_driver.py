@@ -119,10 +119,12 @@ class ImpactDriver:
         rotations = {name: placement.rotation for name, placement in motion.placements.items()}
 
         def shape(solver: Solver, state: State) -> None:
+            self.setup.clock.lap("compile")
             give_history(solver, state, motion.history, rotations)
             found = relaxation.settle(np.concatenate([u[body.name] for body in self.setup.scene.bodies]), state)
             found.give(state)
             settled.append(found)
+            self.setup.clock.lap("rigid")
 
         return shape
 
