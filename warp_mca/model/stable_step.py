@@ -101,6 +101,37 @@ def stable_step(
     )
 
 
+def at_elements(conn: Index, value: Array) -> Array:
+    """Greatest of the values >= 0 at the nodes of each element, shape (element_count,)."""
+    touched = np.flatnonzero((value != 0.0)[conn].any(axis=1))
+    found = np.zeros(len(conn))
+    found[touched] = value[conn[touched]].max(axis=1)
+    return found
+
+
+def element_steps(
+    formulation: Element,
+    X: Array,
+    conn: Index,
+    K: Array,
+    G: Array,
+    mass: Array,
+    contact: Array,
+    *,
+    coarse: bool = False,
+) -> Array:
+    """Stable step that each element would ask for by itself, contact springs included [s], shape (element_count,).
+
+    A lower bound from upper bounds of the eigenvalues: that of a hexahedron's own stiffness is 12 to 18 % below its
+    step, `coarse` ones are 7 % lower and three times as quick. Arguments as in `stable_step`.
+    """
+    own = np.empty(len(conn))
+    for part in chunks(len(conn), CHUNK):
+        own[part] = formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse)
+    # the greater of both parts, and of what stands for a spring that opens and closes
+    return 2.0 / np.sqrt(np.maximum(own + contact, _switching(contact, contact / (own + contact))))
+
+
 def _worst(
     bound: Array,
     exact: Callable[[Part], Array],
