@@ -116,6 +116,9 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 def _add_scene(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
     parser.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
+    parser.add_argument(
+        "--refine", type=float, metavar="R", help="cells R times smaller than the recipes say; below 1 larger ones"
+    )
     help_text = "change a parameter; may be given several times"
     _add_element(parser)
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)

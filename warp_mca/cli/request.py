@@ -46,9 +46,11 @@ def read_request(args: argparse.Namespace, more: Mapping[str, str] | None = None
         preset = args.preset or source.default_preset
         origin = Origin(source.name, preset, values) if source.builtin else None
         label = f"{source.name}-{preset}" if preset else source.name
-        return Request(_with(source.build(values), args.element, scale), label, source, origin)
+        return Request(_with(source.build(values), args.element, scale, args.refine), label, source, origin)
     if args.preset is not None:
         raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
+    if args.refine is not None:
+        raise bad_value("--refine", args.refine, "a model file holds finished meshes; give it when building")
     stored = model_file.load(args.scene)
     scale = _where_no_parameter(scale, stored.origin.parameters if stored.origin else (), overrides)
     stored = model_file.changed(stored, overrides)
@@ -69,8 +71,10 @@ def _where_no_parameter(scale: float | None, names: Collection[str], overrides: 
     return scale
 
 
-def _with(scene: Scene, element: str | None, scale: float | None) -> Scene:
-    """The scene with another element formulation, or share of the stable time step, where one is given."""
+def _with(scene: Scene, element: str | None, scale: float | None, refine: float | None = None) -> Scene:
+    """The scene with another element formulation, share of the stable time step, or size of cells, where given."""
+    if refine is not None:
+        scene = dataclasses.replace(scene, refine=refine)
     if element is not None:
         scene = dataclasses.replace(scene, bodies=tuple(dataclasses.replace(b, element=element) for b in scene.bodies))
     if scale is not None:

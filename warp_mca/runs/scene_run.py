@@ -102,6 +102,7 @@ class SceneRun:
             "stable_dt": model.stable.dt,
             "joint_impulse": joint_impulses(self.solver, self.state, self.index),
             "threads": self.solver.threads,
+            "refine": scene.refine,
         }
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}

@@ -15,7 +15,15 @@ from warp_mca.results.paths import Found
 from warp_mca.results.result import Result
 from warp_mca.results.storage import check_output, hold, write
 from warp_mca.runs.advice import warn
-from warp_mca.runs.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
+from warp_mca.runs.arguments import (
+    Progress,
+    check_recorders,
+    check_scene,
+    one_at_a_time,
+    refined_scene,
+    span_of,
+    teller,
+)
 from warp_mca.runs.meshing import mesh
 from warp_mca.runs.prepare import Clock, Prepared, prepare
 from warp_mca.runs.settings import Settings, settings_of
@@ -37,6 +45,7 @@ def run(
     duration: float | None = None,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
+    refine: float | None = None,
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
@@ -53,6 +62,7 @@ def run(
         duration: of the impact phase [s]; the scene's own if None.
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
+        refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
@@ -67,6 +77,7 @@ def run(
     from warp_mca.recorders.frames import check_files
 
     check_scene("scene", scene)
+    scene = refined_scene(scene, refine, meshes)
     tell = teller(progress)
     span = span_of(scene, duration)
     check_recorders(recorders)
