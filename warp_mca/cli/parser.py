@@ -57,6 +57,12 @@ def _run(parser: argparse.ArgumentParser) -> None:
         "--time-step-scale", type=float, metavar="SHARE", help="time step over the stable one (default: the scene's)"
     )
     parser.add_argument(
+        "--mass-scaling",
+        type=_mass_scaling,
+        metavar="F",
+        help="stable step F times as long, or as 2e-8s, by mass that the smallest elements gain (default: the scene's)",
+    )
+    parser.add_argument(
         "--sweep",
         dest="sweeps",
         action="append",
@@ -93,6 +99,11 @@ def _verify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--level", default="quick", choices=("quick", "full"), help="meshes (default: %(default)s)")
     parser.add_argument("--out", type=_folder, metavar="DIR", help="write verification.md and its figure there")
     parser.set_defaults(command=commands.verify)
+
+
+def _mass_scaling(text: str) -> float | str:
+    """A factor, or a step as text."""
+    return text if text.endswith("s") else float(text)
 
 
 def _folder(text: str) -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
@@ -39,19 +38,6 @@ def check_scene(field: str, scene: object) -> None:
         RequestError: it is none.
     """
     validate.kind_of(field, scene, Scene, "give a warp_mca.Scene; mca.make_scene(NAME) makes one by its name")
-
-
-def refined_scene(scene: Scene, refine: float | None, meshes: object) -> Scene:
-    """The scene, with its cells `refine` times smaller than recipes say unless that is None.
-
-    Raises:
-        RequestError: it is no finite number above 0, or `meshes` are given that it would not change.
-    """
-    if refine is None:
-        return scene
-    if meshes is not None:
-        raise bad_value("refine", refine, "finished meshes are given, which it cannot change; leave one of the two out")
-    return replace(scene, refine=refine)
 
 
 def teller(progress: Progress | None) -> Progress:

@@ -15,10 +15,11 @@ from warp_mca.base.folder import held
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
-from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, refined_scene, span_of, teller
+from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_of, teller
 from warp_mca.runs.settings import settings_of
 from warp_mca.runs.simulation import simulate
 from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene.options import with_options
 
 Meshes = Mapping[str, Mesh]
 
@@ -34,6 +35,7 @@ def run_batch(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     refine: float | None = None,
+    mass_scaling: float | str | None = None,
     meshes: Sequence[Meshes] | None = None,
     progress: Progress | None = None,
 ) -> list[Result]:
@@ -50,7 +52,7 @@ def run_batch(
         duration: of the impact phase [s]; the scenes' own if None.
         out: folder that gets a folder for each scene, named by its number from 0, with the files of `warp_mca.run`;
             with `force`, results of a larger batch before it are removed.
-        refine: as in `warp_mca.run`, for all scenes.
+        refine, mass_scaling: as in `warp_mca.run`, for all scenes.
         meshes: finished meshes by body, for each scene, to save making them again.
         progress: called with a stage and the share of it that is done.
 
@@ -66,7 +68,7 @@ def run_batch(
     scenes = list(scenes)
     tell = teller(progress)
     span = check_alike(scenes, duration)
-    scenes = [refined_scene(scene, refine, meshes) for scene in scenes]
+    scenes = [with_options(scene, refine, mass_scaling, meshes) for scene in scenes]
     settings = settings_of(device, precision, threads)
     _check_meshes(meshes, len(scenes))
     with hold_scenes(out, len(scenes), force) as folders:

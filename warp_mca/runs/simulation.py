@@ -20,7 +20,6 @@ from warp_mca.runs.arguments import (
     check_recorders,
     check_scene,
     one_at_a_time,
-    refined_scene,
     span_of,
     teller,
 )
@@ -28,6 +27,7 @@ from warp_mca.runs.meshing import mesh
 from warp_mca.runs.prepare import Clock, Prepared, prepare
 from warp_mca.runs.settings import Settings, settings_of
 from warp_mca.scene import Scene
+from warp_mca.scene.options import with_options
 
 if TYPE_CHECKING:
     from warp_mca.runs.impact import Impact
@@ -46,6 +46,7 @@ def run(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     refine: float | None = None,
+    mass_scaling: float | str | None = None,
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
@@ -63,6 +64,8 @@ def run(
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
         refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
+        mass_scaling: in place of `ImpactPhase.mass_scaling`: how many times longer the stable step is to be, or that
+            step as "2e-8s", by added mass.
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
@@ -77,7 +80,7 @@ def run(
     from warp_mca.recorders.frames import check_files
 
     check_scene("scene", scene)
-    scene = refined_scene(scene, refine, meshes)
+    scene = with_options(scene, refine, mass_scaling, meshes)
     tell = teller(progress)
     span = span_of(scene, duration)
     check_recorders(recorders)

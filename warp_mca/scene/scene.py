@@ -114,6 +114,9 @@ class Scene:
         validate.positive("Scene", t_end=self.t_end)
         if self.rigid is None:
             raise bad_value("Scene.t_end", self.t_end, "swings and impacts in turn need a RigidPhase; give one")
+        if self.impact.mass_scaling is not None:
+            remedy = "links that get rigid again have their own masses; leave mass_scaling out, or t_end"
+            raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
         if self.prescribed:
             remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
             raise bad_value("Scene.t_end", self.t_end, remedy)
