@@ -9,6 +9,7 @@ import warp_mca as mca
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.model import stable_step as timestep
+from warp_mca.model.assembly import Assembly
 from warp_mca.model.model import Model, build_model, nodal_masses
 from warp_mca.model.stable_step import stable_step
 from warp_mca.rigid.handoff import hand_off
@@ -243,3 +244,27 @@ def test_run_blows_up_just_beyond_the_assembled_limit(share: float, stable: bool
     else:
         with pytest.raises(mca.GuardError, match="lower time_step_scale"):
             mca.run(made, precision="float64")
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+def test_steps_of_single_elements_are_lower_bounds(coarse: bool):
+    """No element's bound exceeds the step that it has alone, and none is more than a third below it."""
+    made = scene(shaken(box(3, 2, 2), 0.1), box(4, 1, 4), penalty=10.0)
+    meshes = mca.mesh(made)
+    start = hand_off(made, meshes, nodal_masses(made, meshes))
+    parts = Assembly(made, meshes, start.positions)
+    added = np.zeros(len(parts.X))
+    added[parts.faces(made.contacts[0].slave).nodes] = 1e12
+    (cells,), (mass,) = parts.cells, parts.element_mass
+    contact = added[cells.conn].max(axis=1)
+    alone = [
+        stable_step(
+            ELEMENTS["hex8"],
+            parts.X,
+            *(v[k : k + 1] for v in (cells.conn, parts.K, parts.G, mass, contact, cells.index)),
+        ).dt
+        for k in range(parts.element_count)
+    ]
+    ratio = parts.element_steps(added, coarse=coarse) / alone
+    assert ratio.max() <= 1.0 + 1e-12
+    assert ratio.min() > 0.67

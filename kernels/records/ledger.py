@@ -40,6 +40,7 @@ def run_of(first: int, end: int, k: int):
 def record_motion(
     row: wp.array(dtype=wp.int32),
     mass: wp.array(dtype=wp.float64),
+    heavy_mass: wp.array(dtype=wp.float64),
     gravity: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     v_before: wp.array(dtype=wp.vec3d),
@@ -69,7 +70,7 @@ def record_motion(
         v_i = v[i]
         kinetic += wp.float64(0.5) * m * wp.dot(v_before[i], v_i)
         if not weightless:
-            fall += m * wp.dot(g, u[i] - dt * v_i)
+            fall += heavy_mass[i] * wp.dot(g, u[i] - dt * v_i)
     driven = wp.float64(0.0)
     begin, end = run_of(driven_first[scene], driven_first[scene + 1], k)
     for i in range(begin + lane, end, wp.block_dim()):

@@ -57,6 +57,12 @@ def _run(parser: argparse.ArgumentParser) -> None:
         "--time-step-scale", type=float, metavar="SHARE", help="time step over the stable one (default: the scene's)"
     )
     parser.add_argument(
+        "--mass-scaling",
+        type=_mass_scaling,
+        metavar="F",
+        help="stable step F times as long, or as 2e-8s, by mass that the smallest elements gain (default: the scene's)",
+    )
+    parser.add_argument(
         "--sweep",
         dest="sweeps",
         action="append",
@@ -95,6 +101,11 @@ def _verify(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(command=commands.verify)
 
 
+def _mass_scaling(text: str) -> float | str:
+    """A factor, or a step as text."""
+    return text if text.endswith("s") else float(text)
+
+
 def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("'': name a folder, or . for this one")
@@ -116,6 +127,9 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 def _add_scene(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
     parser.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
+    parser.add_argument(
+        "--refine", type=float, metavar="R", help="cells R times smaller than the recipes say; below 1 larger ones"
+    )
     help_text = "change a parameter; may be given several times"
     _add_element(parser)
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)

@@ -12,6 +12,7 @@ import warp_mca as mca
 from warp_mca.base.errors import bad_value
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.scene.model_file import SUFFIX, Origin
+from warp_mca.scene.options import with_options
 
 SCALE = "time_step_scale"  # an option for every scene, and a parameter of some
 
@@ -46,13 +47,15 @@ def read_request(args: argparse.Namespace, more: Mapping[str, str] | None = None
         preset = args.preset or source.default_preset
         origin = Origin(source.name, preset, values) if source.builtin else None
         label = f"{source.name}-{preset}" if preset else source.name
-        return Request(_with(source.build(values), args.element, scale), label, source, origin)
+        return Request(_with(source.build(values), args, scale), label, source, origin)
     if args.preset is not None:
         raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
+    if args.refine is not None:
+        raise bad_value("--refine", args.refine, "a model file holds finished meshes; give it when building")
     stored = model_file.load(args.scene)
     scale = _where_no_parameter(scale, stored.origin.parameters if stored.origin else (), overrides)
     stored = model_file.changed(stored, overrides)
-    scene = _with(stored.scene, args.element, scale)
+    scene = _with(stored.scene, args, scale)
     return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
 
 
@@ -69,9 +72,10 @@ def _where_no_parameter(scale: float | None, names: Collection[str], overrides: 
     return scale
 
 
-def _with(scene: Scene, element: str | None, scale: float | None) -> Scene:
-    """The scene with another element formulation, or share of the stable time step, where one is given."""
-    if element is not None:
+def _with(scene: Scene, args: argparse.Namespace, scale: float | None) -> Scene:
+    """The scene with what the options ask for: size of cells, element formulation, time step, mass scaling."""
+    scene = with_options(scene, args.refine, getattr(args, "mass_scaling", None), None)
+    if (element := args.element) is not None:
         scene = dataclasses.replace(scene, bodies=tuple(dataclasses.replace(b, element=element) for b in scene.bodies))
     if scale is not None:
         scene = dataclasses.replace(scene, impact=dataclasses.replace(scene.impact, time_step_scale=scale))

@@ -46,7 +46,8 @@ def run(args: argparse.Namespace) -> None:
     written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
     recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
     print_summary(result, [*(str(out / name) for name in written), *recorded])
-    as_designed = not args.settings and args.duration is None and args.time_step_scale is None
+    changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling)
+    as_designed = not args.settings and all(value is None for value in changed)
     if request.source and as_designed:
         for message in request.source.findings(result):
             print(f"check: {message}")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warp_mca.base import validate
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import check_size
+from warp_mca.geometry.refinement import refined_count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +36,10 @@ class Box:
         check_size("Box", [self.divisions], divisions=self.divisions)
         for value in self.origin:
             validate.finite("Box", origin=value)
+
+    def refined(self, factor: float) -> Box:
+        """The brick with `factor` times as many cells along each edge; even numbers stay even, for a middle plane."""
+        return replace(self, divisions=tuple(refined_count(n, factor, even=n % 2 == 0) for n in self.divisions))
 
     def build(self) -> Mesh:
         """The mesh, numbered with x running fastest, then y, then z."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.edit import mirror, snapped
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.refinement import refined_count
 
 _FIRST_STEP = 1.5  # growth starts from this many fine edges; 1 costs a tenth of the stable step in fine meshes
 
@@ -75,6 +76,34 @@ class Plate:
                 "Plate.core_size", self.core_size, "the core must fit inside the local box; make it smaller"
             )
 
+    def refined(self, factor: float) -> Plate:
+        """The plate with cells `factor` times smaller: counts times it, `core_size` over it.
+
+        The node set contact keeps its extent. Counts that are rounded up make the core grow to half the room at most,
+        or to what it had.
+        """
+        core = tuple(refined_count(n, factor, even=True) for n in self.core)
+        depth = refined_count(self.core_depth, factor)
+        half, size = self._half_box, self.core_size
+        rooms = (0.5 * self.core[0], half), (0.5 * self.core[1], half), (self.core_depth, self.height)
+        counts = 0.5 * core[0], 0.5 * core[1], depth
+        largest = min(max(0.5 * room, old * size) / new for (old, room), new in zip(rooms, counts, strict=True))
+        return replace(
+            self,
+            core=core,
+            core_depth=depth,
+            core_size=min(size / factor, largest),
+            layers=refined_count(self.layers, factor),
+            extension=refined_count(self.extension, factor),
+            extension_z=refined_count(self.extension_z, factor),
+            contact=self._contact,
+        )
+
+    @property
+    def _contact(self) -> float:
+        """Half the extent of the node set contact [m]."""
+        return 2.0 * self.core_size * max(self.core) if self.contact is None else self.contact
+
     @property
     def _half_box(self) -> float:
         return min(0.5 * self.length, 0.5 * self.width, self.height) if self.box is None else self.box
@@ -94,8 +123,7 @@ class Plate:
         for axis, value in planes.values():
             points = snapped(points, axis, value)
         sets = {name: np.flatnonzero(points[:, axis] == value) for name, (axis, value) in planes.items()}
-        reach = 2.0 * self.core_size * max(self.core) if self.contact is None else self.contact
-        near = np.abs(points[:, [0, 2]]).max(axis=1) <= reach * (1.0 + 1e-9)
+        near = np.abs(points[:, [0, 2]]).max(axis=1) <= self._contact * (1.0 + 1e-9)
         sets["contact"] = np.flatnonzero((points[:, 1] == 0.0) & near)
         node_sets = {name: nodes.astype(np.int32) for name, nodes in sets.items()}
         return Mesh(points, mesh.hexahedra, node_sets, mesh.cell_sets)

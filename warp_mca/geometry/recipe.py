@@ -15,7 +15,11 @@ LIMIT = 200_000_000  # elements; more exceed the memory of any machine
 
 
 class Recipe(Protocol):
-    """A frozen dataclass of plain numbers that can make its mesh; equal recipes make equal meshes."""
+    """A frozen dataclass of plain numbers that can make its mesh; equal recipes make equal meshes.
+
+    For `refine` it also has a method `refined(factor)`: the recipe of a mesh whose cells are `factor` times smaller
+    everywhere.
+    """
 
     def build(self) -> Mesh:
         """The mesh in the body's own frame."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import mirror, pinned, snapped
 from warp_mca.geometry.hemisphere import DEPTH_LIMIT, FOCUS_LIMIT, PATCH_LIMIT, Hemisphere
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.refinement import refined_count
 from warp_mca.geometry.rings import bands, disc, join
 
 _FOCUS_SIZE = 0.28  # default edge of the fine cells, times the cells along the section's core [radius]
@@ -96,6 +97,21 @@ class Rod:
     def _cylinder(self) -> float:
         """Length of the cylinder [m]."""
         return self.length - self.radius if self.tip == "hemisphere" else self.length
+
+    def refined(self, factor: float) -> Rod:
+        """The rod with cells `factor` times smaller: counts times it, `focus_size` over it or what fits then."""
+        finer = replace(
+            self,
+            section=refined_count(self.section, factor, even=True),
+            ring=refined_count(self.ring, factor),
+            axial=refined_count(self.axial, factor),
+            tip_layers=None if self.tip_layers is None else refined_count(self.tip_layers, factor),
+            focus_layers=refined_count(self.focus_layers, factor),
+            focus_size=None,
+        )
+        if self.focus_size is None:
+            return finer
+        return replace(finer, focus_size=min(self.focus_size / factor, finer._largest_focus_size))
 
     def build(self) -> Mesh:
         """The mesh: one half by gmsh, mirrored; the nodes that others rely on are put exactly in their places."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from warp_mca.geometry.blocks import Blocks
 from warp_mca.geometry.edit import halved, mirror, pinned, snapped
 from warp_mca.geometry.hemisphere import DEPTH_LIMIT, PATCH_LIMIT, Hemisphere
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.refinement import refined_count
 from warp_mca.geometry.rings import SIDES, Ring, bands, bowed_face, disc, join
 
 _CAP_ANGLE = 0.67  # half the angle that the coarse cap opposite the pole spans [rad]
@@ -68,6 +69,19 @@ class Sphere:
     @property
     def _size(self) -> float:
         return self.pole_size or min(0.28 * self.radius / self.section, self._largest_size)
+
+    def refined(self, factor: float) -> Sphere:
+        """The ball with cells `factor` times smaller: counts times it, `pole_size` over it or what fits then."""
+        finer = replace(
+            self,
+            section=refined_count(self.section, factor, even=True),
+            ring=refined_count(self.ring, factor),
+            pole_layers=refined_count(self.pole_layers, factor),
+            pole_size=None,
+        )
+        if self.pole_size is None:
+            return finer
+        return replace(finer, pole_size=min(self.pole_size / factor, finer._largest_size))
 
     def build(self) -> Mesh:
         """The mesh: one half by gmsh, mirrored or cut."""

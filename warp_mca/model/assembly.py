@@ -14,7 +14,7 @@ from warp_mca.elements import ELEMENTS, Element, default_element
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.patches import PATCH, compact_order
-from warp_mca.model.stable_step import StableStep, stable_step
+from warp_mca.model.stable_step import StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.surfaces import Faces, make_faces
 from warp_mca.scene import Body, Point, Scene, Surface
 from warp_mca.scene.materials import Material
@@ -245,12 +245,19 @@ class Assembly:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
         steps = []
         for part, mass in zip(self.cells, self.element_mass, strict=True):
-            touched = np.flatnonzero((added != 0.0)[part.conn].any(axis=1))
-            contact = np.zeros(len(part.conn))
-            contact[touched] = added[part.conn[touched]].max(axis=1)
             moduli = self.K[part.index], self.G[part.index]
+            contact = at_elements(part.conn, added)
             steps.append(stable_step(part.element, self.X, part.conn, *moduli, mass, contact, part.index))
         return min(steps, key=lambda step: step.dt)
+
+    def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
+        """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
+        steps = np.empty(self.element_count)
+        for part, mass in zip(self.cells, self.element_mass, strict=True):
+            moduli = self.K[part.index], self.G[part.index]
+            contact = at_elements(part.conn, added)
+            steps[part.index] = element_steps(part.element, self.X, part.conn, *moduli, mass, contact, coarse=coarse)
+        return steps
 
     def nodes(self, body: str, name: str) -> Index:
         """Nodes of a set of a body's mesh."""

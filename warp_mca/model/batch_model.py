@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
+from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
 
 Index = NDArray[np.int32]
@@ -63,6 +64,7 @@ def join_models(models: Sequence[Model]) -> Model:
         element_start=_starts(models, "element_start", elements),
         element_of=order,
         stable=replace(stable, element=stable.element + int(elements[fastest])),
+        scaling=_scaling(models),
         batch=Layout(
             nodes=nodes,
             joints=offsets([len(model.joints) for model in models]),
@@ -104,6 +106,20 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
         )
         first = end
     return tuple(blocks), np.concatenate(order), ranges
+
+
+def _scaling(models: Sequence[Model]) -> MassScaling | None:
+    """What mass scaling added in all scenes, or None where none has it."""
+    found = [
+        model.scaling or MassScaling(added=0.0 * model.mass, elements=0, plain_dt=model.stable.dt) for model in models
+    ]
+    if all(model.scaling is None for model in models):
+        return None
+    return MassScaling(
+        added=np.concatenate([item.added for item in found]),
+        elements=sum(item.elements for item in found),
+        plain_dt=min(item.plain_dt for item in found),
+    )
 
 
 def _laws(models: Sequence[Model]) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ from warp_mca.model.constraints import JointPairs, check_bindings, constraints, 
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
+from warp_mca.model.mass_scaling import MassScaling, check_masses, scale_masses
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.scene import Contact, RigidPlane, Scene
@@ -66,6 +67,7 @@ class Model:
         node_start, element_start: first node and element of each body in the concatenated meshes, by name.
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
+        scaling: what mass scaling added to `mass`, or None.
         batch: where the scenes of a batch lie, or None for a model of one scene.
     """
 
@@ -96,6 +98,7 @@ class Model:
     element_start: Mapping[str, int]
     element_of: Index
     stable: StableStep
+    scaling: MassScaling | None = None
     batch: Layout | None = None
 
     def owner(self, element: int) -> tuple[str, int]:
@@ -244,7 +247,8 @@ def build_model(
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
-    stable = parts.stable(added)
+    stable, scaling = scale_masses(parts, added)
+    check_masses(parts, scaling)
     return Model(
         X=parts.X,
         V=velocity,
@@ -264,5 +268,6 @@ def build_model(
         element_start=parts.element_start,
         element_of=order,
         stable=stable,
+        scaling=scaling,
         batch=None,
     )

@@ -86,10 +86,10 @@ def stable_step(
     usual = float(np.median(bound))
     worst, element = _worst(bound, exact, bounds, lambda part: part[_different(X, conn[part], bound[part])])
     own = worst - float(contact[element])
-    stiff = np.flatnonzero(_switching(contact, 1.0) > worst)
+    stiff = np.flatnonzero(switching(contact, 1.0) > worst)
     if len(stiff):
         bound = formulation.eigenvalue_bounds(X[conn[stiff]], K[stiff], G[stiff], mass[stiff], False)
-        value = _switching(contact[stiff], contact[stiff] / (bound + contact[stiff]))
+        value = switching(contact[stiff], contact[stiff] / (bound + contact[stiff]))
         most = int(value.argmax())
         if value[most] > worst:
             worst, element, own = float(value[most]), int(stiff[most]), float(bound[most])
@@ -99,6 +99,65 @@ def stable_step(
         contact_share=1.0 - own / worst,
         shortened=math.sqrt(own / usual),
     )
+
+
+def at_elements(conn: Index, value: Array) -> Array:
+    """Greatest of the values >= 0 at the nodes of each element, shape (element_count,)."""
+    touched = np.flatnonzero((value != 0.0)[conn].any(axis=1))
+    found = np.zeros(len(conn))
+    found[touched] = value[conn[touched]].max(axis=1)
+    return found
+
+
+def element_steps(
+    formulation: Element,
+    X: Array,
+    conn: Index,
+    K: Array,
+    G: Array,
+    mass: Array,
+    contact: Array,
+    *,
+    coarse: bool = False,
+) -> Array:
+    """Stable step that each element would ask for by itself, contact springs included [s], shape (element_count,).
+
+    A lower bound from upper bounds of the eigenvalues: that of a hexahedron's own stiffness is 12 to 18 % below its
+    step, `coarse` ones are 7 % lower and three times as quick. Arguments as in `stable_step`.
+    """
+    own = np.empty(len(conn))
+    for part in chunks(len(conn), CHUNK):
+        own[part] = formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse)
+    # the greater of both parts, and of what stands for a spring that opens and closes
+    return 2.0 / np.sqrt(np.maximum(own + contact, switching(contact, contact / (own + contact))))
+
+
+def exact_or_bound(
+    formulation: Element, X: Array, conn: Index, K: Array, G: Array, mass: Array, contact: Array, limit: float
+) -> tuple[Part, Array]:
+    """Elements whose eigenvalue, with what contact adds, may exceed a limit [1/s^2], and their own eigenvalues.
+
+    Eigenvalues [1/s^2] are exact for the MAX_EXACT greatest bounds, bounds for others. Arguments as in `stable_step`.
+    """
+
+    def whole(own: Array, touched: Array) -> Array:
+        return np.maximum(own + touched, switching(touched, touched / (own + touched)))
+
+    mine = np.arange(len(conn))
+    own = np.zeros(0)
+    for coarse in (True, False):
+        own = np.empty(len(mine))
+        for part in chunks(len(mine), CHUNK):
+            some = mine[part]
+            own[part] = formulation.eigenvalue_bounds(X[conn[some]], K[some], G[some], mass[some], coarse)
+        over = whole(own, contact[mine]) > limit
+        mine, own = mine[over], own[over]
+    greatest = _greatest(own, MAX_EXACT)
+    for part in chunks(len(greatest), BATCH):
+        some = mine[greatest[part]]
+        own[greatest[part]] = formulation.largest_eigenvalues(X[conn[some]], K[some], G[some], mass[some])
+    over = whole(own, contact[mine]) > limit
+    return mine[over], own[over]
 
 
 def _worst(
@@ -144,7 +203,7 @@ def _out_of_range(element: int, bound: float) -> RequestError:
     return bad_value(f"largest eigenvalue of element {element} [1/s^2]", bound, remedy)
 
 
-def _switching(contact: Array, share: Array | float) -> Array:
+def switching(contact: Array, share: Array | float) -> Array:
     """Eigenvalue [1/s^2] that stands for a contact spring which opens and closes.
 
     Central differences keep a linear spring bounded up to (omega dt)^2 = 4. A node that bounces on a spring of one side

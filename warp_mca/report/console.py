@@ -123,6 +123,10 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     steps = f"{summary['n_steps']:,} steps of {summary['dt']:.3g} s, {1e3 * summary['simulated_time']:g} ms"
     yield "model", f"{summary['n_elements']:,} elements, {steps if summary['n_steps'] else 'no impact'}"
     yield "wall time", ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in summary["wall"].items())
+    if "mass_scaling" in summary:
+        scaling, shares = summary["mass_scaling"], summary["mass_added"].items()
+        added = ", ".join(f"{100.0 * share:.2g} % of {name}" for name, share in shares if share > 0.0)
+        yield "mass added", f"{added or 'none'}; first peak off by about {100.0 * scaling['F_n_first_peak']:.2g} %"
     rate = summary["element_steps_per_s"]
     if rate is not None:
         yield "rate", f"{rate / 1e6:.2f} M element-steps/s on {summary['device']}, {summary['precision']}"

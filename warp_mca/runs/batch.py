@@ -19,6 +19,7 @@ from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_o
 from warp_mca.runs.settings import settings_of
 from warp_mca.runs.simulation import simulate
 from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene.options import with_options
 
 Meshes = Mapping[str, Mesh]
 
@@ -33,6 +34,8 @@ def run_batch(
     duration: float | None = None,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
+    refine: float | None = None,
+    mass_scaling: float | str | None = None,
     meshes: Sequence[Meshes] | None = None,
     progress: Progress | None = None,
 ) -> list[Result]:
@@ -49,6 +52,7 @@ def run_batch(
         duration: of the impact phase [s]; the scenes' own if None.
         out: folder that gets a folder for each scene, named by its number from 0, with the files of `warp_mca.run`;
             with `force`, results of a larger batch before it are removed.
+        refine, mass_scaling: as in `warp_mca.run`, for all scenes.
         meshes: finished meshes by body, for each scene, to save making them again.
         progress: called with a stage and the share of it that is done.
 
@@ -64,6 +68,7 @@ def run_batch(
     scenes = list(scenes)
     tell = teller(progress)
     span = check_alike(scenes, duration)
+    scenes = [with_options(scene, refine, mass_scaling, meshes) for scene in scenes]
     settings = settings_of(device, precision, threads)
     _check_meshes(meshes, len(scenes))
     with hold_scenes(out, len(scenes), force) as folders:

@@ -103,7 +103,7 @@ def _without_impact(setup: Setup, history: Columns) -> dict[str, Any]:
         parameters=scene.parameters,
         theta=tuple(float(x) for x in start.theta),
         theta_dot=tuple(float(x) for x in start.theta_dot),
-        more={"energy_drift_rigid": start.energy_drift},
+        more={"energy_drift_rigid": start.energy_drift, "refine": scene.refine},
     )
     return summarise(history, facts)
 

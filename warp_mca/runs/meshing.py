@@ -9,6 +9,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
 from warp_mca.geometry.degenerate import cut_to
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.refinement import refined
 from warp_mca.runs.arguments import check_scene
 from warp_mca.scene import Body, Scene
 
@@ -37,12 +38,12 @@ def mesh(
     for body in scene.bodies:
         if given is not None and body.name not in given:
             raise bad_value("meshes", list(given), f"give a mesh of body {body.name} too")
-        geometry = body.geometry if given is None else given[body.name]
+        geometry = _geometry(scene, body) if given is None else given[body.name]
         if given is not None:
             validate.kind_of(f"meshes[{body.name!r}]", geometry, Mesh, "give a finished Mesh, as mca.mesh makes it")
         key = _key(geometry)
         if key not in made:
-            made[key] = geometry if isinstance(geometry, Mesh) else _build(body)
+            made[key] = geometry if isinstance(geometry, Mesh) else _build(body.name, geometry)
             check(made[key], body.name)
         meshes[body.name] = made[key]
     cut = _cut(scene, meshes)
@@ -52,14 +53,23 @@ def mesh(
     return cut
 
 
-def _build(body: Body) -> Mesh:
+def _geometry(scene: Scene, body: Body) -> object:
+    """The mesh or recipe of a body, finer or coarser where the scene asks for it.
+
+    Raises:
+        RequestError: it cannot be made so.
+    """
+    return body.geometry if scene.refine == 1.0 else refined(body.name, body.geometry, scene.refine)
+
+
+def _build(body: str, geometry: object) -> Mesh:
     """The mesh of a recipe, which may be the user's own.
 
     Raises:
         RequestError: its `build` failed or returned something else than a mesh.
     """
-    field, recipe = f"Body {body.name}.geometry", type(body.geometry).__name__
-    made = validate.call(field, recipe, "build()", lambda: getattr(body.geometry, "build")())  # noqa: B009
+    field, recipe = f"Body {body}.geometry", type(geometry).__name__
+    made = validate.call(field, recipe, "build()", lambda: getattr(geometry, "build")())  # noqa: B009
     validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
     return made
 

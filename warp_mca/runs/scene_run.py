@@ -16,6 +16,7 @@ from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
+from warp_mca.runs.mass_report import mass_report
 from warp_mca.solve.state_figures import (
     joint_impulses,
     max_normal_force,
@@ -102,9 +103,11 @@ class SceneRun:
             "stable_dt": model.stable.dt,
             "joint_impulse": joint_impulses(self.solver, self.state, self.index),
             "threads": self.solver.threads,
+            "refine": scene.refine,
         }
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
+        more |= mass_report(scene, model)
         if scene.paths:
             body = scene.body(scene.paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds

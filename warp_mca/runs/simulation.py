@@ -15,11 +15,19 @@ from warp_mca.results.paths import Found
 from warp_mca.results.result import Result
 from warp_mca.results.storage import check_output, hold, write
 from warp_mca.runs.advice import warn
-from warp_mca.runs.arguments import Progress, check_recorders, check_scene, one_at_a_time, span_of, teller
+from warp_mca.runs.arguments import (
+    Progress,
+    check_recorders,
+    check_scene,
+    one_at_a_time,
+    span_of,
+    teller,
+)
 from warp_mca.runs.meshing import mesh
 from warp_mca.runs.prepare import Clock, Prepared, prepare
 from warp_mca.runs.settings import Settings, settings_of
 from warp_mca.scene import Scene
+from warp_mca.scene.options import with_options
 
 if TYPE_CHECKING:
     from warp_mca.runs.impact import Impact
@@ -37,6 +45,8 @@ def run(
     duration: float | None = None,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
+    refine: float | None = None,
+    mass_scaling: float | str | None = None,
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
@@ -53,6 +63,9 @@ def run(
         duration: of the impact phase [s]; the scene's own if None.
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
+        refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
+        mass_scaling: in place of `ImpactPhase.mass_scaling`: how many times longer the stable step is to be, or that
+            step as "2e-8s", by added mass.
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
@@ -67,6 +80,7 @@ def run(
     from warp_mca.recorders.frames import check_files
 
     check_scene("scene", scene)
+    scene = with_options(scene, refine, mass_scaling, meshes)
     tell = teller(progress)
     span = span_of(scene, duration)
     check_recorders(recorders)

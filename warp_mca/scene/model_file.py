@@ -184,7 +184,7 @@ def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel
         raise bad_value("--set", names, "only models of built-in scenes can be changed; set it when building the model")
     source = load_source(stored.origin.scene)
     values = source.resolve(None, {**stored.origin.parameters, **overrides})
-    scene = source.build(values)
+    scene = dataclasses.replace(source.build(values), refine=stored.scene.refine)
     before = {body.name: body.geometry for body in stored.scene.bodies}
     after = {body.name: body.geometry for body in scene.bodies}
     differing = [name for name in after if name not in before or not _same(before[name], after[name])]

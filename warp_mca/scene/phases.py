@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from types import NoneType
@@ -183,6 +185,8 @@ class ImpactPhase:
         output_interval: time between rows of the history [s].
         time_step_scale: share of the stable time step that is used [-], in (0, 1].
         energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-].
+        mass_scaling: None, or what elements that are too small gain mass for: a factor above 1 by which the stable step
+            grows [-], or the stable step itself, as "2e-8s".
         open_time: how long all contacts must be open for an impact to end, in a run of many phases [s]; None takes the
             longest period of bending of a link, see docs/theory.md.
     """
@@ -191,6 +195,7 @@ class ImpactPhase:
     output_interval: float = 1e-6
     time_step_scale: float = 0.9
     energy_tolerance: float = 0.01
+    mass_scaling: float | str | None = None
     open_time: float | None = None
 
     def __post_init__(self) -> None:
@@ -201,7 +206,24 @@ class ImpactPhase:
             raise bad_value(
                 "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
             )
+        self._check_mass_scaling()
         if self.open_time is not None:
             validate.positive("ImpactPhase", open_time=self.open_time)
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
+
+    def _check_mass_scaling(self) -> None:
+        """Refuse what is neither a factor nor a step.
+
+        Raises:
+            RequestError: so it is.
+        """
+        asked = self.mass_scaling
+        if asked is None or (validate.is_number(asked) and asked >= 1.0):  # pyright: ignore[reportOperatorIssue]
+            return
+        if isinstance(asked, str) and asked.endswith("s"):
+            with suppress(ValueError):
+                if 0.0 < float(asked[:-1]) < math.inf:
+                    return
+        remedy = "give a factor of 1 or above for the stable step, or a step in seconds as 2e-8s"
+        raise bad_value("ImpactPhase.mass_scaling", validate.brief(asked), remedy)

@@ -40,6 +40,8 @@ class Scene:
         paths: lines along which stress is recorded.
         tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
         target: point whose velocity the history lists as plate_vx, plate_vy, plate_vz.
+        refine: how many times smaller the cells of all bodies are to be than their recipes say [-], with their
+            grading; above 1 is finer, below coarser.
         parameters: the values that a built-in scene was made from, for the record.
     """
 
@@ -56,6 +58,7 @@ class Scene:
     gravity: Vec3 = (0.0, 0.0, 0.0)
     tip: Point | None = None
     target: Point | None = None
+    refine: float = 1.0
     parameters: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -71,6 +74,7 @@ class Scene:
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()
+        validate.positive("Scene", refine=self.refine)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
         for key in self.parameters:
@@ -110,6 +114,9 @@ class Scene:
         validate.positive("Scene", t_end=self.t_end)
         if self.rigid is None:
             raise bad_value("Scene.t_end", self.t_end, "swings and impacts in turn need a RigidPhase; give one")
+        if self.impact.mass_scaling is not None:
+            remedy = "links that get rigid again have their own masses; leave mass_scaling out, or t_end"
+            raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
         if self.prescribed:
             remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
             raise bad_value("Scene.t_end", self.t_end, remedy)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM
 from warp_mca.kernels.nodes import constraint, node, slide
 from warp_mca.solve.contact_stage import per_scene
 from warp_mca.solve.threads import NODES, Split, whole
+from warp_mca.solve.weight import nodal_gravity
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -39,6 +41,9 @@ class NodeStage:
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
+        if (own := nodal_gravity(model)) is not None:  # each node is a scene of its own then
+            each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
+            self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
         self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)

@@ -63,6 +63,6 @@ class RecordStage:
     def sum_motion(self, step: Step, constraints: ConstraintStage, dt: float) -> None:
         """Kinetic energy, works, and velocities of recorded points."""
         work, state = self.work, step.state
-        inputs = [work.mass, work.gravity, state.u, work.v_before, state.v, dt, self.node_first]
+        inputs = [work.mass, work.heavy_mass, work.gravity, state.u, work.v_before, state.v, dt, self.node_first]
         inputs += [state.constraints.work, constraints.driven_first, work.point_node]
         self._sum(ledger.record_motion, self.most_nodes, inputs, work.point_velocity)

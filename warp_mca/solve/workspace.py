@@ -11,6 +11,7 @@ from warp_mca.kernels.records.ledger import SUM_WIDTH
 from warp_mca.model.layout import Layout
 from warp_mca.model.model import Model
 from warp_mca.model.precision import limited
+from warp_mca.solve.weight import heavy_mass
 
 ROWS = 32  # records kept on the device before the host reads them
 
@@ -21,6 +22,7 @@ class Workspace:
     Attributes:
         X: reference positions [m], shape (node_count,), vec3d.
         mass, inverse_mass: lumped masses [kg], [1/kg], shape (node_count,), float64.
+        heavy_mass: those that have weight [kg], shape (node_count,), float64; `mass` itself without mass scaling.
         law: parameters of each material, see `Model.law`, in the scalars of the precision.
         first_slots, more_slots: slots of the forces on each node, see `gather_lists`.
         force: of each element on its nodes, by slot [N], vec3 in the scalars of the precision.
@@ -42,6 +44,7 @@ class Workspace:
         self.X = wp.array(model.X, dtype=wp.vec3d)
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
+        self.heavy_mass = wp.array(heavy_mass(model), dtype=wp.float64) if model.scaling else self.mass
         self.law = wp.array(limited(model.law, precision), dtype=t.real)
         self.first_slots, self.more_slots = wp.array(first_slots, dtype=wp.vec2i), wp.array(more_slots, dtype=wp.vec4i)
         self.force = wp.zeros(slots, dtype=t.vec3)
