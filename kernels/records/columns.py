@@ -14,8 +14,8 @@ IMPULSE, NORMAL_IMPULSE, STICK_IMPULSE = slice(3, 6), 6, 7
 NORMAL_FORCE, PRESSURE, NORMAL_ENERGY, LOST, SQUARES = slice(8, 11), 11, 12, 13, 14
 PASS_COLUMNS = 15
 
-# Behind the passes, where a scene has absorbing boundaries: energy that they have taken up, and work done on the bodies
-# by what lies beyond them and moves along [J].
+# Behind the passes, where a scene has absorbing boundaries: energy that bodies gave to what lies beyond them, in
+# the frame of the body, and work that this does on the bodies as it moves along [J].
 ABSORBED, BEYOND_WORK = 0, 1
 ABSORBING_COLUMNS = 2
 

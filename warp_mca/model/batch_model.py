@@ -55,6 +55,7 @@ def join_models(models: Sequence[Model]) -> Model:
         absorbing=AbsorbingNodes(
             node=np.concatenate([m.absorbing.node + start for m, start in zip(models, nodes, strict=False)]),
             damping=np.concatenate([model.absorbing.damping for model in models]),
+            stiffness=np.concatenate([model.absorbing.stiffness for model in models]),
             velocity=np.concatenate([model.absorbing.velocity for model in models]),
         ),
         passes=tuple(

@@ -247,6 +247,8 @@ def build_model(
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
+    absorbing = absorbing_nodes(parts, velocity, held, pairs)
+    added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     stable = parts.stable(added)
     return Model(
         X=parts.X,
@@ -259,7 +261,7 @@ def build_model(
         joints=joints,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
-        absorbing=absorbing_nodes(parts, velocity, held, pairs),
+        absorbing=absorbing,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

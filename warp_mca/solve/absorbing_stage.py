@@ -31,12 +31,14 @@ class AbsorbingState:
         impulse_after: the same half a step later [N s], shape (count,), vec3d.
         absorbed: energy that each node gave away, in the frame of its body, up to t(n) [J], shape (count,), float64.
         absorbed_after: the same half a step later [J], shape (count,), float64.
+        stretch: displacement of each node less the way of its body [m], shape (count,), vec3d; empty without springs.
     """
 
     impulse: wp.array
     impulse_after: wp.array
     absorbed: wp.array
     absorbed_after: wp.array
+    stretch: wp.array
 
 
 class AbsorbingStage:
@@ -56,9 +58,11 @@ class AbsorbingStage:
         self.dashpots = Dashpots()
         self.dashpots.node = wp.array(own.node, dtype=wp.int32)
         self.dashpots.damping = wp.array(own.damping, dtype=wp.mat33d)
+        stiffness = own.stiffness if own.sprung else own.stiffness[:0]
+        self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
         self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
         self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
-        self.kernel = absorbing_kernel(precision, nodes.touched, nodes.each)
+        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each)
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
         self.column = absorbing_column(len(model.passes) // layout.count)
@@ -70,6 +74,7 @@ class AbsorbingStage:
             impulse_after=wp.zeros(self.count, dtype=wp.vec3d),
             absorbed=wp.zeros(self.count, dtype=wp.float64),
             absorbed_after=wp.zeros(self.count, dtype=wp.float64),
+            stretch=wp.zeros(self.count if self.model.absorbing.sprung else 0, dtype=wp.vec3d),
         )
 
     def kernels(self) -> list[Any]:
@@ -94,7 +99,7 @@ class AbsorbingStage:
         inputs = [self.dashpots, work.inverse_mass, work.first_slots, work.more_slots, self.nodes.constraints.role]
         inputs += [work.force, self.nodes.scene, self.nodes.gravity, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
-        outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after]
+        outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
         wp.launch(self.kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def _sum(self, step: Step, records: RecordStage) -> None:
