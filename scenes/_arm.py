@@ -59,6 +59,15 @@ def _bodies(
     return (*inner, tip, plate)
 
 
+def _absorbing(which: str) -> tuple[mca.Absorbing, ...]:
+    """Absorbing boundaries of the plate, as `absorbs` of `arm`."""
+    ends = ("xmin", "xmax")
+    if which == "all":
+        middle = (0.0, 0.0, 0.0)
+        return tuple(mca.Absorbing(body="plate", nodes=n, centre=middle) for n in (*ends, "zmin", "zmax", "bottom"))
+    return tuple(mca.Absorbing(body="plate", nodes=nodes) for nodes in ends) if which == "ends" else ()
+
+
 def arm(
     name: str,
     links: Sequence[str],
@@ -79,6 +88,7 @@ def arm(
     impact: mca.ImpactPhase,
     paths: tuple[mca.Path, ...] = (),
     t_end: float | None = None,
+    absorbs: str = "none",
 ) -> mca.Scene:
     """Equal rods, hinged in a row from O at the origin, whose hemispherical tip will strike a plate H below O.
 
@@ -99,6 +109,8 @@ def arm(
         impact: the impact phase.
         paths: lines along which stress is recorded.
         t_end: as in `mca.Scene`.
+        absorbs: boundaries of the plate through which waves leave: "none"; its "ends"; "all" but the top, with springs
+            in place of the support.
     """
     last, tip_centre = links[-1], (length - radius, 0.0, 0.0)
     top = mca.Surface(body="plate", nodes="top")
@@ -121,7 +133,8 @@ def arm(
         bodies=_bodies(links, shapes, materials, ground),
         joints=tuple(mca.Revolute(**hinge, nodes=joint_nodes) for hinge in hinges),  # pyright: ignore[reportArgumentType]
         contacts=(mca.Contact(slave=mca.Surface(body=last, nodes="tip"), master=top, **contact),),
-        fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
+        fixed=() if absorbs == "all" else (mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
+        absorbing=_absorbing(absorbs),
         paths=paths,
         gravity=(0.0, -gravity, 0.0),
         rigid=mca.RigidPhase(

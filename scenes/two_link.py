@@ -128,6 +128,13 @@ def build(
     plate_core_depth: Annotated[int, Param("fine cells of the plate downwards", low=1)] = 3,
     plate_layers: Annotated[int, Param("cells from the plate's fine core to its local box", low=1)] = 8,
     plate_extension: Annotated[int, Param("cells along x from the local box to each end", low=1)] = 14,
+    plate_absorbs: Annotated[
+        str,
+        Param(
+            "sides of the plate through which waves leave, so that it can be cut; all: springs are its support",
+            choices=("none", "ends", "all"),
+        ),
+    ] = "none",
 ) -> mca.Scene:
     """The scene of Table 1, Fig. 1 of the paper, with any of its values changed."""
     theta = (math.radians(theta_OA), math.radians(theta_AB))
@@ -173,6 +180,7 @@ def build(
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval, time_step_scale=time_step_scale),
         paths=_paths(length, radius),
         t_end=t_end,
+        absorbs=plate_absorbs,
     )
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import GuardError, McaError, RequestError
 from warp_mca.scene import (
+    Absorbing,
     BaseMotion,
     Body,
     Contact,
@@ -78,6 +79,7 @@ __all__ = [
     "Prismatic",
     "Fixed",
     "Prescribed",
+    "Absorbing",
     "Point",
     "Path",
     "Line",

@@ -13,7 +13,7 @@ from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
 wp.set_module_options({"enable_backward": False})
 
 # In the role of a node, whose lowest three bits are its axes at rest:
-BOUND = 8  # `kernels.nodes.constraint` advances it
+BOUND = 8  # `kernels.nodes.constraint` or `absorbing` advances it
 TOUCHABLE = 16  # it belongs to a surface of a contact
 
 KEEPERS = 32  # threads that keep the greatest normal force of each scene
@@ -87,8 +87,9 @@ def integrate_kernel(
     Each node sums its element forces in a fixed order, so that runs repeat bit for bit. v_before_out takes v(n-1/2),
     where it is not empty. speed_square_out keeps the greatest v^2, see `extremes.keep_speed`. With `contact`, KEEPERS
     threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
-    some nodes are left to `constraint.bound_kernel`. With `each`, gravity differs between the scenes of a batch, and
-    nodes know their scene. `early`: the next kernel takes its places as soon as nodes leave some.
+    some nodes are left to `constraint.bound_kernel` or `absorbing.absorbing_kernel`. With `each`, gravity differs
+    between the scenes of a batch, and nodes know their scene. `early`: the next kernel takes its places as soon as
+    nodes leave some.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3

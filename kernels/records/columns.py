@@ -13,3 +13,18 @@ SPRING_ENERGY, FRICTION, PLANE_WORK = 0, 1, 2
 IMPULSE, NORMAL_IMPULSE, STICK_IMPULSE = slice(3, 6), 6, 7
 NORMAL_FORCE, PRESSURE, NORMAL_ENERGY, LOST, SQUARES = slice(8, 11), 11, 12, 13, 14
 PASS_COLUMNS = 15
+
+# Behind the passes, where a scene has absorbing boundaries: energy that bodies gave to what lies beyond them, in
+# the frame of the body, and work that this does on the bodies as it moves along [J].
+ABSORBED, BEYOND_WORK = 0, 1
+ABSORBING_COLUMNS = 2
+
+
+def absorbing_column(passes: int) -> int:
+    """First of the columns of absorbing boundaries."""
+    return PASS + PASS_COLUMNS * passes
+
+
+def column_count(passes: int, absorbing: bool) -> int:
+    """Columns of a record with so many passes of each scene."""
+    return absorbing_column(passes) + (ABSORBING_COLUMNS if absorbing else 0)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.model.absorbing import AbsorbingNodes
 from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.mass_scaling import MassScaling
@@ -52,6 +53,12 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_tied=np.concatenate([model.joint_tied for model in models]),
         joint_slides=shifted("joint_slides", pairs),
         **_joints(models, nodes, pairs),
+        absorbing=AbsorbingNodes(
+            node=np.concatenate([m.absorbing.node + start for m, start in zip(models, nodes, strict=False)]),
+            damping=np.concatenate([model.absorbing.damping for model in models]),
+            stiffness=np.concatenate([model.absorbing.stiffness for model in models]),
+            velocity=np.concatenate([model.absorbing.velocity for model in models]),
+        ),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)

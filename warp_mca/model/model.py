@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.absorbing import AbsorbingNodes, absorbing_nodes
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
 from warp_mca.model.contact_checks import check_spacing
@@ -58,6 +59,7 @@ class Model:
         joints: name of each joint and its pairs.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
+        absorbing: nodes of absorbing boundaries.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
@@ -90,6 +92,7 @@ class Model:
     joints: tuple[JointPairs, ...]
     hinge_loads: tuple[HingeLoad, ...]
     bases: tuple[MovableBase, ...]
+    absorbing: AbsorbingNodes
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -247,6 +250,8 @@ def build_model(
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
+    absorbing = absorbing_nodes(parts, velocity, held, pairs)
+    added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     stable, scaling = scale_masses(parts, added)
     check_masses(parts, scaling)
     return Model(
@@ -260,6 +265,7 @@ def build_model(
         joints=joints,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
+        absorbing=absorbing,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

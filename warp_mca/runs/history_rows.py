@@ -38,6 +38,7 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
         velocity[:, 1] = model.passes[0].plane.velocity
     stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
     balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
+    absorbed = {"E_absorbed": energy["absorbed"]} if ledger.absorbs else {}
     return {
         "time_s": steps.interval * np.arange(first, kept.count, dtype=np.float64),
         "F_n_N": F_n,
@@ -56,6 +57,7 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
         "plate_vy": velocity[:, 1, 1],
         "plate_vz": velocity[:, 1, 2],
         "closing_speed": _closing_speed(ledger, first),
+        **absorbed,
     }
 
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import (
+    ABSORBED,
+    BEYOND_WORK,
     CARRIAGE,
     DRIVE_WORK,
     ELASTIC,
@@ -30,6 +32,8 @@ from warp_mca.kernels.records.columns import (
     SPRING_ENERGY,
     SQUARES,
     STRAIN,
+    absorbing_column,
+    column_count,
 )
 from warp_mca.solve.records import SceneRecords
 
@@ -68,9 +72,14 @@ class Ledger:
         self.rounding = _rounding(model, steps.dt)
 
     @property
+    def absorbs(self) -> bool:
+        """Whether the scene has absorbing boundaries."""
+        return len(self.model.absorbing.node) > 0
+
+    @property
     def _width(self) -> int:
         """Columns of a record."""
-        return PASS + PASS_COLUMNS * len(self.model.passes)
+        return column_count(len(self.model.passes), self.absorbs)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of a scene's `records`, see `Layout.records`, and hold them to the guards.
@@ -123,19 +132,21 @@ class Ledger:
     def _sums(self, partial: Array) -> Array:
         """Columns of each record from its partial sums, shape (row_count, column_count)."""
         with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is found out
-            sums = partial.sum(axis=2)
+            sums = partial[:, : self._width].sum(axis=2)  # others of a batch may absorb
         sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
         return sums
 
     def springs(self, sums: Array) -> Array:
         """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
-        return sums[..., PASS:].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+        end = absorbing_column(len(self.model.passes))
+        return sums[..., PASS:end].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
 
     def _energies(self, sums: Array) -> dict[str, Array]:
         """The ledger [J] of a row of sums, or of each row."""
         springs = self.springs(sums)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + sums[..., LOAD_WORK]
         work = work + springs[..., PLANE_WORK].sum(axis=-1)
+        absorbed, beyond = self._absorbed(sums)
         return {
             "kinetic": sums[..., KINETIC] + sums[..., CARRIAGE],
             "elastic": sums[..., ELASTIC],
@@ -146,8 +157,16 @@ class Ledger:
             "contact_loss": springs[..., LOST].sum(axis=-1),
             "damping": np.zeros(sums.shape[:-1]),
             "joint": sums[..., JOINT_HEAT],
-            "external_work": work - self.kept.initial_work,
+            "absorbed": absorbed,
+            "external_work": work + beyond - self.kept.initial_work,
         }
+
+    def _absorbed(self, sums: Array) -> tuple[Array, Array]:
+        """Energy that absorbing boundaries took up, and work of what lies beyond them [J], of each row of sums."""
+        if not self.absorbs:
+            return np.zeros(sums.shape[:-1]), np.zeros(sums.shape[:-1])
+        first = absorbing_column(len(self.model.passes))
+        return sums[..., first + ABSORBED], sums[..., first + BEYOND_WORK]
 
     def _balance(self, sums: Array) -> Array:
         """Imbalance of each row of sums, as a share of initial energy and external work [-]."""

@@ -108,6 +108,8 @@ class SceneRun:
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= mass_report(scene, model)
+        if ledger.absorbs:
+            more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
         if scene.paths:
             body = scene.body(scene.paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds

@@ -1,9 +1,10 @@
-"""Owns the public vocabulary of a scene: bodies, joints, contacts, drives, phases.
+"""Owns the public vocabulary of a scene: bodies, joints, contacts, drives, boundaries, phases.
 
 A scene is plain, immutable data. Every class checks its own values and raises `RequestError` with the field, the value
 and the remedy. Nothing here meshes, allocates or imports Warp.
 """
 
+from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
@@ -15,6 +16,7 @@ from warp_mca.scene.scene import Scene
 
 __all__ = [
     "OVERLAP_CHOICES",
+    "Absorbing",
     "BaseMotion",
     "Body",
     "Contact",

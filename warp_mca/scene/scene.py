@@ -8,6 +8,7 @@ from types import NoneType
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
@@ -20,6 +21,7 @@ _PARTS = {
     "contacts": Contact,
     "fixed": Fixed,
     "prescribed": Prescribed,
+    "absorbing": Absorbing,
     "paths": Path,
 }
 
@@ -36,6 +38,7 @@ class Scene:
         t_end: the run goes through as many swings and impacts as occur until then, counted from the release [s]; None
             for one impact.
         joints, contacts, fixed, prescribed: what binds the bodies.
+        absorbing: sides of bodies through which waves leave.
         gravity: [m/s^2].
         paths: lines along which stress is recorded.
         tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
@@ -54,6 +57,7 @@ class Scene:
     contacts: tuple[Contact, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     prescribed: tuple[Prescribed, ...] = ()
+    absorbing: tuple[Absorbing, ...] = ()
     paths: tuple[Path, ...] = ()
     gravity: Vec3 = (0.0, 0.0, 0.0)
     tip: Point | None = None
@@ -107,7 +111,7 @@ class Scene:
         """Refuse an end that no cycle of swings and impacts can reach.
 
         Raises:
-            RequestError: it is no time above 0, or the scene does not swing or has driven nodes.
+            RequestError: it is no time above 0, or the scene does not swing, has driven nodes or absorbing sides.
         """
         if self.t_end is None:
             return
@@ -117,6 +121,9 @@ class Scene:
         if self.impact.mass_scaling is not None:
             remedy = "links that get rigid again have their own masses; leave mass_scaling out, or t_end"
             raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
+        if self.absorbing:
+            remedy = "a cut body with absorbing sides does not move between impacts as the large one; leave t_end out"
+            raise bad_value("Scene.t_end", self.t_end, remedy)
         if self.prescribed:
             remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
             raise bad_value("Scene.t_end", self.t_end, remedy)
@@ -124,6 +131,7 @@ class Scene:
     def _named_bodies(self) -> list[tuple[str, str]]:
         named = [("Fixed.body", item.body) for item in self.fixed]
         named += [("Prescribed.body", item.body) for item in self.prescribed]
+        named += [("Absorbing.body", item.body) for item in self.absorbing]
         named += [(f"{item.title}.body", item.body) for item in self.joints]
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [("Contact.slave.body", item.slave.body) for item in self.contacts]

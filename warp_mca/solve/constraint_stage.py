@@ -42,7 +42,7 @@ class ConstraintStage:
         rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
         bonds: pairs, driven nodes and their tables.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
-        at_rest: the same of a model without joints and driven axes.
+        at_rest: the same of a model without joints, driven axes and absorbing boundaries.
         pairs, driven: their numbers.
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
@@ -56,10 +56,11 @@ class ConstraintStage:
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
             role[item.master] |= TOUCHABLE
-        if not self.count and not role.any():
+        absorbing = model.absorbing.node
+        if not self.count and not len(absorbing) and not role.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)
-        for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes):
+        for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes, absorbing):
             role[bound] |= BOUND
         self.role = wp.array(role, dtype=wp.uint8)
         begin, end = (np.full((len(nodes), 3), -1, dtype=np.int32) for _ in range(2))

@@ -29,6 +29,8 @@ class NodeStage:
     """Advances all nodes by a step of central differences.
 
     Attributes:
+        each: whether gravity differs between the scenes of a batch; then `gravity` and `scene` are arrays.
+        touched: whether there is contact.
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
     """
 
@@ -37,7 +39,7 @@ class NodeStage:
     ) -> None:
         """Choose the kernels; `rounds` of elements that wait for nothing but the nodes."""
         self.work, self.constraints, self.dt, self.node_count = work, constraints, dt, model.node_count
-        each = bool((model.gravity != model.gravity[0]).any())
+        self.each = each = bool((model.gravity != model.gravity[0]).any())
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
@@ -46,7 +48,8 @@ class NodeStage:
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
+        left_out = bound or len(model.absorbing.node) > 0
+        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, left_out, each, early)
         self.bound_kernel = (
             constraint.bound_kernel(precision, self.touched, each, constraints.partial) if bound else None
         )

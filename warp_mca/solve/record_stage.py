@@ -41,7 +41,7 @@ class RecordStage:
         """Those of a record."""
         return [ledger.record_motion, spring.sum_springs, self.sum_elements_kernel]
 
-    def _sum(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
+    def sum_runs(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
         """Sums of each run of entries, by a block of threads each; no scene has more entries than `largest`."""
         runs = min(max(-(-largest // ledger.RUN), 1), ledger.SUM_WIDTH)
         threads = (self.scenes, runs, self.lanes)
@@ -54,15 +54,15 @@ class RecordStage:
     def sum_springs(self, step: Step, stage: ContactStage) -> None:
         """Sums of a contact pass. In a check between rows, what is summed over an output interval goes on."""
         inputs = [stage.column, stage.first, step.is_row, step.state.contacts[stage.index].spring]
-        self._sum(spring.sum_springs, int(np.diff(stage.springs).max()), inputs)
+        self.sum_runs(spring.sum_springs, int(np.diff(stage.springs).max()), inputs)
 
     def sum_elements(self, step: Step) -> None:
         """Energies and extremes of the elements."""
-        self._sum(self.sum_elements_kernel, self.most_elements, [self.work.energy, self.element_ranges])
+        self.sum_runs(self.sum_elements_kernel, self.most_elements, [self.work.energy, self.element_ranges])
 
     def sum_motion(self, step: Step, constraints: ConstraintStage, dt: float) -> None:
         """Kinetic energy, works, and velocities of recorded points."""
         work, state = self.work, step.state
         inputs = [work.mass, work.heavy_mass, work.gravity, state.u, work.v_before, state.v, dt, self.node_first]
         inputs += [state.constraints.work, constraints.driven_first, work.point_node]
-        self._sum(ledger.record_motion, self.most_nodes, inputs, work.point_velocity)
+        self.sum_runs(ledger.record_motion, self.most_nodes, inputs, work.point_velocity)

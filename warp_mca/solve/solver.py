@@ -23,6 +23,7 @@ from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
+from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.device import check_device
@@ -53,6 +54,7 @@ class Solver:
         work: the model on the device, and what a step computes and forgets.
         elements, contacts: stages of the model's blocks and contact passes.
         constraints: what binds nodes.
+        absorbing: absorbing boundaries.
         loads: what acts in the joints of chains, and moves their bases.
         output: what is read off the state for paths and recorders, or None.
     """
@@ -92,6 +94,7 @@ class Solver:
         self.constraints = ConstraintStage(model, self.layout)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
+        self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision, self.dt)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
         self._streams = Streams(wp.get_device().is_cuda)
@@ -99,7 +102,7 @@ class Solver:
     @property
     def _early(self) -> int:
         """Rounds of patches that the elements take, where nothing else waits for the nodes."""
-        if self.contacts or self.constraints.count:
+        if self.contacts or self.constraints.count or len(self.model.absorbing.node):
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
 
@@ -128,6 +131,7 @@ class Solver:
         advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
         advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
+        advance += self.absorbing.stages()
         advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
             Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
@@ -135,6 +139,7 @@ class Solver:
         ]
         if self.loads.kernels():
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
+        motion += self.absorbing.record_stages(self.records)
         torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
         return [forces, energies, sums, advance, torques if self.model.hinge_loads else [], motion]
 
@@ -161,6 +166,7 @@ class Solver:
                 contacts=[stage.new_state() for stage in self.contacts],
                 constraints=self.constraints.new_state(),
                 loads=self.loads.new_state(),
+                absorbing=self.absorbing.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
@@ -179,7 +185,7 @@ class Solver:
     def _kernels(self) -> list[tuple[list[Any], int | None]]:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
-        sums = self.records.kernels() + self.loads.kernels()
+        sums = self.records.kernels() + self.loads.kernels() + self.absorbing.record_kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
@@ -187,7 +193,7 @@ class Solver:
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + elements, ELEMENT_BLOCK),
+            (self.nodes.kernels() + self.absorbing.kernels() + elements, ELEMENT_BLOCK),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 

@@ -23,6 +23,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.files import write_atomically
 from warp_mca.base.validate import DAMAGE
 from warp_mca.elements.state import ElementState
+from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.load_stage import LoadState
@@ -50,6 +51,7 @@ class State:
         contacts: of each contact pass, `ContactState`.
         constraints: of joints and driven nodes, `ConstraintState`.
         loads: of torques in hinges and of movable bases, `LoadState`.
+        absorbing: of absorbing boundaries, `AbsorbingState`.
         steps: steps taken since the start of the phase [-].
         scenes: what each scene has recorded so far, `records.SceneRecords`.
     """
@@ -63,6 +65,7 @@ class State:
     contacts: list[ContactState]
     constraints: ConstraintState
     loads: LoadState
+    absorbing: AbsorbingState
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
 

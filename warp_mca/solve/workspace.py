@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.records.columns import JACOBIAN, PASS, PASS_COLUMNS
+from warp_mca.kernels.records.columns import JACOBIAN, column_count
 from warp_mca.kernels.records.ledger import SUM_WIDTH
 from warp_mca.model.layout import Layout
 from warp_mca.model.model import Model
@@ -52,7 +52,7 @@ class Workspace:
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
-        columns = PASS + PASS_COLUMNS * passes
+        columns = column_count(passes, len(model.absorbing.node) > 0)
         self.partial = wp.zeros((ROWS, layout.count, columns, SUM_WIDTH), dtype=wp.float64)
         self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)

@@ -252,6 +252,12 @@ MUTATIONS: dict[str, Mutation] = {
         "trial = f_start - k *",
         "trial = f_start + k *",
     ),
+    "dashpots_stiff_in_shear": Mutation(
+        "dashpots of absorbing boundaries resist shear with rho c_p in place of rho c_s",
+        "warp_mca/model/absorbing.py",
+        "(rho * c_p, rho * c_s)",
+        "(rho * c_p, rho * c_p)",
+    ),
     "gravity_reversed": Mutation(
         "gravity acts against its direction",
         "kernels/nodes/node.py",

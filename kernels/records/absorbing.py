@@ -1,0 +1,36 @@
+"""Owns the sums of what absorbing boundaries take up, of each scene apart."""
+
+import warp as wp
+
+from warp_mca.kernels.records.columns import ABSORBED, BEYOND_WORK
+from warp_mca.kernels.records.ledger import run_of
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel(enable_backward=False)
+def sum_absorbed(
+    row: wp.array(dtype=wp.int32),
+    column: int,
+    first: wp.array(dtype=wp.int32),
+    velocity: wp.array(dtype=wp.vec3d),
+    impulse: wp.array(dtype=wp.vec3d),
+    absorbed: wp.array(dtype=wp.float64),
+    partial_out: wp.array4d(dtype=wp.float64),
+):
+    """Energy absorbed, and work of what lies beyond, which moves with `velocity`, into the columns from `column` on.
+
+    `first` is the first node of absorbing boundaries of each scene; sums are those of `records.ledger`.
+    """
+    scene, k, lane = wp.tid()
+    energy = wp.float64(0.0)
+    work = wp.float64(0.0)
+    begin, end = run_of(first[scene], first[scene + 1], k)
+    for i in range(begin + lane, end, wp.block_dim()):
+        energy += absorbed[i]
+        work -= wp.dot(velocity[i], impulse[i])
+    energy_sum = wp.tile_sum(wp.tile(energy))
+    work_sum = wp.tile_sum(wp.tile(work))
+    if lane == 0:
+        partial_out[row[0], scene, column + wp.static(ABSORBED), k] = energy_sum[0]
+        partial_out[row[0], scene, column + wp.static(BEYOND_WORK), k] = work_sum[0]

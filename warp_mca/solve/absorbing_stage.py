@@ -1,0 +1,119 @@
+"""Owns the stage of absorbing boundaries: their nodes move against dashpots, and what these take up is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.elements.stage import BLOCK_DIM
+from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
+from warp_mca.kernels.records.absorbing import sum_absorbed
+from warp_mca.kernels.records.columns import absorbing_column
+from warp_mca.model.layout import Layout
+from warp_mca.solve.stage import BESIDE, Stage, Step
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.solve.node_stage import NodeStage
+    from warp_mca.solve.record_stage import RecordStage
+    from warp_mca.solve.state import State
+
+
+@dataclass(eq=False)
+class AbsorbingState:
+    """What absorbing boundaries have taken up; empty where a scene has none.
+
+    Attributes:
+        impulse: given by each of their nodes to what lies beyond up to t(n) [N s], shape (count,), vec3d.
+        impulse_after: the same half a step later [N s], shape (count,), vec3d.
+        absorbed: energy that each node gave away, in the frame of its body, up to t(n) [J], shape (count,), float64.
+        absorbed_after: the same half a step later [J], shape (count,), float64.
+        stretch: displacement of each node less the way of its body [m], shape (count,), vec3d; empty without springs.
+    """
+
+    impulse: wp.array
+    impulse_after: wp.array
+    absorbed: wp.array
+    absorbed_after: wp.array
+    stretch: wp.array
+
+
+class AbsorbingStage:
+    """What `kernels.nodes.absorbing` reads and writes.
+
+    Attributes:
+        count: nodes of absorbing boundaries.
+    """
+
+    def __init__(self, model: Model, layout: Layout, nodes: NodeStage, precision: str, dt: float) -> None:
+        """Allocate on the current device."""
+        own, self.nodes, self.layout, self.dt = model.absorbing, nodes, layout, dt
+        self.count, self.model = len(own.node), model
+        if not self.count:
+            return
+        decay = 0.5 * dt * own.damping / model.mass[own.node, None, None]
+        self.dashpots = Dashpots()
+        self.dashpots.node = wp.array(own.node, dtype=wp.int32)
+        self.dashpots.damping = wp.array(own.damping, dtype=wp.mat33d)
+        stiffness = own.stiffness if own.sprung else own.stiffness[:0]
+        self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
+        self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
+        self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
+        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each)
+        first = np.searchsorted(own.node, layout.nodes)
+        self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
+        self.column = absorbing_column(len(model.passes) // layout.count)
+
+    def new_state(self) -> AbsorbingState:
+        """State before the first step, on the current device."""
+        return AbsorbingState(
+            impulse=wp.zeros(self.count, dtype=wp.vec3d),
+            impulse_after=wp.zeros(self.count, dtype=wp.vec3d),
+            absorbed=wp.zeros(self.count, dtype=wp.float64),
+            absorbed_after=wp.zeros(self.count, dtype=wp.float64),
+            stretch=wp.zeros(self.count if self.model.absorbing.sprung else 0, dtype=wp.vec3d),
+        )
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [self.kernel] if self.count else []
+
+    def record_kernels(self) -> list[Any]:
+        """Those of a record."""
+        return [sum_absorbed] if self.count else []
+
+    def stages(self) -> list[Stage]:
+        """Those of a step, beside that of the free nodes."""
+        return [Stage("absorbing boundaries", self._advance, BESIDE)] if self.count else []
+
+    def record_stages(self, records: RecordStage) -> list[Stage]:
+        """Those of a record, after all nodes have moved."""
+        return [Stage("absorbed energy", lambda s: self._sum(s, records), only_records=True)] if self.count else []
+
+    def _advance(self, step: Step) -> None:
+        """The nodes that dashpots act on."""
+        work, state, own = self.nodes.work, step.state, step.state.absorbing
+        inputs = [self.dashpots, work.inverse_mass, work.first_slots, work.more_slots, self.nodes.constraints.role]
+        inputs += [work.force, self.nodes.scene, self.nodes.gravity, self.dt]
+        outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
+        outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
+        wp.launch(self.kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+    def _sum(self, step: Step, records: RecordStage) -> None:
+        """Energy absorbed and work of what lies beyond, in the record."""
+        own = step.state.absorbing
+        inputs = [self.column, self.first, self.dashpots.velocity, own.impulse, own.absorbed]
+        records.sum_runs(sum_absorbed, self.most, inputs)
+
+    def impulses(self, state: State, scene: int = 0) -> dict[str, list[float]]:
+        """Impulse that each body of a scene gave to what lies beyond its absorbing boundaries [N s], by name."""
+        names = [name for name in self.model.node_start if self.layout.count == 1 or name.startswith(f"{scene}/")]
+        starts = [self.model.node_start[name] for name in names]
+        bounds = np.searchsorted(self.model.absorbing.node, [*starts, self.layout.nodes[scene + 1]])
+        impulse = state.absorbing.impulse.numpy()
+        spans = zip(names, bounds[:-1], bounds[1:], strict=True)
+        own = {name: impulse[first:end].sum(axis=0).tolist() for name, first, end in spans if end > first}
+        return own if self.layout.count == 1 else {name.split("/", 1)[1]: value for name, value in own.items()}
