@@ -43,6 +43,8 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
         offset.append(len(time))
 
     for item in parts.scene.fixed:
+        if parts.scene.body(item.body).rigid:
+            continue  # rows hold them
         nodes = parts.nodes(item.body, item.nodes)
         for letter in item.axes:
             k = "xyz".index(letter)

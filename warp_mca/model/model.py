@@ -16,6 +16,8 @@ from warp_mca.model.constraints import JointPairs, check_bindings, constraints, 
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
+from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, rigid_bodies
+from warp_mca.model.rigid_step import stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.scene import Contact, RigidPlane, Scene
@@ -67,6 +69,9 @@ class Model:
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
         batch: where the scenes of a batch lie, or None for a model of one scene.
+        rigid_bodies, rigid_rows: rigid bodies, those of each scene in turn, and what binds them.
+        rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
+            in a batch.
     """
 
     X: Array
@@ -97,6 +102,9 @@ class Model:
     element_of: Index
     stable: StableStep
     batch: Layout | None = None
+    rigid_bodies: tuple[RigidBody, ...] = ()
+    rigid_rows: tuple[RigidRow, ...] = ()
+    rigid_blocks: tuple[Block, ...] = ()
 
     def owner(self, element: int) -> tuple[str, int]:
         """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""
@@ -110,8 +118,8 @@ class Model:
 
     @property
     def element_count(self) -> int:
-        """Number of elements."""
-        return len(self.element_of)
+        """Number of elements that are computed."""
+        return sum(block.conn.shape[1] for block in self.blocks)
 
 
 def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...], Array, Array]:
@@ -237,14 +245,17 @@ def build_model(
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints = join_bodies(parts)
     bases = movable_bases(parts, joints, chain, start)
+    check_loads(scene, chain, bases)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
     blocks, order = parts.blocks()
+    rigid_blocks, rigid_order = parts.blocks(rigid=True, first=len(order))
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
-    stable = parts.stable(added)
+    bodies, rows = rigid_bodies(parts, pairs, joints, passes, velocity)
+    stable = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
     return Model(
         X=parts.X,
         V=velocity,
@@ -262,7 +273,10 @@ def build_model(
         points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target), *others], dtype=np.int32),
         node_start=parts.node_start,
         element_start=parts.element_start,
-        element_of=order,
+        element_of=np.concatenate([order, rigid_order]),
         stable=stable,
         batch=None,
+        rigid_bodies=bodies,
+        rigid_rows=rows,
+        rigid_blocks=rigid_blocks,
     )

@@ -118,7 +118,7 @@ class SceneRun:
             wall=wall,
             device=f"{self.solver.device} ({wp.get_device(self.solver.device).name})",
             precision=self.solver.precision,
-            element=" ".join(sorted({block.element for block in model.blocks})),
+            element=" ".join(sorted({block.element for block in model.blocks})) or "none",
             energy_error=ledger.kept.energy_error,
             energy=ledger.energy(),
             max_plastic_strain=max_plastic_strain(self.solver, self.state, self.index),

@@ -41,9 +41,12 @@ class NodeStage:
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
+        left = bound or bool(model.rigid_bodies)
+        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, left, each, early)
         self.bound_kernel = (
-            constraint.bound_kernel(precision, self.touched, each, constraints.partial) if bound else None
+            constraint.bound_kernel(precision, self.touched, each, constraints.partial, constraints.skips)
+            if bound
+            else None
         )
 
     def kernels(self) -> list[Any]:

@@ -27,6 +27,7 @@ from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
+from warp_mca.solve.rigid_stage import RigidState
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -50,6 +51,7 @@ class State:
         contacts: of each contact pass, `ContactState`.
         constraints: of joints and driven nodes, `ConstraintState`.
         loads: of torques in hinges and of movable bases, `LoadState`.
+        rigid: of rigid bodies, `RigidState`.
         steps: steps taken since the start of the phase [-].
         scenes: what each scene has recorded so far, `records.SceneRecords`.
     """
@@ -63,13 +65,14 @@ class State:
     contacts: list[ContactState]
     constraints: ConstraintState
     loads: LoadState
+    rigid: RigidState
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
 
     @property
     def _scalar(self) -> str:
-        """Type of the numbers that elements compute with."""
-        return str(self.elements[0].extreme.dtype.__name__)
+        """Type of the numbers that elements compute with; that of all others where there are none."""
+        return str(self.elements[0].extreme.dtype.__name__) if self.elements else "float64"
 
     def arrays(self) -> dict[str, Any]:
         """Device arrays by name, as `elements/0/history`; of `normal_force` what lasts."""
