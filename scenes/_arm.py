@@ -59,6 +59,20 @@ def _bodies(
     return (*inner, tip, plate)
 
 
+def _made_rigid(bodies: tuple[mca.Body, ...], names: str | None) -> tuple[mca.Body, ...]:
+    """The bodies, those of the `names` rigid.
+
+    Raises:
+        RequestError: a name is none of a body.
+    """
+    wanted = {name.strip() for name in (names or "").split(",")} - {""}
+    known = [body.name for body in bodies]
+    if wanted - set(known):
+        remedy = f"name some of {', '.join(known)}, with commas between them"
+        raise bad_value("rigid_bodies", names, remedy)
+    return tuple(replace(body, rigid=body.name in wanted) for body in bodies)
+
+
 def arm(
     name: str,
     links: Sequence[str],
@@ -79,6 +93,7 @@ def arm(
     impact: mca.ImpactPhase,
     paths: tuple[mca.Path, ...] = (),
     t_end: float | None = None,
+    rigid_bodies: str | None = None,
 ) -> mca.Scene:
     """Equal rods, hinged in a row from O at the origin, whose hemispherical tip will strike a plate H below O.
 
@@ -99,6 +114,7 @@ def arm(
         impact: the impact phase.
         paths: lines along which stress is recorded.
         t_end: as in `mca.Scene`.
+        rigid_bodies: names of the bodies that stay rigid in the impact, with commas between them.
     """
     last, tip_centre = links[-1], (length - radius, 0.0, 0.0)
     top = mca.Surface(body="plate", nodes="top")
@@ -118,7 +134,7 @@ def arm(
     ]
     return mca.Scene(
         name=name,
-        bodies=_bodies(links, shapes, materials, ground),
+        bodies=_made_rigid(_bodies(links, shapes, materials, ground), rigid_bodies),
         joints=tuple(mca.Revolute(**hinge, nodes=joint_nodes) for hinge in hinges),  # pyright: ignore[reportArgumentType]
         contacts=(mca.Contact(slave=mca.Surface(body=last, nodes="tip"), master=top, **contact),),
         fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),

@@ -48,6 +48,9 @@ def build(
     sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "mesh",
+    rigid_bodies: Annotated[
+        str | None, Param("bodies that stay rigid in the impact, as OA,AB; None: none")
+    ] = None,
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     t_end: Annotated[
         float | None,
@@ -106,6 +109,7 @@ def build(
         joint_nodes="axis",
         rigid_inertia=rigid_inertia,
         t_end=t_end,
+        rigid_bodies=rigid_bodies,
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval),
     )
 

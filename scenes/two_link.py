@@ -93,6 +93,9 @@ def build(
     plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
     joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "ends",
+    rigid_bodies: Annotated[
+        str | None, Param("bodies that stay rigid in the impact, as OA or OA,plate; None: none")
+    ] = None,
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
     t_end: Annotated[
@@ -173,6 +176,7 @@ def build(
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval, time_step_scale=time_step_scale),
         paths=_paths(length, radius),
         t_end=t_end,
+        rigid_bodies=rigid_bodies,
     )
 
 

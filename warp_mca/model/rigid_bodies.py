@@ -156,7 +156,7 @@ def check_loads(scene: Scene, chain: Chain | None, bases: Sequence[MovableBase])
     Raises:
         RequestError: there is such a link.
     """
-    rigid = {body.name for body in scene.bodies if body.rigid}
+    rigid = set(scene.rigid_names)
     if chain is None or not rigid:
         return
     remedy = "{} acts on nodes of flexible links; leave rigid off for this body"

@@ -68,7 +68,7 @@ class SceneRun:
         try:
             self.ledger.read(written, self.solver.layout.records(records, self.index))
         finally:
-            if self.ready.scene.paths:
+            if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
@@ -103,10 +103,12 @@ class SceneRun:
             "joint_impulse": joint_impulses(self.solver, self.state, self.index),
             "threads": self.solver.threads,
         }
+        if scene.rigid_names:
+            more["rigid_bodies"] = scene.rigid_names
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
-        if scene.paths:
-            body = scene.body(scene.paths[0].lines[0].body)
+        if scene.stress_paths:
+            body = scene.body(scene.stress_paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
         return RunFacts(
             scene=scene.name,
