@@ -14,6 +14,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
 from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
 from warp_mca.model.stable_step import StableStep
@@ -55,6 +56,7 @@ class Model:
         joint_slides: of each rail the first of its sliders, the first of its own nodes and the end of these in
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
         joints: name of each joint and its pairs.
+        couplings: of joints between clusters of nodes; their pairs count as tied in no direction.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
         passes: contact passes; those of each scene in turn.
@@ -86,6 +88,7 @@ class Model:
     joint_tied: Array
     joint_slides: Index
     joints: tuple[JointPairs, ...]
+    couplings: tuple[Coupling, ...]
     hinge_loads: tuple[HingeLoad, ...]
     bases: tuple[MovableBase, ...]
     passes: tuple[ContactPass, ...]
@@ -235,7 +238,7 @@ def build_model(
     """
     parts = Assembly(scene, meshes, X)
     others = [parts.node_start[body] + node for body, node in watched]
-    pairs, joints = join_bodies(parts)
+    pairs, joints, couplings = join_bodies(parts)
     bases = movable_bases(parts, joints, chain, start)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
@@ -254,6 +257,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
+        couplings=couplings,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
         passes=passes,
