@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from test_joint import SOFT
 
 import warp_mca as mca
-from warp_mca.model.couplings import mean_pose
+from warp_mca.base.rotation import mean_pose
 
 SIZE = (0.1, 0.02, 0.02)
 ORIGIN = (0.0, -0.01, -0.01)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.rotation import best_rotation
+from warp_mca.base.rotation import mean_pose
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Clusters, Side
@@ -19,6 +19,7 @@ from warp_mca.scene.ties import Clusters, Side
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
+APART = 1e-3  # of a cluster's extent: distance of the points of both clusters, at most
 FLAT = 1e-3  # of a cluster's radius of inertia: distance from a line below which nodes are on it
 ALIGNED = math.cos(math.radians(1.0))  # between the axes of both bodies, at least
 
@@ -51,20 +52,6 @@ class _Pose(NamedTuple):
     centre: Array
     place: Array
     axis: Array
-
-
-def mean_pose(points: Array, X: Array, weights: Array) -> tuple[Array, Array, Array]:
-    """Mean positions of a cluster at `points` and at `X`, and the rotation from the one to the other.
-
-    Args:
-        points, X: of its nodes [m], shape (count, 3), float64.
-        weights: s m of each [kg], shape (count,), float64.
-
-    Returns:
-        Shapes (3,), (3,) and (3, 3), float64.
-    """
-    a, b = weights @ points / weights.sum(), weights @ X / weights.sum()
-    return a, b, best_rotation(points - a, X - b, weights)
 
 
 def _pose(joint: Joint, side: Side, nodes: Index, weights: Array, at: Vec3, axis: Vec3) -> _Pose:
@@ -110,7 +97,7 @@ def coupling(
         own = weights(clusters.second, clusters.second_weight, masses[1])
         b = _pose(joint, second, clusters.second, own, clusters.other_at, clusters.axis)
         apart = float(np.linalg.norm(a.place - b.place))
-        if apart > first.tolerance:
+        if apart > APART * np.ptp(first.X[clusters.first], axis=0).max():
             remedy = f"it is {apart:.3g} m from other_at = {clusters.other_at} of {second.body}; let both coincide"
             raise bad_value(f"{joint.title}.at", clusters.at, remedy)
         if a.axis @ b.axis < ALIGNED:

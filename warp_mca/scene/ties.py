@@ -50,15 +50,8 @@ class Side:
         return nodes[np.argsort(along[nodes])].astype(np.int32)
 
     def around_axis(self, at: Vec3, axis: Vec3, radius: float) -> tuple[Index, Array]:
-        """Nodes within a radius [m] of such an axis, and the weights (1 - (r / radius)^2)^2 of their distance r.
-
-        The weight and its slope are 0 at the radius, so that sums over the nodes, which lumped masses make quadratures,
-        change smoothly with the mesh.
-        """
-        direction = np.asarray(axis) / np.linalg.norm(axis)
-        offset = self.mesh.points - np.asarray(at)
-        square = (offset**2).sum(axis=1) - (offset @ direction) ** 2
-        weight = np.maximum(1.0 - square / radius**2, 0.0) ** 2
+        """Nodes within a radius [m] of such an axis, and the `pin_weights` of these."""
+        weight = pin_weights(self.mesh.points, at, axis, radius)
         nodes = np.flatnonzero(weight > 0.0)
         return nodes.astype(np.int32), weight[nodes]
 
@@ -116,6 +109,22 @@ class Clusters:
     second: Index | None = None
     second_weight: Array | None = None
     other_at: Vec3 = (0.0, 0.0, 0.0)
+
+
+def pin_weights(points: Array, at: Vec3, axis: Vec3, radius: float) -> Array:
+    """Weights (1 - (r / radius)^2)^2 of points at the distance r from an axis through `at`, shape (count,); 0 beyond.
+
+    The weight and its slope are 0 at the radius, so that sums over the nodes, which lumped masses make quadratures,
+    change smoothly with the mesh.
+
+    Args:
+        points: [m], shape (count, 3), float64.
+        at, axis: in the same frame [m].
+        radius: [m].
+    """
+    offset, direction = points - np.asarray(at), np.asarray(axis) / np.linalg.norm(axis)
+    square = (offset**2).sum(axis=1) - (offset @ direction) ** 2
+    return np.asarray(np.maximum(1.0 - square / radius**2, 0.0) ** 2, dtype=np.float64)
 
 
 def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:
