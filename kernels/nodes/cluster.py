@@ -183,7 +183,6 @@ def pull(
     T: wp.vec3d,
     clusters: Clusters,
     X: wp.array(dtype=wp.vec3d),
-    mass: wp.array(dtype=wp.float64),
     dt: wp.float64,
     u_out: wp.array(dtype=wp.vec3d),
     v_out: wp.array(dtype=wp.vec3d),
@@ -245,15 +244,12 @@ def couple(
     held = wp.identity(3, dtype=wp.float64) - wp.outer(d, d)
     J, T = joint_impulses(sum_of(a.response, b.response), gap / dt, tilt / dt, held)
     arm_P = P - a.centre
-    pull(
-        begin[0], begin[1], lane, place, a, J, wp.cross(arm_P, J) + T, clusters, X, mass, dt,
-        u_out, v_out, speed_square_out,
-    )  # fmt: skip
+    outer = -(wp.cross(P - b.centre, J) + T)
+    # fmt: off
+    pull(begin[0], begin[1], lane, place, a, J, wp.cross(arm_P, J) + T, clusters, X, dt, u_out, v_out, speed_square_out)
     if begin[2] > begin[1]:
-        pull(
-            begin[1], begin[2], lane, place, b, -J, -(wp.cross(P - b.centre, J) + T), clusters, X, mass, dt,
-            u_out, v_out, speed_square_out,
-        )  # fmt: skip
+        pull(begin[1], begin[2], lane, place, b, -J, outer, clusters, X, dt, u_out, v_out, speed_square_out)
+    # fmt: on
     if lane == 0:
         spin = a.spin + wp.transpose(a.response.mixed) * J + a.response.turn * T
         v = a.velocity + wp.cross(a.spin, arm_P) + a.response.point * J + a.response.mixed * T
