@@ -89,6 +89,7 @@ def arm(
     v_plate: float,
     contact: Mapping[str, Any],
     joint_nodes: str,
+    pin_radius: float | None,
     rigid_inertia: str,
     impact: mca.ImpactPhase,
     paths: tuple[mca.Path, ...] = (),
@@ -111,6 +112,7 @@ def arm(
         v_plate: initial velocity of the plate along x [m/s].
         contact: parameters of the contact of tip and plate.
         joint_nodes, rigid_inertia: as `mca.Revolute` and `mca.RigidPhase` take them.
+        pin_radius: of hinges with "pin" [m]; None: half of the rods' radius.
         impact: the impact phase.
         paths: lines along which stress is recorded.
         t_end: as in `mca.Scene`.
@@ -128,6 +130,9 @@ def arm(
     angle = _approach_angle(links, length, radius, H, gravity, theta)
     shapes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
     shapes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
+    tied: dict[str, Any] = {"nodes": joint_nodes}
+    if joint_nodes == "pin":
+        tied["pin_radius"] = 0.5 * radius if pin_radius is None else pin_radius
     hinges: list[dict[str, Any]] = [{"name": "O", "body": links[0], "at": (0.0, 0.0, 0.0)}]
     hinges += [
         {"name": outer[0], "body": link, "at": (length, 0.0, 0.0), "other": outer} for link, outer in pairwise(links)
@@ -135,7 +140,7 @@ def arm(
     return mca.Scene(
         name=name,
         bodies=_made_rigid(_bodies(links, shapes, materials, ground), rigid_bodies),
-        joints=tuple(mca.Revolute(**hinge, nodes=joint_nodes) for hinge in hinges),  # pyright: ignore[reportArgumentType]
+        joints=tuple(mca.Revolute(**hinge, **tied) for hinge in hinges),
         contacts=(mca.Contact(slave=mca.Surface(body=last, nodes="tip"), master=top, **contact),),
         fixed=(mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
         paths=paths,

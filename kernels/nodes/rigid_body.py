@@ -1,7 +1,7 @@
 """Owns rigid bodies in a step: forces on their nodes become momentum and spin, and their motion that of their nodes.
 
-Nodes of flexible bodies that joints tie to those of a rigid body ride on it: they have part in its mass and inertia, and
-the forces of their elements act on it. `rigid_motion` has the equations, `rigid_rows` joints between rigid bodies.
+Nodes of flexible bodies that joints tie to those of a rigid body ride on it: they have part in its mass and inertia,
+and the forces of their elements act on it. `rigid_motion` has the equations, `rigid_rows` joints between rigid bodies.
 """
 
 from functools import cache
@@ -17,6 +17,7 @@ from warp_mca.kernels.nodes.rigid_rows import RigidRows, factorise, place_row, r
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
+
 
 @cache
 def load_function(precision: str, contact: bool) -> Any:
@@ -98,7 +99,7 @@ def count_riders(
 
 @cache
 def advance_kernel(precision: str, contact: bool) -> Any:
-    """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes the bodies of a group in turn.
+    """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes a group's bodies in turn.
 
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
@@ -214,7 +215,7 @@ def follow(
     v_before_out: wp.array(dtype=wp.vec3d),
     speed_square_out: wp.array(dtype=wp.float32),
 ):
-    """Give each node of a rigid body, riders included, its displacement and velocity; v_before_out takes the old one."""
+    """Give nodes of rigid bodies, riders included, displacement and velocity; v_before_out takes the old velocity."""
     k = wp.tid()
     i = node[k]
     b = body[k]

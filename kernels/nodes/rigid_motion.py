@@ -37,7 +37,8 @@ class RigidBodies:
         node: these nodes, shape (loaded_count,), int32.
         arm: their reference positions from the mass centre [m], shape (loaded_count,), vec3d.
         pair: pair of `Model.joint_first` by which a rider is tied, -1 of own nodes, shape (loaded_count,), int32.
-        sign: 1 where the rider is the first node of its pair, -1 where it is the second, shape (loaded_count,), float64.
+        sign: 1 where the rider is the first node of its pair, -1 where it is the second, shape (loaded_count,),
+            float64.
     """
 
     mass: wp.array(dtype=wp.float64)

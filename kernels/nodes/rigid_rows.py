@@ -1,9 +1,9 @@
 """Owns what binds rigid bodies to each other and to the ground: rows, kept by impulses.
 
-A row is the scalar condition n . (x_first - x_second) = 0 at t(n+1) for a point that two bodies share. Equal and opposite
-impulses along n act at that point, so that momentum and angular momentum are kept. All rows of a group are solved
-together by Newton's method, with the matrix of t(n): the rotation of a step is small, so that three or four steps reach
-rounding.
+A row is the scalar condition n . (x_first - x_second) = 0 at t(n+1) for a point that two bodies share. Equal and
+opposite impulses along n act at that point, so that momentum and angular momentum are kept. All rows of a group are
+solved together by Newton's method, with the matrix of t(n): the rotation of a step is small, so that three or four
+steps reach rounding.
 """
 
 import warp as wp
@@ -22,8 +22,8 @@ class RigidRows:
 
     Attributes:
         member: bodies, group by group, shape (body_count,), int32.
-        body, begin: first place in `member` and first row of each group, and the numbers of all, shape (group_count + 1,),
-            int32.
+        body, begin: first place in `member` and first row of each group, and the numbers of all, shape
+            (group_count + 1,), int32.
         entry: first entry of each group's matrix, shape (group_count,), int32.
         first, second: bodies of each row, second -1 where that is the ground, shape (row_count,), int32.
         first_arm, second_arm: reference position of the common point from the bodies' mass centres [m], shape

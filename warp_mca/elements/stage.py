@@ -160,8 +160,8 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
 
     Returns:
         (The first slot of each node, one beyond all of them where it has none, and its second, -1 where there is none,
-        -2 - row where it has more than two, shape (node_count, 2), int32; rows of three more slots, -1 where there are fewer, and the number of the node's rows,
-        shape (row_count, 4), int32.)
+        -2 - row where it has more than two, shape (node_count, 2), int32; rows of three more slots, -1 where there are
+        fewer, and the number of the node's rows, shape (row_count, 4), int32.)
     """
     first = 0
     for stage in stages:

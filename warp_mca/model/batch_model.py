@@ -136,6 +136,11 @@ def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, An
             for _, model, _, first in scenes
             for joint in model.joints
         ),
+        "couplings": tuple(
+            replace(item, start=item.start + first, middle=item.middle + first, end=item.end + first)
+            for _, model, _, first in scenes
+            for item in model.couplings
+        ),
         "hinge_loads": tuple(
             replace(load, inner=load.inner + node, outer=load.outer + node, scene=k)
             for k, model, node, _ in scenes

@@ -14,9 +14,10 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
 from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
-from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, rigid_bodies
+from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, flexible, rigid_bodies
 from warp_mca.model.rigid_step import stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
@@ -57,6 +58,8 @@ class Model:
         joint_slides: of each rail the first of its sliders, the first of its own nodes and the end of these in
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
         joints: name of each joint and its pairs.
+        couplings: of joints between clusters of nodes; their pairs count as tied in no direction. Those of rigid bodies
+            are in `rigid_rows`.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
         passes: contact passes; those of each scene in turn.
@@ -91,6 +94,7 @@ class Model:
     joint_tied: Array
     joint_slides: Index
     joints: tuple[JointPairs, ...]
+    couplings: tuple[Coupling, ...]
     hinge_loads: tuple[HingeLoad, ...]
     bases: tuple[MovableBase, ...]
     passes: tuple[ContactPass, ...]
@@ -243,7 +247,7 @@ def build_model(
     """
     parts = Assembly(scene, meshes, X)
     others = [parts.node_start[body] + node for body, node in watched]
-    pairs, joints = join_bodies(parts)
+    pairs, joints, couplings = join_bodies(parts)
     bases = movable_bases(parts, joints, chain, start)
     check_loads(scene, chain, bases)
     for base in bases:
@@ -254,7 +258,7 @@ def build_model(
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
-    bodies, rows = rigid_bodies(parts, pairs, joints, passes, velocity)
+    bodies, rows = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     stable = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
     return Model(
         X=parts.X,
@@ -265,6 +269,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
+        couplings=flexible(couplings, pairs, bodies),
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
         passes=passes,

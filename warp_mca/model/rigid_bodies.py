@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.model.constraints import JointPairs
+from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import MovableBase
 from warp_mca.model.surfaces import ContactPass
 from warp_mca.scene import Scene
@@ -90,6 +91,15 @@ def own_nodes(parts: Assembly) -> dict[str, Index]:
     }
 
 
+def flexible(
+    couplings: Sequence[Coupling], pairs: Mapping[str, NDArray], bodies: Sequence[RigidBody]
+) -> tuple[Coupling, ...]:
+    """The couplings without those of rigid bodies."""
+    own = np.concatenate([np.zeros(0, np.int32), *(body.own for body in bodies)])
+    rigid = np.isin(pairs["joint_first"], own)
+    return tuple(item for item in couplings if not rigid[item.start : item.end].any())
+
+
 def rigid_nodes(model: Model) -> NDArray[np.bool_]:
     """Nodes of rigid bodies, riders aside, shape (node_count,), bool."""
     found = np.zeros(model.node_count, dtype=bool)
@@ -98,10 +108,19 @@ def rigid_nodes(model: Model) -> NDArray[np.bool_]:
     return found
 
 
+def moves_with_rigid(model: Model) -> NDArray[np.bool_]:
+    """Nodes of rigid bodies and riders, shape (node_count,), bool."""
+    found = np.zeros(model.node_count, dtype=bool)
+    for body in model.rigid_bodies:
+        found[body.nodes] = True
+    return found
+
+
 def rigid_bodies(
     parts: Assembly,
     pairs: Mapping[str, NDArray],
     joints: Sequence[JointPairs],
+    couplings: Sequence[Coupling],
     passes: Sequence[ContactPass],
     velocity: Array,
 ) -> tuple[tuple[RigidBody, ...], tuple[RigidRow, ...]]:
@@ -110,6 +129,7 @@ def rigid_bodies(
     Args:
         parts: of the scene.
         pairs, joints: as in `Model`.
+        couplings: of all joints between clusters.
         passes: of its contacts.
         velocity: initial velocities [m/s], shape (node_count, 3), float64.
 
@@ -123,13 +143,14 @@ def rigid_bodies(
     for place, own in enumerate(nodes.values()):
         owner[own] = place
     _check_drives(parts)
+    coupled = {item.start: item for item in couplings}
     for joint, found in zip(parts.scene.joints, joints, strict=True):
-        _check_joint(joint, pairs, found, owner)
+        _check_joint(joint, pairs, found, owner, found.start in coupled)
     touched = np.zeros(len(parts.X), dtype=bool)
     for item in passes:
         touched[item.slave], touched[item.master] = True, True
     bodies = [_body(parts, name, own, touched, pairs, owner) for name, own in nodes.items()]
-    rows = [row for found in joints for row in _joint_rows(parts, pairs, found, owner)]
+    rows = [row for found in joints for row in _joint_rows(parts, pairs, found, owner, coupled.get(found.start))]
     rows += [row for place, name in enumerate(nodes) for row in _fixed_rows(parts, place, name, bodies, velocity)]
     return tuple(bodies), tuple(rows)
 
@@ -141,11 +162,15 @@ def _check_drives(parts: Assembly) -> None:
             raise bad_value("Prescribed.body", item.body, remedy)
 
 
-def _check_joint(joint: Joint, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index) -> None:
+def _check_joint(joint: Joint, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupled: bool) -> None:
     first, second = (pairs[name][found.start : found.end] for name in ("joint_first", "joint_second"))
     sides = np.concatenate([owner[first], owner[second[second != GROUND]]])
     tied = pairs["joint_tied"][found.start : found.end]
-    if (sides != GROUND).any() and (tied != np.eye(3)).any():
+    if (sides != GROUND).any() and coupled:
+        if (sides == GROUND).any():
+            remedy = "a pin joins two flexible bodies or two rigid ones; choose axis or ends, or leave rigid off"
+            raise bad_value(f"{joint.title}.nodes", "pin", remedy)
+    elif (sides != GROUND).any() and (tied != np.eye(3)).any():
         remedy = "nodes of rigid bodies are tied in all directions or not at all; leave rigid off, or the joint out"
         raise bad_value(f"{joint.title}.body", joint.body, remedy)
 
@@ -203,15 +228,24 @@ def _body(
 
 
 def _joint_rows(
-    parts: Assembly, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index
+    parts: Assembly, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupling: Coupling | None
 ) -> list[RigidRow]:
-    """Independent rows that hold the common nodes of two rigid bodies, or of one and the ground, together."""
+    """Independent rows that hold the common nodes of two rigid bodies, or of one and the ground, together.
+
+    A coupling of rigid bodies joins two points of its axis.
+    """
     first, second = (pairs[name][found.start : found.end] for name in ("joint_first", "joint_second"))
     a = owner[first[0]]
-    b = GROUND if second[0] == GROUND else owner[second[0]]
-    if a == GROUND or (b == GROUND and second[0] != GROUND):
+    if coupling:
+        b = owner[first[-1]] if coupling.end > coupling.middle else GROUND
+    else:
+        b = GROUND if second[0] == GROUND else owner[second[0]]
+    if a == GROUND or (b == GROUND and not coupling and second[0] != GROUND):
         return []  # flexible bodies alone, or riders
     points = parts.X[first]
+    if coupling:
+        reach = np.ptp(points, axis=0).max()
+        points = np.stack([coupling.place, coupling.place + reach * coupling.axis])
     away = np.linalg.norm(points - points[0], axis=1)
     far = int(away.argmax())
     rows = [(0, direction) for direction in np.eye(3)]
@@ -236,9 +270,7 @@ def _across(along: Array) -> Array:
     return np.stack([one, np.cross(along, one)])
 
 
-def _fixed_rows(
-    parts: Assembly, place: int, name: str, bodies: Sequence[RigidBody], velocity: Array
-) -> list[RigidRow]:
+def _fixed_rows(parts: Assembly, place: int, name: str, bodies: Sequence[RigidBody], velocity: Array) -> list[RigidRow]:
     """Independent rows that hold the fixed axes of a rigid body's nodes.
 
     Raises:

@@ -168,7 +168,7 @@ class RigidStage:
 
 
 def _pose(model: Model, body: RigidBody, u: Array) -> tuple[Array, Array, Array, Array]:
-    """Displacement of the mass centre [m], quaternion, momentum [kg m/s] and spin [kg m^2/s] from those of the nodes."""
+    """Displacement of the mass centre [m], quaternion, momentum [kg m/s] and spin [kg m^2/s] from the nodes."""
     nodes = body.nodes
     mass, arm, rotation = model.mass[nodes], model.X[nodes] - body.centre, np.array([0.0, 0.0, 0.0, 1.0])
     centre = mass @ u[nodes] / body.mass

@@ -25,6 +25,7 @@ from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
@@ -54,6 +55,7 @@ class Solver:
         work: the model on the device, and what a step computes and forgets.
         elements, contacts: stages of the model's blocks and contact passes.
         constraints: what binds nodes.
+        couplings: joints between clusters of nodes.
         loads: what acts in the joints of chains, and moves their bases.
         rigid: rigid bodies.
         output: what is read off the state for paths and recorders, or None.
@@ -92,6 +94,7 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
+        self.couplings = CouplingStage(model, self.work, self.constraints, self.dt)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
         self.rigid = RigidStage(model, self.work, self.precision, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
@@ -130,6 +133,7 @@ class Solver:
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
         advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
         advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
+        advance += [Stage("couplings", self.couplings.couple, BESIDE)] if self.couplings.count else []
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
         advance += [Stage("rigid bodies", self.rigid.advance, BESIDE)] if self.rigid.count else []
         advance.append(Stage("free nodes", self.nodes.advance))
@@ -164,6 +168,7 @@ class Solver:
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],
                 constraints=self.constraints.new_state(),
+                couplings=self.couplings.new_state(),
                 loads=self.loads.new_state(),
                 rigid=self.rigid.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
@@ -184,7 +189,7 @@ class Solver:
     def _kernels(self) -> list[tuple[list[Any], int | None]]:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
-        sums = self.records.kernels() + self.loads.kernels() + self.rigid.kernels()
+        sums = self.records.kernels() + self.couplings.kernels() + self.loads.kernels() + self.rigid.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]

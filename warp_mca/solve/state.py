@@ -25,6 +25,7 @@ from warp_mca.base.validate import DAMAGE
 from warp_mca.elements.state import ElementState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.coupling_stage import CouplingState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.rigid_stage import RigidState
@@ -50,6 +51,7 @@ class State:
         elements: of each block, `ElementState`.
         contacts: of each contact pass, `ContactState`.
         constraints: of joints and driven nodes, `ConstraintState`.
+        couplings: of joints between clusters of nodes, `CouplingState`.
         loads: of torques in hinges and of movable bases, `LoadState`.
         rigid: of rigid bodies, `RigidState`.
         steps: steps taken since the start of the phase [-].
@@ -64,6 +66,7 @@ class State:
     elements: list[ElementState]
     contacts: list[ContactState]
     constraints: ConstraintState
+    couplings: CouplingState
     loads: LoadState
     rigid: RigidState
     steps: int = 0
