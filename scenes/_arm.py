@@ -68,6 +68,20 @@ def _absorbing(which: str) -> tuple[mca.Absorbing, ...]:
     return tuple(mca.Absorbing(body="plate", nodes=nodes) for nodes in ends) if which == "ends" else ()
 
 
+def _made_rigid(bodies: tuple[mca.Body, ...], names: str | None) -> tuple[mca.Body, ...]:
+    """The bodies, those of the `names` rigid.
+
+    Raises:
+        RequestError: a name is none of a body.
+    """
+    wanted = {name.strip() for name in (names or "").split(",")} - {""}
+    known = [body.name for body in bodies]
+    if wanted - set(known):
+        remedy = f"name some of {', '.join(known)}, with commas between them"
+        raise bad_value("rigid_bodies", names, remedy)
+    return tuple(replace(body, rigid=body.name in wanted) for body in bodies)
+
+
 def arm(
     name: str,
     links: Sequence[str],
@@ -84,11 +98,13 @@ def arm(
     v_plate: float,
     contact: Mapping[str, Any],
     joint_nodes: str,
+    pin_radius: float | None,
     rigid_inertia: str,
     impact: mca.ImpactPhase,
     paths: tuple[mca.Path, ...] = (),
     t_end: float | None = None,
     absorbs: str = "none",
+    rigid_bodies: str | None = None,
 ) -> mca.Scene:
     """Equal rods, hinged in a row from O at the origin, whose hemispherical tip will strike a plate H below O.
 
@@ -106,11 +122,13 @@ def arm(
         v_plate: initial velocity of the plate along x [m/s].
         contact: parameters of the contact of tip and plate.
         joint_nodes, rigid_inertia: as `mca.Revolute` and `mca.RigidPhase` take them.
+        pin_radius: of hinges with "pin" [m]; None: half of the rods' radius.
         impact: the impact phase.
         paths: lines along which stress is recorded.
         t_end: as in `mca.Scene`.
         absorbs: boundaries of the plate through which waves leave: "none"; its "ends"; "all" but the top, with springs
             in place of the support.
+        rigid_bodies: names of the bodies that stay rigid in the impact, with commas between them.
     """
     last, tip_centre = links[-1], (length - radius, 0.0, 0.0)
     top = mca.Surface(body="plate", nodes="top")
@@ -124,14 +142,17 @@ def arm(
     angle = _approach_angle(links, length, radius, H, gravity, theta)
     shapes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
     shapes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
+    tied: dict[str, Any] = {"nodes": joint_nodes}
+    if joint_nodes == "pin":
+        tied["pin_radius"] = 0.5 * radius if pin_radius is None else pin_radius
     hinges: list[dict[str, Any]] = [{"name": "O", "body": links[0], "at": (0.0, 0.0, 0.0)}]
     hinges += [
         {"name": outer[0], "body": link, "at": (length, 0.0, 0.0), "other": outer} for link, outer in pairwise(links)
     ]
     return mca.Scene(
         name=name,
-        bodies=_bodies(links, shapes, materials, ground),
-        joints=tuple(mca.Revolute(**hinge, nodes=joint_nodes) for hinge in hinges),  # pyright: ignore[reportArgumentType]
+        bodies=_made_rigid(_bodies(links, shapes, materials, ground), rigid_bodies),
+        joints=tuple(mca.Revolute(**hinge, **tied) for hinge in hinges),
         contacts=(mca.Contact(slave=mca.Surface(body=last, nodes="tip"), master=top, **contact),),
         fixed=() if absorbs == "all" else (mca.Fixed(body="plate", nodes="bottom", axes="yz"),),
         absorbing=_absorbing(absorbs),

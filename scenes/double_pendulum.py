@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -28,6 +28,10 @@ def build(
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.3,
     rho_OA: Annotated[float, Param("density of OA", unit="kg/m^3", low=0.0, exclusive=True)] = 1000.0,
     rho_AB: Annotated[float, Param("density of AB", unit="kg/m^3", low=0.0, exclusive=True)] = 2000.0,
+    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends", "pin"))] = "axis",
+    pin_radius: Annotated[
+        float, Param("reach of a pin around the axis, with joint_nodes=pin", unit="m", low=0.0, exclusive=True)
+    ] = 0.08,
     duration: Annotated[float, Param("simulated time", unit="s", low=0.0, exclusive=True)] = 0.4,
     samples: Annotated[int, Param("rows of the history", low=1)] = 1000,
     axial: Annotated[int, Param("cells along each link", low=1)] = 10,
@@ -55,12 +59,13 @@ def build(
             ("OA", "AB"), (rho_OA, rho_AB), places, (theta_OA, theta_AB), speeds, rates, strict=True
         )
     )
+    tied: dict[str, Any] = {"nodes": joint_nodes} | ({"pin_radius": pin_radius} if joint_nodes == "pin" else {})
     return mca.Scene(
         name="double_pendulum",
         bodies=bodies,
         joints=(
-            mca.Revolute(name="O", body="OA", at=(0.0, 0.0, 0.0)),
-            mca.Revolute(name="A", body="OA", at=(length, 0.0, 0.0), other="AB"),
+            mca.Revolute(name="O", body="OA", at=(0.0, 0.0, 0.0), **tied),
+            mca.Revolute(name="A", body="OA", at=(length, 0.0, 0.0), other="AB", **tied),
         ),
         gravity=(0.0, -gravity, 0.0),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / samples),

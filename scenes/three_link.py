@@ -48,6 +48,17 @@ def build(
     sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "mesh",
+    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends", "pin"))] = "axis",
+    pin_radius: Annotated[
+        float | None,
+        Param(
+            "reach of a pin around the axis, with joint_nodes=pin; None: half of radius",
+            unit="m",
+            low=0.0,
+            exclusive=True,
+        ),
+    ] = None,
+    rigid_bodies: Annotated[str | None, Param("bodies that stay rigid in the impact, as OA,AB; None: none")] = None,
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     t_end: Annotated[
         float | None,
@@ -103,9 +114,11 @@ def build(
         ),
         v_plate=0.0,
         contact={"mu": mu, "penalty": penalty},
-        joint_nodes="axis",
+        joint_nodes=joint_nodes,
+        pin_radius=pin_radius,
         rigid_inertia=rigid_inertia,
         t_end=t_end,
+        rigid_bodies=rigid_bodies,
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval),
     )
 

@@ -92,7 +92,19 @@ def build(
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
-    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "ends",
+    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends", "pin"))] = "ends",
+    pin_radius: Annotated[
+        float | None,
+        Param(
+            "reach of a pin around the axis, with joint_nodes=pin; None: half of radius",
+            unit="m",
+            low=0.0,
+            exclusive=True,
+        ),
+    ] = None,
+    rigid_bodies: Annotated[
+        str | None, Param("bodies that stay rigid in the impact, as OA or OA,plate; None: none")
+    ] = None,
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
     t_end: Annotated[
@@ -176,11 +188,13 @@ def build(
         v_plate=v_plate,
         contact={"mu": mu, "penalty": penalty, "two_way": two_way},
         joint_nodes=joint_nodes,
+        pin_radius=pin_radius,
         rigid_inertia=rigid_inertia,
         impact=mca.ImpactPhase(duration=duration, output_interval=output_interval, time_step_scale=time_step_scale),
         paths=_paths(length, radius),
         t_end=t_end,
         absorbs=plate_absorbs,
+        rigid_bodies=rigid_bodies,
     )
 
 

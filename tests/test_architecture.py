@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from chains import BASE, TORQUE, bars
@@ -17,6 +18,7 @@ import warp_mca as mca
 from warp_mca.elements.state import ElementState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.coupling_stage import CouplingState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
@@ -111,8 +113,10 @@ def everything() -> mca.Scene:
 def test_stages_of_a_step_are_those_of_the_page_in_this_order():
     page = [cells[:4] for cells in table("Stages of a step")]
     driven = bars(torques=(TORQUE,), base_motion=BASE)
+    pin = mca.Revolute(name="A", body="cart", at=(0.02, 0.0, 0.005), nodes="pin", pin_radius=0.01)
+    pinned = replace(everything(), joints=(pin,))
     seen = set()
-    for ready in (prepared(everything()), chain_ready(driven)):
+    for ready in (prepared(everything()), prepared(pinned), chain_ready(driven)):
         solver = Solver(ready.model, device="cpu", precision="mixed", dt=1e-8)
         found = [
             [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
@@ -129,6 +133,7 @@ STATE_PARTS = {
     "elements/0/": ElementState,
     "contacts/0/": ContactState,
     "constraints/": ConstraintState,
+    "couplings/": CouplingState,
     "loads/": LoadState,
 }
 

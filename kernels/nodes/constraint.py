@@ -19,7 +19,8 @@ class Bonds:
     """What binds the nodes of a model.
 
     Attributes:
-        first, second: nodes of each tied pair, second -1 where that is the ground, shape (pair_count,), int32.
+        first, second: nodes of each tied pair, second -1 where that is the ground, shape (pair_count,), int32; first is
+            -1 where the pair holds a rigid body's node.
         tied: orthogonal projector on the directions in which each pair moves as one [-], shape (pair_count,), mat33d;
             empty where all pairs are tied in all directions.
         node: driven nodes, shape (driven_count,), int32.
@@ -123,12 +124,13 @@ def move(
 
 
 @cache
-def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False) -> Any:
+def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False, skips: bool = False) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
-    impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
+    impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
+    rigid bodies, which `rigid_body.advance_kernel` advances.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
@@ -174,6 +176,9 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
         k = wp.tid()
         pairs = bonds.first.shape[0]
         i = bound_node(k, bonds)
+        if wp.static(skips):
+            if i < 0:
+                return
         total = total_force(i, first_slots, more_slots, force, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         free = v_out[i] + dt * a

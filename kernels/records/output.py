@@ -31,7 +31,10 @@ def nodal_stress(
     von_mises_out: wp.array(dtype=wp.float32),
     plastic_out: wp.array(dtype=wp.float32),
 ):
-    """Mean over the elements around each node of the values at its corners, and the von Mises stress of the mean."""
+    """Mean over the elements around each node of the values at its corners, and the von Mises stress of the mean.
+
+    Nodes of rigid bodies have no elements, and show no stress.
+    """
     i = wp.tid()
     total = vec6()
     plastic = wp.float32(0.0)
@@ -40,7 +43,7 @@ def nodal_stress(
         for k in range(6):
             total[k] = total[k] + stress[k, c]
         plastic += stress[6, c]
-    count = wp.float32(offset[i + 1] - offset[i])
+    count = wp.float32(wp.max(offset[i + 1] - offset[i], 1))
     tensor_out[i] = total / count
     von_mises_out[i] = von_mises(total / count)
     plastic_out[i] = plastic / count

@@ -17,3 +17,29 @@ def rotation_matrix(rotation_vector: Sequence[float] | Array) -> Array:
     from scipy.spatial.transform import Rotation  # whose import takes a fifth of a second
 
     return Rotation.from_rotvec(rotation_vector).as_matrix()
+
+
+def best_rotation(a: Array, b: Array, weights: Array) -> Array:
+    """Rotation R, shape (3, 3), float64, with the least sum w |b - R a|^2 (Kabsch, Acta Cryst. A 32 (1976) 922).
+
+    Args:
+        a, b: vectors, shape (count, 3), float64, that span a plane at least.
+        weights: shape (count,), float64.
+    """
+    U, _, W = np.linalg.svd((weights[:, None] * b).T @ a)
+    U[:, 2] *= np.linalg.det(U) * np.linalg.det(W)
+    return np.asarray(U @ W, dtype=np.float64)
+
+
+def mean_pose(points: Array, X: Array, weights: Array) -> tuple[Array, Array, Array]:
+    """Mean positions of a cluster at `points` and at `X`, and the rotation from the one to the other.
+
+    Args:
+        points, X: of its nodes [m], shape (count, 3), float64.
+        weights: s m of each [kg], shape (count,), float64.
+
+    Returns:
+        Shapes (3,), (3,) and (3, 3), float64.
+    """
+    a, b = weights @ points / weights.sum(), weights @ X / weights.sum()
+    return a, b, best_rotation(points - a, X - b, weights)

@@ -159,19 +159,19 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
     """Give each stage its slots; list the slots of the forces on each node, in rising order.
 
     Returns:
-        (The first slot of each node and its second, -1 where it has one, -2 - row where it has more than two, shape
-        (node_count, 2), int32; rows of three more slots, -1 where there are fewer, and the number of the node's rows,
-        shape (row_count, 4), int32.)
+        (The first slot of each node, one beyond all of them where it has none, and its second, -1 where there is none,
+        -2 - row where it has more than two, shape (node_count, 2), int32; rows of three more slots, -1 where there are
+        fewer, and the number of the node's rows, shape (row_count, 4), int32.)
     """
     first = 0
     for stage in stages:
         stage.slot = first
         first += len(stage.slot_node)
-    node = np.concatenate([stage.slot_node for stage in stages])
+    node = np.concatenate([np.zeros(0, np.int32), *(stage.slot_node for stage in stages)])
     slot, count = np.argsort(node, kind="stable").astype(np.int32), np.bincount(node, minlength=node_count)
     begin = np.cumsum(count) - count
     first_slots = np.full((node_count, 2), -1, dtype=np.int32)
-    first_slots[:, 0] = slot[begin]
+    first_slots[:, 0] = np.append(slot, first)[np.where(count > 0, begin, first)]
     first_slots[count == 2, 1] = slot[begin[count == 2] + 1]
     many = np.flatnonzero(count > 2)
     others = count[many] - 1

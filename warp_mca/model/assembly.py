@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,6 +159,7 @@ class Assembly:
         cells: the elements by formulation and strain measure.
         materials: those of the scene; `material` is each element's index among them.
         K, G: moduli [Pa], and volume [m^3], of each element.
+        rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
         mass: lumped masses [kg], shape (node_count,).
     """
 
@@ -173,6 +174,7 @@ class Assembly:
             elements += meshes[body.name].cell_count
         self.element_count = elements
         self.X = np.concatenate([X[body.name] for body in scene.bodies])
+        self.rigid = np.repeat([b.rigid for b in scene.bodies], [meshes[b.name].cell_count for b in scene.bodies])
         self.cells = self._merged_cells()
         self.materials: list[Material] = []
         self.material = np.empty(elements, dtype=np.int32)
@@ -216,13 +218,16 @@ class Assembly:
         width = max(map(len, rows))
         return np.array([(*row, *[0.0] * (width - len(row))) for row in rows])
 
-    def blocks(self) -> tuple[tuple[Block, ...], Index]:
-        """Elements grouped by kernels, those of a patch together, and the order that this gives them."""
-        blocks, order, first = [], [], 0
+    def blocks(self, rigid: bool = False, first: int = 0) -> tuple[tuple[Block, ...], Index]:
+        """Elements grouped by kernels, those of a patch together, and the order that this gives them.
+
+        They are those that are computed, or those of `rigid` bodies; `first` is the number of the first one.
+        """
+        blocks, order = [], [np.zeros(0, dtype=np.int32)]
         for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
             flowing = np.array([m.law == law for m in self.materials])[self.material]
             for part in self.cells:
-                mine = np.flatnonzero(flowing[part.index])
+                mine = np.flatnonzero(flowing[part.index] & (self.rigid[part.index] == rigid))
                 if len(mine):
                     if part.element.patches:
                         mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
@@ -244,7 +249,7 @@ class Assembly:
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
         steps = []
-        for part, mass in zip(self.cells, self.element_mass, strict=True):
+        for part, mass in self._computed():
             moduli = self.K[part.index], self.G[part.index]
             contact = at_elements(part.conn, added)
             steps.append(stable_step(part.element, self.X, part.conn, *moduli, mass, contact, part.index))
@@ -252,12 +257,21 @@ class Assembly:
 
     def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
         """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
-        steps = np.empty(self.element_count)
-        for part, mass in zip(self.cells, self.element_mass, strict=True):
+        steps = np.full(self.element_count, np.inf)  # of elements of rigid bodies
+        for part, mass in self._computed():
             moduli = self.K[part.index], self.G[part.index]
             contact = at_elements(part.conn, added)
             steps[part.index] = element_steps(part.element, self.X, part.conn, *moduli, mass, contact, coarse=coarse)
         return steps
+
+    def _computed(self) -> Iterator[tuple[Cells, Array]]:
+        """Cells that are computed, with their lumped masses as `element_mass` has them."""
+        for part, mass in zip(self.cells, self.element_mass, strict=True):
+            kept = ~self.rigid[part.index]
+            if kept.all():
+                yield part, mass
+            elif kept.any():
+                yield Cells(part.element, part.finite, part.conn[kept], part.index[kept]), mass[kept]
 
     def nodes(self, body: str, name: str) -> Index:
         """Nodes of a set of a body's mesh."""

@@ -27,7 +27,7 @@ def join_models(models: Sequence[Model]) -> Model:
     if len(models) == 1:
         return models[0]
     nodes = offsets([model.node_count for model in models])
-    elements = offsets([model.element_count for model in models])
+    elements = offsets([len(model.element_of) for model in models])
     pairs = offsets([len(model.joint_first) for model in models])
     blocks, order, ranges = _blocks(models, nodes, elements)
     fastest = int(np.argmin([model.stable.dt for model in models]))
@@ -77,6 +77,7 @@ def join_models(models: Sequence[Model]) -> Model:
             joints=offsets([len(model.joints) for model in models]),
             elements=ranges,
         ),
+        **_rigid(models, nodes, pairs),
     )
 
 
@@ -85,7 +86,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
     laws = offsets([len(model.law) for model in models])
     # in the order that a scene alone has them in, so that sums over elements come out alike
     kinds = sorted({block.kind for model in models for block in model.blocks})
-    blocks, order, first = [], [], 0
+    blocks, order, first = [], [np.zeros(0, dtype=np.int32)], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
         conn, material, end = [], [], first
@@ -158,6 +159,11 @@ def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, An
             for _, model, _, first in scenes
             for joint in model.joints
         ),
+        "couplings": tuple(
+            replace(item, start=item.start + first, middle=item.middle + first, end=item.end + first)
+            for _, model, _, first in scenes
+            for item in model.couplings
+        ),
         "hinge_loads": tuple(
             replace(load, inner=load.inner + node, outer=load.outer + node, scene=k)
             for k, model, node, _ in scenes
@@ -169,6 +175,34 @@ def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, An
             for base in model.bases
         ),
     }
+
+
+def _rigid(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any]:
+    """Rigid bodies of all scenes, and what binds them; arguments as of `_joints`."""
+    first = offsets([len(model.rigid_bodies) for model in models])
+    bodies = tuple(
+        replace(
+            body,
+            own=body.own + nodes[k],
+            loaded=body.loaded + nodes[k],
+            riders=body.riders + nodes[k],
+            pairs=body.pairs + pairs[k],
+            scene=k,
+        )
+        for k, model in enumerate(models)
+        for body in model.rigid_bodies
+    )
+    rows = tuple(
+        replace(
+            row,
+            first=row.first + int(first[k]),
+            second=row.second if row.second == GROUND else row.second + int(first[k]),
+            pair=row.pair if row.pair < 0 else row.pair + int(pairs[k]),
+        )
+        for k, model in enumerate(models)
+        for row in model.rigid_rows
+    )
+    return {"rigid_bodies": bodies, "rigid_rows": rows}
 
 
 def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
+from warp_mca.model.couplings import Coupling, coupling
 from warp_mca.scene.joints import Joint
-from warp_mca.scene.ties import Rails, Side
+from warp_mca.scene.ties import Clusters, Rails, Side
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +44,8 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
         offset.append(len(time))
 
     for item in parts.scene.fixed:
+        if parts.scene.body(item.body).rigid:
+            continue  # rows hold them
         nodes = parts.nodes(item.body, item.nodes)
         for letter in item.axes:
             k = "xyz".index(letter)
@@ -87,14 +90,17 @@ class _Tied:
     second: Index
     tied: Array
     slides: Index
+    coupling: Coupling | None = None
 
 
-def _tied_pairs(parts: Assembly, joint: Joint) -> _Tied:
-    """What a joint ties."""
+def _tied_pairs(parts: Assembly, joint: Joint, start: int) -> _Tied:
+    """What a joint ties, whose pairs begin at `start`."""
     side = _side(parts, joint.body)
     ties = joint.ties(side, None if joint.other is None else _side(parts, joint.other))
     if isinstance(ties, Rails):
         return _on_rails(parts, joint, ties)
+    if isinstance(ties, Clusters):
+        return _coupled(parts, joint, ties, start)
     a = ties.first + parts.node_start[joint.body]
     b = np.full(len(a), GROUND, dtype=np.int32)
     if joint.other is not None:
@@ -126,8 +132,26 @@ def _on_rails(parts: Assembly, joint: Joint, ties: Rails) -> _Tied:
     return _Tied(np.concatenate(nodes), ground, np.zeros((count, 3, 3)), np.array(slides, dtype=np.int32))
 
 
-def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, ...]]:
-    """Pairs of tied nodes as in `Model`, and the joints that own them.
+def _coupled(parts: Assembly, joint: Joint, clusters: Clusters, start: int) -> _Tied:
+    """Nodes of both clusters as pairs with the ground that are tied in no direction."""
+    bodies = [(joint.body, clusters.first), (joint.other, clusters.second)]
+    sides: list[Side | None] = [None, None]
+    masses: list[Array | None] = [None, None]
+    nodes: list[Index] = []
+    for k, (body, own) in enumerate(bodies):
+        if body is not None and own is not None:
+            first = parts.node_start[body]
+            sides[k] = side = _side(parts, body)
+            masses[k] = parts.mass[first : first + len(side.X)]
+            nodes.append(own + np.int32(first))
+    found = coupling(joint, clusters, sides, masses, start)
+    a = np.concatenate(nodes)
+    ground = np.full(len(a), GROUND, dtype=np.int32)
+    return _Tied(a, ground, np.zeros((len(a), 3, 3)), np.zeros((0, 3), np.int32), found)
+
+
+def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, ...], tuple[Coupling, ...]]:
+    """Pairs of tied nodes as in `Model`, the joints that own them, and those of joints between clusters.
 
     Raises:
         RequestError: a joint finds no nodes, its pairs do not coincide, or a node is tied twice.
@@ -135,7 +159,7 @@ def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, 
     found, joints, start = [], [], 0
     slides = [np.zeros((0, 3), np.int32)]
     for joint in parts.scene.joints:
-        found.append(_tied_pairs(parts, joint))
+        found.append(_tied_pairs(parts, joint, start))
         slides.append(found[-1].slides + np.int32(start))
         joints.append(JointPairs(name=joint.name, start=start, end=start + len(found[-1].first)))
         start = joints[-1].end
@@ -148,7 +172,7 @@ def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, 
     nodes = _nodes_of(pairs)
     if len(np.unique(nodes)) < len(nodes):
         raise RequestError("Scene.joints: a node is tied twice; give each joint, of two bodies, nodes of its own")
-    return pairs, tuple(joints)
+    return pairs, tuple(joints), tuple(item.coupling for item in found if item.coupling is not None)
 
 
 def _nodes_of(pairs: dict[str, NDArray]) -> Index:

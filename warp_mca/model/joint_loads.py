@@ -137,7 +137,10 @@ def movable_bases(
     table = None if chain is None or chain.loads is None else chain.loads.base_velocity
     if chain is None or (table is None and chain.slide is None):
         return ()
-    (pairs,) = [own for own, joint in zip(joints, parts.scene.joints, strict=True) if joint.other is None]
+    ((pairs, joint),) = [own for own in zip(joints, parts.scene.joints, strict=True) if own[1].other is None]
+    if getattr(joint, "pin_radius", None) is not None:
+        remedy = "a base that moves or slides holds nodes on the hinge's axis; choose axis or ends for this hinge"
+        raise bad_value(f"{joint.title}.nodes", "pin", remedy)
     times, velocities = _shifted(table, start, np.zeros((1, 2)))
     direction = np.zeros(3) if chain.slide is None else np.array([*chain.slide, 0.0])
     return (

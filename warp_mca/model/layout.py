@@ -58,5 +58,5 @@ def layout_of(model: Model) -> Layout:
     return Layout(
         nodes=offsets([model.node_count]),
         joints=offsets([len(model.joints)]),
-        elements=np.array([ends], dtype=np.int32),
+        elements=np.array(ends, dtype=np.int32).reshape(1, len(ends), 2),
     )

@@ -39,17 +39,23 @@ class MassScaling:
     plain_dt: float
 
 
-def scale_masses(parts: Assembly, contact: Array) -> tuple[StableStep, MassScaling | None]:
+def scale_masses(parts: Assembly, contact: Array, plain: StableStep) -> tuple[StableStep, MassScaling | None]:
     """Stable step of an assembly, with what `contact` springs add at each node [1/s^2]; raises its masses if asked for.
 
     An element whose eigenvalue exceeds that of the wanted step w, omega_w^2 = (2 / dt_w)^2, has its lumped masses
     multiplied by their ratio. Contact springs count with the mass of the nodes: masses grow until
     lambda_e / s_e + contact_e <= omega_w^2 for all elements. The step is safe: added mass never lowers one, and
-    lambda_e is exact or an upper bound.
+    lambda_e is exact or an upper bound. `plain` is the step without.
+
+    Raises:
+        RequestError: the scene has rigid bodies.
     """
-    plain, asked = parts.stable(contact), parts.scene.impact.mass_scaling
+    asked = parts.scene.impact.mass_scaling
     if asked is None:
         return plain, None
+    if parts.rigid.any():
+        remedy = "rigid bodies must keep their mass; leave mass_scaling out, or Body.rigid"
+        raise bad_value("ImpactPhase.mass_scaling", asked, remedy)
     wanted = float(asked.rstrip("s")) if isinstance(asked, str) else asked * plain.dt
     before, count, stable = parts.mass.copy(), 0, replace(plain, dt=max(wanted, plain.dt))
     slow = [_Slow(parts, k, contact, (2.0 / stable.dt) ** 2) for k in range(len(parts.cells))]

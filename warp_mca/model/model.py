@@ -15,9 +15,12 @@ from warp_mca.model.absorbing import AbsorbingNodes, absorbing_nodes
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
 from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
 from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling, check_masses, scale_masses
+from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_step import stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.scene import Contact, RigidPlane, Scene
@@ -57,6 +60,8 @@ class Model:
         joint_slides: of each rail the first of its sliders, the first of its own nodes and the end of these in
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
         joints: name of each joint and its pairs.
+        couplings: of joints between clusters of nodes; their pairs count as tied in no direction. Those of rigid bodies
+            are in `rigid_rows`.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
         absorbing: nodes of absorbing boundaries.
@@ -71,6 +76,9 @@ class Model:
         stable: the stable time step.
         scaling: what mass scaling added to `mass`, or None.
         batch: where the scenes of a batch lie, or None for a model of one scene.
+        rigid_bodies, rigid_rows: rigid bodies, those of each scene in turn, and what binds them.
+        rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
+            in a batch.
     """
 
     X: Array
@@ -90,6 +98,7 @@ class Model:
     joint_tied: Array
     joint_slides: Index
     joints: tuple[JointPairs, ...]
+    couplings: tuple[Coupling, ...]
     hinge_loads: tuple[HingeLoad, ...]
     bases: tuple[MovableBase, ...]
     absorbing: AbsorbingNodes
@@ -103,6 +112,9 @@ class Model:
     stable: StableStep
     scaling: MassScaling | None = None
     batch: Layout | None = None
+    rigid_bodies: tuple[RigidBody, ...] = ()
+    rigid_rows: tuple[RigidRow, ...] = ()
+    rigid_blocks: tuple[Block, ...] = ()
 
     def owner(self, element: int) -> tuple[str, int]:
         """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""
@@ -116,8 +128,8 @@ class Model:
 
     @property
     def element_count(self) -> int:
-        """Number of elements."""
-        return len(self.element_of)
+        """Number of elements that are computed."""
+        return sum(block.conn.shape[1] for block in self.blocks)
 
 
 def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...], Array, Array]:
@@ -241,18 +253,22 @@ def build_model(
     """
     parts = Assembly(scene, meshes, X)
     others = [parts.node_start[body] + node for body, node in watched]
-    pairs, joints = join_bodies(parts)
+    pairs, joints, couplings = join_bodies(parts)
     bases = movable_bases(parts, joints, chain, start)
+    check_loads(scene, chain, bases)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
     blocks, order = parts.blocks()
+    rigid_blocks, rigid_order = parts.blocks(rigid=True, first=len(order))
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
-    stable, scaling = scale_masses(parts, added)
+    bodies, rows = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
+    stable, scaling = scale_masses(parts, added, plain)
     check_masses(parts, scaling)
     return Model(
         X=parts.X,
@@ -263,6 +279,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
+        couplings=flexible(couplings, pairs, bodies),
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
         absorbing=absorbing,
@@ -272,8 +289,11 @@ def build_model(
         points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target), *others], dtype=np.int32),
         node_start=parts.node_start,
         element_start=parts.element_start,
-        element_of=order,
+        element_of=np.concatenate([order, rigid_order]),
         stable=stable,
         scaling=scaling,
         batch=None,
+        rigid_bodies=bodies,
+        rigid_rows=rows,
+        rigid_blocks=rigid_blocks,
     )

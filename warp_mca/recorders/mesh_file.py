@@ -96,9 +96,10 @@ def cells(model: Model) -> tuple[list[tuple[CellType, NDArray[np.int64]]], NDArr
 
     Cells come in the order of the concatenated meshes, which is not the model's.
     """
-    nodes = np.full((model.element_count, MAX_CORNERS), -1, dtype=np.int64)
-    material = np.empty(model.element_count, dtype=np.int32)
-    for block in model.blocks:
+    count = len(model.element_of)
+    nodes = np.full((count, MAX_CORNERS), -1, dtype=np.int64)
+    material = np.empty(count, dtype=np.int32)
+    for block in (*model.blocks, *model.rigid_blocks):
         index = model.element_of[block.first : block.first + block.conn.shape[1]]
         nodes[index, : len(block.conn)] = block.conn.T
         material[index] = block.material
@@ -109,7 +110,7 @@ def cells(model: Model) -> tuple[list[tuple[CellType, NDArray[np.int64]]], NDArr
         cell = CELL_TYPES[str(names[first])]
         runs.append((cell, nodes[first:end][:, cell.own_corners]))
     start = list(model.element_start.values())
-    body = np.searchsorted(start, np.arange(model.element_count), side="right") - 1
+    body = np.searchsorted(start, np.arange(count), side="right") - 1
     return runs, body.astype(np.int32), material
 
 

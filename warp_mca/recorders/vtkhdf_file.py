@@ -192,7 +192,7 @@ def _write_mesh(root: h5py.Group, model: Model) -> None:
     runs, body, material = cells(model)
     sizes = np.concatenate([np.full(len(nodes), nodes.shape[1]) for _, nodes in runs])
     root["NumberOfPoints"] = np.array([model.node_count])
-    root["NumberOfCells"] = np.array([model.element_count])
+    root["NumberOfCells"] = np.array([len(model.element_of)])
     root["NumberOfConnectivityIds"] = np.array([sizes.sum()])
     root["Points"] = model.X
     root["Connectivity"] = np.concatenate([nodes.ravel() for _, nodes in runs])

@@ -74,7 +74,7 @@ Found = dict[tuple[int, Line, float], Place]  # by mesh, line and spacing
 
 
 def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found | None = None) -> Probes:
-    """Find the elements that the scene's paths run through.
+    """Find the elements that the scene's paths run through; see `Scene.stress_paths`.
 
     Args:
         scene, model, meshes: of one run.
@@ -87,7 +87,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
     corner, weight = [np.zeros((0, MAX_CORNERS), np.int32)], [np.zeros((0, MAX_CORNERS))]
     found = {} if found is None else found
     boxes: dict[str, dict[str, Boxes]] = {}
-    for path in scene.paths:
+    for path in scene.stress_paths:
         along = []
         for line in path.lines:
             mesh = meshes[line.body]

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.rotation import mean_pose
 from warp_mca.rigid.body_motion import BodyMotion, body_motion
 from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, mesh_link, perpendicular
 from warp_mca.rigid.placement import Placement, link_placements
+from warp_mca.scene.ties import pin_weights
 
 MAX_ITERATIONS = 50  # of the fit of the angles; elastic shapes need three or four
 
@@ -123,20 +125,27 @@ def carriage_motion(chain: Chain, t: float, points: Array, positions: Array, vel
     return (float(way @ e), float(rate @ e))
 
 
-def deformed_chain(chain: Chain, reference: Mapping[str, Array], points: Mapping[str, Array]) -> Chain:
-    """The chain with each hinge where the nodes on it have moved in their body's frame.
+def deformed_chain(
+    chain: Chain,
+    reference: Mapping[str, Array],
+    points: Mapping[str, Array],
+    nodal_masses: Mapping[str, Array],
+    pins: Sequence[float],
+) -> Chain:
+    """The chain with each hinge where its nodes have moved in their body's frame.
 
     Args:
         chain: whose hinges lie where they do in the reference shape.
         reference: shape of each link in its body's frame without deformation [m], each shape (node_count, 3), float64.
         points: the same, deformed.
+        nodal_masses: lumped masses by body name [kg], each shape (node_count,), float64.
+        pins: radius of the pin of each link's inbound hinge [m], 0 where it has none (`scene_chain.pin_radii`).
     """
     links = []
-    for link in chain.links:
-        shift = {
-            end: _moved(reference[link.body], points[link.body], np.add(link.hinge_in, arm))
-            for end, arm in (("in", (0.0, 0.0)), ("out", link.hinge_out))
-        }
+    for k, link in enumerate(chain.links):
+        nodes = reference[link.body], points[link.body], nodal_masses[link.body]
+        ends = (("in", (0.0, 0.0), pins[k]), ("out", link.hinge_out, pins[k + 1] if k + 1 < len(pins) else 0.0))
+        shift = {end: _moved(*nodes, np.add(link.hinge_in, arm), pin) for end, arm, pin in ends}
         hinge_in, hinge_out = link.hinge_in + shift["in"], link.hinge_out + shift["out"] - shift["in"]
         links.append(replace(link, hinge_in=_pair(hinge_in), hinge_out=_pair(hinge_out)))
     return replace(chain, links=tuple(links))
@@ -146,8 +155,16 @@ def _pair(vector: Array) -> Vec2:
     return (float(vector[0]), float(vector[1]))
 
 
-def _moved(reference: Array, points: Array, hinge: Array) -> Array:
-    """Mean displacement of the nodes on a hinge axis [m], shape (2,), float64; 0 if there are none."""
+def _moved(reference: Array, points: Array, masses: Array, hinge: Array, pin: float) -> Array:
+    """Mean displacement of the nodes on a hinge axis [m], shape (2,), float64; 0 if there are none.
+
+    That of a pin is that of the axis which follows the mean motion of the nodes around it.
+    """
+    if pin > 0.0:
+        weights = masses * pin_weights(reference, (float(hinge[0]), float(hinge[1]), 0.0), (0.0, 0.0, 1.0), pin)
+        centre, moved, R = mean_pose(reference, points, weights)
+        arm = np.append(hinge, centre[2]) - centre
+        return np.asarray((moved + R @ arm)[:2] - hinge, dtype=np.float64)
     on_axis = _on_axis(reference, hinge)
     return (points - reference)[on_axis, :2].mean(axis=0) if on_axis.any() else np.zeros(2)
 

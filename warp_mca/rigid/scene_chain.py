@@ -77,6 +77,12 @@ def chain_from_scene(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Map
     )
 
 
+def pin_radii(scene: Scene) -> tuple[float, ...]:
+    """Radius of the pin in each hinge of the scene's chain, from the ground outwards [m]; 0 where it has none."""
+    radii = {joint.name: joint.pin_radius or 0.0 for joint in _hinges(scene)}
+    return tuple(radii[span.joint] for span in _spans(scene))
+
+
 def release(rigid: RigidPhase) -> tuple[Array, Array]:
     """Coordinates of the chain at its release and their rates, each shape (coordinate_count,), float64."""
     slide = rigid.slide

@@ -54,6 +54,12 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
                 f"{count} nodes of body {body.name} lie where others of it do: unless cracks are meant, merge the "
                 "parts of its mesh, which hang together at shared nodes only"
             )
+    unstressed = [path.name for path in scene.paths if path not in scene.stress_paths]
+    if unstressed:
+        rigid = " and ".join(
+            sorted({line.body for path in scene.paths for line in path.lines} & set(scene.rigid_names))
+        )
+        found.append(f"{', '.join(unstressed)} leave out their lines in {rigid}: rigid bodies have no stress")
     for contact in scene.contacts:
         if (ratio := _coarser(contact, meshes)) > COARSER:
             found.append(

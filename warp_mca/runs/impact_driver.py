@@ -154,7 +154,11 @@ class ImpactDriver:
 def open_time(setup: Setup) -> float:
     """How long all contacts must be open for an impact to end [s]: as the scene says, or the longest bending period."""
     asked = setup.scene.impact.open_time
-    return max(bending_period(setup, link.body) for link in setup.chain.links) if asked is None else asked
+    if asked is not None:
+        return asked
+    links = [link.body for link in setup.chain.links]
+    bends = [name for name in links if not setup.scene.body(name).rigid] or links
+    return max(bending_period(setup, name) for name in bends)
 
 
 def bending_period(setup: Setup, name: str) -> float:

@@ -1,7 +1,8 @@
 """Owns the shape that bodies keep between two impacts: the equilibrium of their elements with the plastic strain.
 
-The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground, on a base or on held axes
-stay where they are. Forces are those of the elements in float64, whatever the precision of the run.
+The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground, on a base, on held axes
+or of rigid bodies stay where they are. Hinges with pins give no forces, as the bodies of an open chain hold none
+against each other. Forces are those of the elements in float64, whatever the precision of the run.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from warp_mca.model.assembly import GROUND
 from warp_mca.model.model import Model
+from warp_mca.model.rigid_bodies import moves_with_rigid
 from warp_mca.rigid.equilibrium import equilibrium
 from warp_mca.runs.settings import Settings
 from warp_mca.solve.solver import Solver
@@ -61,12 +63,16 @@ class Relaxation:
         self.solver = Solver(model, device=settings.device, precision="float64", dt=dt, threads=settings.threads)
         self.solver.compile()
         self.base, self.trial = self.solver.new_state(), self.solver.new_state()
-        second = model.joint_second
-        self.tied = np.flatnonzero(second != GROUND)
+        second, tied = model.joint_second, np.ones(len(model.joint_first), dtype=bool)
+        for item in model.couplings:
+            tied[item.start : item.end] = False
+        self.rigid = moves_with_rigid(model)
+        self.ground = model.joint_first[(second == GROUND) & tied & ~self.rigid[model.joint_first]]
+        self.tied = np.flatnonzero((second != GROUND) & ~self.rigid[model.joint_first])
         self.held = np.stack([(model.fixed_axes >> axis & 1).astype(bool) for axis in range(3)], axis=1)
         self.held[model.prescribed_node, model.prescribed_axis] = True
-        self.held[model.joint_first[second == GROUND]] = True
-        self.grounded = model.joint_first[(second == GROUND) & model.joint_tied.any(axis=(1, 2))]  # not on a base
+        self.held[self.ground] = True
+        self.held[self.rigid] = True
         self.held[second[self.tied]] = True  # they follow the first node of their pair
         self.masses = model.mass.copy()
         np.add.at(self.masses, model.joint_first[self.tied], model.mass[second[self.tied]])
@@ -109,7 +115,10 @@ class Relaxation:
         first, second = model.joint_first[self.tied], model.joint_second[self.tied]
         share = (model.mass[second] / (model.mass[first] + model.mass[second]))[:, None]
         found[first] += share * (u[second] - u[first])
-        found[model.joint_first[model.joint_second == GROUND]] = 0.0
+        found[self.ground] = 0.0
+        for body in model.rigid_bodies:
+            ends = model.joint_first[body.pairs], model.joint_second[body.pairs]
+            found[body.riders] = u[np.where(ends[0] == body.riders, ends[1], ends[0])]
         return self._followed(found)
 
     def _followed(self, u: Array) -> Array:
@@ -138,6 +147,7 @@ class Relaxation:
         force = self.model.mass[:, None] * (self.trial.v.numpy() - self.model.gravity[0])
         force[first] += force[second]
         force[second] = 0.0
+        force[self.rigid] = 0.0
         return force
 
     def _energy(self, u: Array) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import HandBack, carriage_motion, deformed_chain, hand_back
+from warp_mca.rigid.scene_chain import pin_radii
 from warp_mca.runs.cycle_setup import Setup
 from warp_mca.runs.motion import Motion
 from warp_mca.runs.parts import ImpactPart
@@ -88,7 +89,7 @@ def _fit(
     still = {name: np.zeros_like(x) for name, x in rest.items()}
     shapes = hand_back(setup.chain, points, setup.masses, rest, still, **common).displacements
     deformed = {name: points[name] + shapes[name] for name in points}
-    chain = deformed_chain(setup.chain, points, deformed)
+    chain = deformed_chain(setup.chain, points, deformed, setup.masses, pin_radii(setup.scene))
     return shapes, hand_back(chain, deformed, setup.masses, now, velocities, **common)
 
 

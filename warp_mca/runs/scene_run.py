@@ -69,7 +69,7 @@ class SceneRun:
         try:
             self.ledger.read(written, self.solver.layout.records(records, self.index))
         finally:
-            if self.ready.scene.paths:
+            if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
@@ -105,13 +105,15 @@ class SceneRun:
             "threads": self.solver.threads,
             "refine": scene.refine,
         }
+        if scene.rigid_names:
+            more["rigid_bodies"] = scene.rigid_names
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= mass_report(scene, model)
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
-        if scene.paths:
-            body = scene.body(scene.paths[0].lines[0].body)
+        if scene.stress_paths:
+            body = scene.body(scene.stress_paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
         return RunFacts(
             scene=scene.name,
@@ -123,7 +125,7 @@ class SceneRun:
             wall=wall,
             device=f"{self.solver.device} ({wp.get_device(self.solver.device).name})",
             precision=self.solver.precision,
-            element=" ".join(sorted({block.element for block in model.blocks})),
+            element=" ".join(sorted({block.element for block in model.blocks})) or "none",
             energy_error=ledger.kept.energy_error,
             energy=ledger.energy(),
             max_plastic_strain=max_plastic_strain(self.solver, self.state, self.index),

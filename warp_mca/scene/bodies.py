@@ -20,7 +20,7 @@ Vec3 = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A deformable body.
+    """A deformable body, or a rigid one.
 
     Attributes:
         name: unique in the scene.
@@ -35,6 +35,8 @@ class Body:
         rotation: of the body frame, as a rotation vector [rad].
         velocity: initial velocity of the body frame's origin [m/s].
         angular_velocity: initial angular velocity about the body frame's origin [rad/s].
+        rigid: whether it moves as a rigid body in the impact phase: its elements are not computed, and `material` gives
+            its mass and the stiffness of contact springs alone.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Body:
     rotation: Vec3 = (0.0, 0.0, 0.0)
     velocity: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
+    rigid: bool = False
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -61,6 +64,7 @@ class Body:
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         if self.kinematics not in ("corotational", "finite"):
             raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
+        validate.flags(f"Body {self.name}", rigid=self.rigid)
         validate.vectors(
             f"Body {self.name}",
             position=self.position,

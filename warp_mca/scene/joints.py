@@ -16,7 +16,7 @@ import numpy as np
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.ties import Index, Rails, Side, Ties, coincident, rails_along
+from warp_mca.scene.ties import Clusters, Index, Rails, Side, Ties, coincident, rails_along
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +48,8 @@ class Joint(ABC):
         return f"{type(self).__name__} {self.name}"
 
     @abstractmethod
-    def ties(self, first: Side, second: Side | None) -> Ties | Rails:
-        """Pairs that the joint ties, or nodes on rails; `second` is None for the ground.
+    def ties(self, first: Side, second: Side | None) -> Ties | Rails | Clusters:
+        """Pairs that the joint ties, nodes on rails, or clusters; `second` is None for the ground.
 
         Raises:
             RequestError: the bodies have no such nodes.
@@ -58,29 +58,42 @@ class Joint(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Revolute(Joint):
-    """A hinge ("re-joint"): pairs of coincident nodes on the hinge axis move as one.
+    """A hinge ("re-joint"): pairs of coincident nodes on the hinge axis move as one, or the mean of those around it.
 
     Attributes:
         at: a point of the hinge axis in the frame of `body` [m].
         other_at: the same point in the frame of `other` [m].
         axis: direction of the hinge axis in the frame of both bodies [-].
-        nodes: "axis" ties every node on the axis, as a pin does; "ends" the two outermost pairs, as the paper does.
+        nodes: "axis" ties every node on the axis; "ends" the two outermost pairs, as the paper does; "pin" ties the
+            mean motion of all nodes near the axis, which need not coincide.
+        pin_radius: distance from the axis up to which "pin" takes nodes [m]; their weight decreases from 1 on the axis
+            to 0 there.
     """
 
     at: Vec3
     other_at: Vec3 = (0.0, 0.0, 0.0)
     axis: Vec3 = (0.0, 0.0, 1.0)
-    nodes: Literal["axis", "ends"] = "axis"
+    nodes: Literal["axis", "ends", "pin"] = "axis"
+    pin_radius: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.vectors(self.title, at=self.at, other_at=self.other_at, axis=self.axis)
         _check_direction(f"{self.title}.axis", self.axis)
-        if self.nodes not in ("axis", "ends"):
-            raise bad_value(f"{self.title}.nodes", self.nodes, "choose axis or ends")
+        if self.nodes not in ("axis", "ends", "pin"):
+            raise bad_value(f"{self.title}.nodes", self.nodes, "choose axis, ends or pin")
+        if (self.pin_radius is not None) != (self.nodes == "pin"):
+            remedy = "give the radius of the pin [m]" if self.nodes == "pin" else 'it needs nodes="pin"; leave it out'
+            raise bad_value(f"{self.title}.pin_radius", self.pin_radius, remedy)
+        if self.pin_radius is not None:
+            validate.positive(self.title, pin_radius=self.pin_radius)
 
-    def ties(self, first: Side, second: Side | None) -> Ties:
-        """Nodes on the axis, in the order along it."""
+    def ties(self, first: Side, second: Side | None) -> Ties | Clusters:
+        """Nodes on the axis, in the order along it, or those around it."""
+        if self.pin_radius is not None:
+            a = first.around_axis(self.at, self.axis, self.pin_radius)
+            b = (None, None) if second is None else second.around_axis(self.other_at, self.axis, self.pin_radius)
+            return Clusters(*a, self.at, self.axis, *b, self.other_at)
         a = self._nodes(first, self.at)
         if len(a) < 2:
             what = f"{len(a)} nodes of {self.body} lie on this axis; two are needed"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import NoneType
 
 from warp_mca.base import validate
@@ -143,6 +143,17 @@ class Scene:
             if isinstance(self.rigid.target, Surface):
                 named.append(("RigidPhase.target.body", self.rigid.target.body))
         return named
+
+    @property
+    def rigid_names(self) -> list[str]:
+        """Bodies that move as rigid ones in the impact phase."""
+        return [body.name for body in self.bodies if body.rigid]
+
+    @property
+    def stress_paths(self) -> tuple[Path, ...]:
+        """The paths without their lines in rigid bodies, which have no stress; those that have no line left are out."""
+        kept = [[line for line in path.lines if not self.body(line.body).rigid] for path in self.paths]
+        return tuple(replace(path, lines=tuple(lines)) for path, lines in zip(self.paths, kept, strict=True) if lines)
 
     def body(self, name: str) -> Body:
         """The body of that name."""

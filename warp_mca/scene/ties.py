@@ -1,4 +1,4 @@
-"""Owns what a joint returns, pairs of tied nodes or nodes on rails, and what it may read of its bodies."""
+"""Owns what a joint returns, tied nodes, nodes on rails or clusters, and what it may read of its bodies."""
 
 from __future__ import annotations
 
@@ -49,6 +49,12 @@ class Side:
         nodes = np.flatnonzero(away <= self.tolerance)
         return nodes[np.argsort(along[nodes])].astype(np.int32)
 
+    def around_axis(self, at: Vec3, axis: Vec3, radius: float) -> tuple[Index, Array]:
+        """Nodes within a radius [m] of such an axis, and the `pin_weights` of these."""
+        weight = pin_weights(self.mesh.points, at, axis, radius)
+        nodes = np.flatnonzero(weight > 0.0)
+        return nodes.astype(np.int32), weight[nodes]
+
 
 @dataclass(frozen=True)
 class Ties:
@@ -78,6 +84,47 @@ class Rails:
 
     sliders: tuple[Index, ...]
     rails: tuple[Index, ...]
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """Nodes near a hinge, of the joint's body and of the other one or the ground, that share a mean motion.
+
+    The means coincide at a point and in the direction of an axis; meshes need not match.
+
+    Attributes:
+        first: nodes of the joint's body, in the numbering of its mesh, shape (count,), int32.
+        first_weight: of each of these beside its mass [-], shape (count,), float64.
+        at: the point in the frame of the joint's body [m].
+        axis: direction of the hinge in that frame [-].
+        second: nodes of the other body, likewise; None for the ground.
+        second_weight: of each of these [-], shape (count,), float64; None for the ground.
+        other_at: the point in the frame of the other body [m].
+    """
+
+    first: Index
+    first_weight: Array
+    at: Vec3
+    axis: Vec3
+    second: Index | None = None
+    second_weight: Array | None = None
+    other_at: Vec3 = (0.0, 0.0, 0.0)
+
+
+def pin_weights(points: Array, at: Vec3, axis: Vec3, radius: float) -> Array:
+    """Weights (1 - (r / radius)^2)^2 of points at the distance r from an axis through `at`, shape (count,); 0 beyond.
+
+    The weight and its slope are 0 at the radius, so that sums over the nodes, which lumped masses make quadratures,
+    change smoothly with the mesh.
+
+    Args:
+        points: [m], shape (count, 3), float64.
+        at, axis: in the same frame [m].
+        radius: [m].
+    """
+    offset, direction = points - np.asarray(at), np.asarray(axis) / np.linalg.norm(axis)
+    square = (offset**2).sum(axis=1) - (offset @ direction) ** 2
+    return np.asarray(np.maximum(1.0 - square / radius**2, 0.0) ** 2, dtype=np.float64)
 
 
 def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:

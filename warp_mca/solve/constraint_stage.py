@@ -11,6 +11,7 @@ import warp as wp
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.nodes.node import BOUND, TOUCHABLE
 from warp_mca.model.layout import Layout
+from warp_mca.model.rigid_bodies import rigid_nodes
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -37,8 +38,9 @@ class ConstraintStage:
     """What `kernels.nodes.node` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
 
     Attributes:
-        count: tied pairs and driven nodes.
+        count: tied pairs and driven nodes; 0 where all pairs hold nodes of rigid bodies.
         partial: whether some pairs are tied in some directions only.
+        skips: whether some pairs are not advanced here, because they hold nodes of a rigid body.
         rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
         bonds: pairs, driven nodes and their tables.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
@@ -51,23 +53,28 @@ class ConstraintStage:
         """Allocate on the current device."""
         nodes, place = np.unique(model.prescribed_node, return_inverse=True)
         self.pairs, self.driven = len(model.joint_first), len(nodes)
-        self.count = self.pairs + self.driven
+        rigid = rigid_nodes(model)
+        held = rigid[model.joint_first] | (rigid[model.joint_second] & (model.joint_second >= 0))  # by `RigidStage`
+        self.count = 0 if held.all() and not self.driven else self.pairs + self.driven
         role = model.fixed_axes.astype(np.uint8)
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
             role[item.master] |= TOUCHABLE
         absorbing = model.absorbing.node
-        if not self.count and not len(absorbing) and not role.any():
+        if not self.count and not len(absorbing) and not role.any() and not rigid.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)
         for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes, absorbing):
             role[bound] |= BOUND
+        if rigid.any():
+            role[rigid] |= BOUND
         self.role = wp.array(role, dtype=wp.uint8)
         begin, end = (np.full((len(nodes), 3), -1, dtype=np.int32) for _ in range(2))
         begin[place, model.prescribed_axis] = model.table_offset[model.prescribed_table]
         end[place, model.prescribed_axis] = model.table_offset[model.prescribed_table + 1]
         self.bonds = Bonds()
-        self.bonds.first = wp.array(model.joint_first, dtype=wp.int32)
+        self.skips = bool(held.any())
+        self.bonds.first = wp.array(np.where(held, -1, model.joint_first), dtype=wp.int32)
         self.bonds.second = wp.array(model.joint_second, dtype=wp.int32)
         self.partial = bool((model.joint_tied != np.eye(3)).any())
         self.bonds.tied = wp.array(model.joint_tied if self.partial else model.joint_tied[:0], dtype=wp.mat33d)

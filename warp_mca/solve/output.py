@@ -43,7 +43,7 @@ class NodalStress:
                 self.parts.append((stage, wp.array(element, dtype=wp.int32), first))
             corner.append(local[stage.block.conn[:, element]].T.ravel())
             first += stage.corners * len(element)
-        flat = np.concatenate(corner)
+        flat = np.concatenate([np.zeros(0, np.int32), *corner])
         slot = np.argsort(flat, kind="stable")[np.count_nonzero(flat < 0) :]
         offset = np.searchsorted(flat[slot], np.arange(len(nodes) + 1))
         self.offset = wp.array(offset, dtype=wp.int32)

@@ -26,6 +26,7 @@ from warp_mca.model.model import Model
 from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
@@ -33,6 +34,7 @@ from warp_mca.solve.node_stage import NodeStage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
+from warp_mca.solve.rigid_stage import RigidStage
 from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.threads import ELEMENTS as RANGE
@@ -55,7 +57,9 @@ class Solver:
         elements, contacts: stages of the model's blocks and contact passes.
         constraints: what binds nodes.
         absorbing: absorbing boundaries.
+        couplings: joints between clusters of nodes.
         loads: what acts in the joints of chains, and moves their bases.
+        rigid: rigid bodies.
         output: what is read off the state for paths and recorders, or None.
     """
 
@@ -69,7 +73,7 @@ class Solver:
             raise bad_value("precision", precision, "choose mixed or float64")
         self.model, self.device, self.precision, self.dt = model, check_device(device), precision, dt
         self.layout = layout_of(model)
-        largest = max(block.conn.shape[1] for block in model.blocks)
+        largest = max((block.conn.shape[1] for block in model.blocks), default=0)
         self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
         self.output: Output | None = None
         with wp.ScopedDevice(self.device):
@@ -92,7 +96,9 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
+        self.couplings = CouplingStage(model, self.work, self.constraints, self.dt)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
+        self.rigid = RigidStage(model, self.work, self.precision, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision, self.dt)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
@@ -102,7 +108,7 @@ class Solver:
     @property
     def _early(self) -> int:
         """Rounds of patches that the elements take, where nothing else waits for the nodes."""
-        if self.contacts or self.constraints.count or len(self.model.absorbing.node):
+        if self.contacts or self.constraints.count or self.rigid.count or len(self.model.absorbing.node):
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
 
@@ -130,8 +136,10 @@ class Solver:
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
         advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
         advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
+        advance += [Stage("couplings", self.couplings.couple, BESIDE)] if self.couplings.count else []
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
         advance += self.absorbing.stages()
+        advance += [Stage("rigid bodies", self.rigid.advance, BESIDE)] if self.rigid.count else []
         advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
             Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
@@ -165,8 +173,10 @@ class Solver:
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],
                 constraints=self.constraints.new_state(),
+                couplings=self.couplings.new_state(),
                 loads=self.loads.new_state(),
                 absorbing=self.absorbing.new_state(),
+                rigid=self.rigid.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
@@ -186,6 +196,7 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
         sums = self.records.kernels() + self.loads.kernels() + self.absorbing.record_kernels()
+        sums += self.couplings.kernels() + self.rigid.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
@@ -218,6 +229,8 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
             self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.constraints.at_rest)
+            if self.rigid.count:
+                self.rigid.start(state)
             if self.model.hinge_loads:
                 self.loads.torques(state, -0.5 * self.dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start

@@ -26,8 +26,10 @@ from warp_mca.elements.state import ElementState
 from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
+from warp_mca.solve.coupling_stage import CouplingState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
+from warp_mca.solve.rigid_stage import RigidState
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -50,8 +52,10 @@ class State:
         elements: of each block, `ElementState`.
         contacts: of each contact pass, `ContactState`.
         constraints: of joints and driven nodes, `ConstraintState`.
+        couplings: of joints between clusters of nodes, `CouplingState`.
         loads: of torques in hinges and of movable bases, `LoadState`.
         absorbing: of absorbing boundaries, `AbsorbingState`.
+        rigid: of rigid bodies, `RigidState`.
         steps: steps taken since the start of the phase [-].
         scenes: what each scene has recorded so far, `records.SceneRecords`.
     """
@@ -64,15 +68,17 @@ class State:
     elements: list[ElementState]
     contacts: list[ContactState]
     constraints: ConstraintState
+    couplings: CouplingState
     loads: LoadState
     absorbing: AbsorbingState
+    rigid: RigidState
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
 
     @property
     def _scalar(self) -> str:
-        """Type of the numbers that elements compute with."""
-        return str(self.elements[0].extreme.dtype.__name__)
+        """Type of the numbers that elements compute with; that of all others where there are none."""
+        return str(self.elements[0].extreme.dtype.__name__) if self.elements else "float64"
 
     def arrays(self) -> dict[str, Any]:
         """Device arrays by name, as `elements/0/history`; of `normal_force` what lasts."""

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 def max_plastic_strain(solver: Solver, state: State, scene: int = 0) -> float:
     """Greatest equivalent plastic strain of any integration point of a scene [-]."""
     ranges = zip(solver.elements, solver.layout.elements[scene].tolist(), strict=True)
-    return max(s.max_plastic_strain(state, slice(a - s.block.first, b - s.block.first)) for s, (a, b) in ranges)
+    found = (s.max_plastic_strain(state, slice(a - s.block.first, b - s.block.first)) for s, (a, b) in ranges)
+    return max(found, default=0.0)
 
 
 def max_penetration(solver: Solver, state: State, scene: int = 0) -> float:

@@ -47,7 +47,8 @@ class Workspace:
         self.heavy_mass = wp.array(heavy_mass(model), dtype=wp.float64) if model.scaling else self.mass
         self.law = wp.array(limited(model.law, precision), dtype=t.real)
         self.first_slots, self.more_slots = wp.array(first_slots, dtype=wp.vec2i), wp.array(more_slots, dtype=wp.vec4i)
-        self.force = wp.zeros(slots, dtype=t.vec3)
+        # one slot more, without force, for nodes without elements
+        self.force = wp.zeros(slots + bool(model.rigid_bodies), dtype=t.vec3)
         self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)

@@ -186,12 +186,28 @@ class _Ends:
 )
 def fe_double_pendulum(setup: Setup) -> list[Row]:
     """Links of 1 m x 0.2 m x 0.1 m, 1000 and 2000 kg/m^3, E = 200 MPa and four times that; 0.4 s under gravity."""
+    return _swinging_links(setup)
+
+
+@case(
+    group="rigid",
+    title="The same double pendulum with pins, which join the mean motion of the nodes around each hinge axis",
+    reference="The rigid chain, verified by itself above.",
+    catches=("pin_pulls_at_the_mean", "pin_stays_upright"),
+)
+def pinned_double_pendulum(setup: Setup) -> list[Row]:
+    """Four cells along the depth in place of two; pins of 80 mm."""
+    return _swinging_links(setup, joint_nodes="pin", pin_radius=0.08, deep=4)
+
+
+def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
+    """Tip, hinge A and kinetic energy at the end of a swing, for links of rising stiffness."""
     from warp_mca.model.model import nodal_masses
     from warp_mca.runs.simulation import mesh
 
     moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))
     start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}
-    scenes = [setup.scene("double_pendulum", E=E, length=LENGTH, duration=SPAN, **start) for E in moduli]
+    scenes = [setup.scene("double_pendulum", E=E, length=LENGTH, duration=SPAN, **start, **parameters) for E in moduli]
     meshes = mesh(scenes[0])
     tip_exact, hinge_exact, kinetic_exact = _rigid_pendulum(meshes, nodal_masses(scenes[0], meshes))
     tip, hinge, kinetic = [], [], []

@@ -234,6 +234,18 @@ MUTATIONS: dict[str, Mutation] = {
         "return (m_a * a + m_b * b) / (m_a + m_b)",
         "return wp.float64(0.5) * (a + b)",
     ),
+    "pin_pulls_at_the_mean": Mutation(
+        "the impulse of a pin acts at the mean position of a cluster in place of the hinge",
+        "kernels/nodes/cluster.py",
+        "pull(begin[0], begin[1], lane, place, a, J, wp.cross(arm_P, J) + T,",
+        "pull(begin[0], begin[1], lane, place, a, J, T,",
+    ),
+    "pin_stays_upright": Mutation(
+        "the arm from the mean position of a cluster to its hinge does not turn with the body",
+        "kernels/nodes/cluster.py",
+        "orientation_out[j, 0] = turned(q_a, dt * spin)",
+        "orientation_out[j, 0] = q_a",
+    ),
     "beta_swapped": Mutation(
         "isotropic and kinematic hardening are swapped: 1 - beta is taken for beta",
         "warp_mca/scene/materials.py",

@@ -1,0 +1,227 @@
+"""Owns rigid bodies in a step: forces on their nodes become momentum and spin, and their motion that of their nodes.
+
+Nodes of flexible bodies that joints tie to those of a rigid body ride on it: they have part in its mass and inertia,
+and the forces of their elements act on it. `rigid_motion` has the equations, `rigid_rows` joints between rigid bodies.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.joint_torque import block_sum, wait_for_block
+from warp_mca.kernels.nodes.node import gather_function, take_contact
+from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
+from warp_mca.kernels.nodes.rigid_rows import RigidRows, factorise, place_row, row_lightness, satisfy
+from warp_mca.kernels.records.extremes import keep_speed
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def load_function(precision: str, contact: bool) -> Any:
+    """The function that lets the forces on its nodes act on a body."""
+    vec3 = scalars(precision).vec3
+    gather = gather_function(precision)
+
+    @wp.func
+    def load(
+        b: int,
+        lane: int,
+        kick: wp.float64,
+        bodies: RigidBodies,
+        rotation: wp.array(dtype=wp.quatd),
+        first_slots: wp.array(dtype=wp.vec2i),
+        more_slots: wp.array(dtype=wp.vec4i),
+        force: wp.array(dtype=vec3),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        momentum_out: wp.array(dtype=wp.vec3d),
+        spin_out: wp.array(dtype=wp.vec3d),
+        work_out: wp.array(dtype=wp.vec3d),
+    ):
+        q = rotation[b]
+        F = wp.vec3d()
+        T = wp.vec3d()
+        for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
+            i = bodies.node[e]
+            f = gather(first_slots[i], more_slots, force)
+            if wp.static(contact):
+                f += take_contact(i, contact_force_out)
+            work_out[e] = f
+            F += f
+            T += wp.cross(wp.quat_rotate(q, bodies.arm[e]), f)
+        sum_F = wp.vec3d(block_sum(F[0]), block_sum(F[1]), block_sum(F[2]))
+        sum_T = wp.vec3d(block_sum(T[0]), block_sum(T[1]), block_sum(T[2]))
+        if lane == 0:
+            momentum_out[b] = momentum_out[b] + kick * (sum_F + bodies.mass[b] * bodies.gravity[b])
+            spin_out[b] = spin_out[b] + kick * sum_T
+
+    return load
+
+
+@wp.func
+def move_on(
+    b: int,
+    span: wp.float64,
+    turn: wp.array(dtype=wp.vec3d),
+    velocity: wp.array(dtype=wp.vec3d),
+    centre_out: wp.array(dtype=wp.vec3d),
+    rotation_out: wp.array(dtype=wp.quatd),
+):
+    """Take the pose of a body from t(n) to t(n+1)."""
+    f = turn[b]
+    centre_out[b] = centre_out[b] + span * velocity[b]
+    rotation_out[b] = wp.normalize(rotation_out[b] * wp.quatd(f[0], f[1], f[2], wp.float64(1.0)))
+
+
+@wp.func
+def count_riders(
+    b: int,
+    lane: int,
+    kick: wp.float64,
+    bodies: RigidBodies,
+    mass: wp.array(dtype=wp.float64),
+    v: wp.array(dtype=wp.vec3d),
+    force: wp.array(dtype=wp.vec3d),
+    velocity: wp.array(dtype=wp.vec3d),
+    rate: wp.array(dtype=wp.mat33d),
+    impulse_out: wp.array(dtype=wp.vec3d),
+):
+    """Add the impulse that holds each rider of a body, m (v(n+1/2) - v(n-1/2)) - dt f, to that of its pair [N s]."""
+    for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
+        pair = bodies.pair[e]
+        if pair >= 0:
+            i = bodies.node[e]
+            gained = mass[i] * (velocity[b] + rate[b] * bodies.arm[e] - v[i] - kick * bodies.gravity[b])
+            impulse_out[pair] = impulse_out[pair] + bodies.sign[e] * (gained - kick * force[e])
+
+
+@cache
+def advance_kernel(precision: str, contact: bool) -> Any:
+    """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes a group's bodies in turn.
+
+    v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
+    `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
+    Q - I after the step, the other outputs from force_out on are as in `find_motion` and `rigid_rows`.
+    """
+    vec3 = scalars(precision).vec3
+    load = load_function(precision, contact)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def advance_rigid(
+        bodies: RigidBodies,
+        rows: RigidRows,
+        mass: wp.array(dtype=wp.float64),
+        v: wp.array(dtype=wp.vec3d),
+        first_slots: wp.array(dtype=wp.vec2i),
+        more_slots: wp.array(dtype=wp.vec4i),
+        force: wp.array(dtype=vec3),
+        kick: wp.float64,
+        span: wp.float64,
+        moves: bool,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        centre_out: wp.array(dtype=wp.vec3d),
+        rotation_out: wp.array(dtype=wp.quatd),
+        momentum_out: wp.array(dtype=wp.vec3d),
+        spin_out: wp.array(dtype=wp.vec3d),
+        impulse_out: wp.array(dtype=wp.vec3d),
+        force_out: wp.array(dtype=wp.vec3d),
+        turn_out: wp.array(dtype=wp.vec3d),
+        velocity_out: wp.array(dtype=wp.vec3d),
+        rate_out: wp.array(dtype=wp.mat33d),
+        turned_out: wp.array(dtype=wp.mat33d),
+        normal_out: wp.array(dtype=wp.vec3d),
+        lever_out: wp.array2d(dtype=wp.vec3d),
+        gap_out: wp.array(dtype=wp.float64),
+        value_out: wp.array(dtype=wp.float64),
+        matrix_out: wp.array(dtype=wp.float64),
+    ):
+        k, lane = wp.tid()
+        begin = rows.begin[k]
+        size = rows.begin[k + 1] - begin
+        for place in range(rows.body[k], rows.body[k + 1]):
+            b = rows.member[place]
+            load(
+                b,
+                lane,
+                kick,
+                bodies,
+                rotation_out,
+                first_slots,
+                more_slots,
+                force,
+                contact_force_out,
+                momentum_out,
+                spin_out,
+                force_out,
+            )
+            if lane == 0:
+                find_motion(b, bodies, span, rotation_out, momentum_out, spin_out, turn_out, velocity_out, rate_out)
+        if size > 0:
+            for r in range(begin + lane, begin + size, wp.block_dim()):
+                place_row(r, rows, span, centre_out, rotation_out, normal_out, lever_out, gap_out)
+            wait_for_block()
+            for e in range(lane, size * size, wp.block_dim()):
+                r = begin + e // size
+                s = begin + e % size
+                matrix_out[rows.entry[k] + e] = row_lightness(r, s, bodies, rows, normal_out, lever_out)
+            wait_for_block()
+            if lane == 0:
+                factorise(rows.entry[k], size, matrix_out)
+                satisfy(
+                    k,
+                    span,
+                    moves,
+                    bodies,
+                    rows,
+                    rotation_out,
+                    normal_out,
+                    lever_out,
+                    gap_out,
+                    matrix_out,
+                    momentum_out,
+                    spin_out,
+                    impulse_out,
+                    turn_out,
+                    velocity_out,
+                    rate_out,
+                    value_out,
+                )
+        wait_for_block()
+        for place in range(rows.body[k], rows.body[k + 1]):
+            b = rows.member[place]
+            if moves:
+                count_riders(b, lane, kick, bodies, mass, v, force_out, velocity_out, rate_out, impulse_out)
+                if lane == 0:
+                    move_on(b, span, turn_out, velocity_out, centre_out, rotation_out)
+            if lane == 0:
+                turned_out[b] = turned_by(rotation_out[b])
+
+    return advance_rigid
+
+
+@wp.kernel(enable_backward=False)
+def follow(
+    node: wp.array(dtype=wp.int32),
+    body: wp.array(dtype=wp.int32),
+    arm: wp.array(dtype=wp.vec3d),
+    centre: wp.array(dtype=wp.vec3d),
+    velocity: wp.array(dtype=wp.vec3d),
+    rate: wp.array(dtype=wp.mat33d),
+    turned: wp.array(dtype=wp.mat33d),
+    u_out: wp.array(dtype=wp.vec3d),
+    v_out: wp.array(dtype=wp.vec3d),
+    v_before_out: wp.array(dtype=wp.vec3d),
+    speed_square_out: wp.array(dtype=wp.float32),
+):
+    """Give nodes of rigid bodies, riders included, displacement and velocity; v_before_out takes the old velocity."""
+    k = wp.tid()
+    i = node[k]
+    b = body[k]
+    if v_before_out.shape[0] > 0:
+        v_before_out[i] = v_out[i]
+    v = velocity[b] + rate[b] * arm[k]
+    v_out[i] = v
+    u_out[i] = centre[b] + turned[b] * arm[k]
+    keep_speed(i, v, speed_square_out)

@@ -1,0 +1,246 @@
+"""Owns what binds rigid bodies to each other and to the ground: rows, kept by impulses.
+
+A row is the scalar condition n . (x_first - x_second) = 0 at t(n+1) for a point that two bodies share. Equal and
+opposite impulses along n act at that point, so that momentum and angular momentum are kept. All rows of a group are
+solved together by Newton's method, with the matrix of t(n): the rotation of a step is small, so that three or four
+steps reach rounding.
+"""
+
+import warp as wp
+
+from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
+
+wp.set_module_options({"enable_backward": False})
+
+SOLVES = 50  # steps of Newton's method at most
+DEPENDENT = 1e-10  # of its diagonal entry: pivot below which a row follows from those before it
+
+
+@wp.struct
+class RigidRows:
+    """Conditions between rigid bodies, in groups of bodies that they connect.
+
+    Attributes:
+        member: bodies, group by group, shape (body_count,), int32.
+        body, begin: first place in `member` and first row of each group, and the numbers of all, shape
+            (group_count + 1,), int32.
+        entry: first entry of each group's matrix, shape (group_count,), int32.
+        first, second: bodies of each row, second -1 where that is the ground, shape (row_count,), int32.
+        first_arm, second_arm: reference position of the common point from the bodies' mass centres [m], shape
+            (row_count,), vec3d.
+        direction: n at the reference positions [-], shape (row_count,), vec3d; it turns with the first body, unless the
+            second is the ground.
+        pair: that takes the row's impulse, -1 where none does, shape (row_count,), int32.
+    """
+
+    member: wp.array(dtype=wp.int32)
+    body: wp.array(dtype=wp.int32)
+    begin: wp.array(dtype=wp.int32)
+    entry: wp.array(dtype=wp.int32)
+    first: wp.array(dtype=wp.int32)
+    second: wp.array(dtype=wp.int32)
+    first_arm: wp.array(dtype=wp.vec3d)
+    second_arm: wp.array(dtype=wp.vec3d)
+    direction: wp.array(dtype=wp.vec3d)
+    pair: wp.array(dtype=wp.int32)
+
+
+@wp.func
+def lever(q: wp.quatd, arm: wp.vec3d, n: wp.vec3d) -> wp.vec3d:
+    """Moment of a unit impulse along n at a point of a body, in the body's frame [m]."""
+    return wp.cross(arm, wp.quat_rotate_inv(q, n))
+
+
+@wp.func
+def lightness(
+    b: int, c: int, bodies: RigidBodies, n: wp.vec3d, lever_b: wp.vec3d, m: wp.vec3d, lever_c: wp.vec3d
+) -> wp.float64:
+    """Speed along n of a point of body b that a unit impulse along m at a point of body c gives [1/kg]."""
+    if b != c or b < 0:
+        return wp.float64(0.0)
+    return wp.dot(n, m) / bodies.mass[b] + wp.dot(lever_b, bodies.inverse_inertia[b] * lever_c)
+
+
+@wp.func
+def place_row(
+    r: int,
+    rows: RigidRows,
+    span: wp.float64,
+    centre: wp.array(dtype=wp.vec3d),
+    rotation: wp.array(dtype=wp.quatd),
+    normal_out: wp.array(dtype=wp.vec3d),
+    lever_out: wp.array2d(dtype=wp.vec3d),
+    gap_out: wp.array(dtype=wp.float64),
+):
+    """n at t(n), levers on both bodies, and the speed that closes what is open along n at t(n) in the step [m/s]."""
+    a = rows.first[r]
+    b = rows.second[r]
+    n = rows.direction[r]
+    q = rotation[a]
+    apart = centre[a] + turned_by(q) * rows.first_arm[r]
+    if b >= 0:
+        n = wp.quat_rotate(q, n)
+        apart -= centre[b] + turned_by(rotation[b]) * rows.second_arm[r]
+        lever_out[r, 1] = lever(rotation[b], rows.second_arm[r], n)
+    normal_out[r] = n
+    lever_out[r, 0] = lever(q, rows.first_arm[r], n)
+    gap_out[r] = wp.dot(n, apart) / span
+
+
+@wp.func
+def row_lightness(
+    r: int,
+    s: int,
+    bodies: RigidBodies,
+    rows: RigidRows,
+    normal: wp.array(dtype=wp.vec3d),
+    levers: wp.array2d(dtype=wp.vec3d),
+) -> wp.float64:
+    """Entry of the matrix of a group: speed that opens row r by a unit impulse of row s [1/kg]."""
+    a = rows.first[r]
+    b = rows.second[r]
+    c = rows.first[s]
+    d = rows.second[s]
+    n = normal[r]
+    m = normal[s]
+    found = lightness(a, c, bodies, n, levers[r, 0], m, levers[s, 0])
+    found -= lightness(a, d, bodies, n, levers[r, 0], m, levers[s, 1])
+    found -= lightness(b, c, bodies, n, levers[r, 1], m, levers[s, 0])
+    return found + lightness(b, d, bodies, n, levers[r, 1], m, levers[s, 1])
+
+
+@wp.func
+def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
+    """L D L^T of a symmetric matrix in place, D on the diagonal; it is 0 for rows that follow from those before."""
+    for j in range(size):
+        pivot = matrix_out[first + j * size + j]
+        least = wp.float64(DEPENDENT) * pivot
+        for k in range(j):
+            x = matrix_out[first + j * size + k]
+            pivot -= x * x * matrix_out[first + k * size + k]
+        if pivot <= least:
+            pivot = wp.float64(0.0)
+        matrix_out[first + j * size + j] = pivot
+        for i in range(j + 1, size):
+            x = matrix_out[first + i * size + j]
+            for k in range(j):
+                y = matrix_out[first + j * size + k] * matrix_out[first + k * size + k]
+                x -= matrix_out[first + i * size + k] * y
+            if pivot > wp.float64(0.0):
+                x = x / pivot
+            else:
+                x = wp.float64(0.0)
+            matrix_out[first + i * size + j] = x
+
+
+@wp.func
+def solve(first: int, size: int, begin: int, matrix: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64)):
+    """Solution for the right-hand side in value_out[begin:]; 0 for rows that follow from others."""
+    for i in range(size):
+        x = value_out[begin + i]
+        for k in range(i):
+            x -= matrix[first + i * size + k] * value_out[begin + k]
+        value_out[begin + i] = x
+    for i in range(size):
+        pivot = matrix[first + i * size + i]
+        if pivot > wp.float64(0.0):
+            value_out[begin + i] = value_out[begin + i] / pivot
+        else:
+            value_out[begin + i] = wp.float64(0.0)
+    for back in range(size):
+        i = size - 1 - back
+        x = value_out[begin + i]
+        for k in range(i + 1, size):
+            x -= matrix[first + k * size + i] * value_out[begin + k]
+        value_out[begin + i] = x
+
+
+@wp.func
+def opening(
+    begin: int,
+    end: int,
+    rows: RigidRows,
+    normal: wp.array(dtype=wp.vec3d),
+    gap: wp.array(dtype=wp.float64),
+    velocity: wp.array(dtype=wp.vec3d),
+    rate: wp.array(dtype=wp.mat33d),
+    value_out: wp.array(dtype=wp.float64),
+) -> wp.float64:
+    """Speeds at which rows would be open at t(n+1), negative [m/s]; the greatest."""
+    worst = wp.float64(0.0)
+    for r in range(begin, end):
+        a = rows.first[r]
+        b = rows.second[r]
+        v = velocity[a] + rate[a] * rows.first_arm[r]
+        if b >= 0:
+            v -= velocity[b] + rate[b] * rows.second_arm[r]
+        speed = wp.dot(normal[r], v) + gap[r]
+        value_out[r] = -speed
+        worst = wp.max(worst, wp.abs(speed))
+    return worst
+
+
+@wp.func
+def give_impulses(
+    begin: int,
+    end: int,
+    counts: bool,
+    rows: RigidRows,
+    rotation: wp.array(dtype=wp.quatd),
+    normal: wp.array(dtype=wp.vec3d),
+    levers: wp.array2d(dtype=wp.vec3d),
+    value: wp.array(dtype=wp.float64),
+    momentum_out: wp.array(dtype=wp.vec3d),
+    spin_out: wp.array(dtype=wp.vec3d),
+    impulse_out: wp.array(dtype=wp.vec3d),
+):
+    """Impulses [N s] of rows on their bodies, equal and opposite at the common point."""
+    for r in range(begin, end):
+        a = rows.first[r]
+        b = rows.second[r]
+        J = value[r] * normal[r]
+        momentum_out[a] = momentum_out[a] + J
+        spin_out[a] = spin_out[a] + value[r] * wp.quat_rotate(rotation[a], levers[r, 0])
+        if b >= 0:
+            momentum_out[b] = momentum_out[b] - J
+            spin_out[b] = spin_out[b] - value[r] * wp.quat_rotate(rotation[b], levers[r, 1])
+        if counts and rows.pair[r] >= 0:
+            impulse_out[rows.pair[r]] = impulse_out[rows.pair[r]] + J
+
+
+@wp.func
+def satisfy(
+    k: int,
+    span: wp.float64,
+    counts: bool,
+    bodies: RigidBodies,
+    rows: RigidRows,
+    rotation: wp.array(dtype=wp.quatd),
+    normal: wp.array(dtype=wp.vec3d),
+    levers: wp.array2d(dtype=wp.vec3d),
+    gap: wp.array(dtype=wp.float64),
+    matrix: wp.array(dtype=wp.float64),
+    momentum_out: wp.array(dtype=wp.vec3d),
+    spin_out: wp.array(dtype=wp.vec3d),
+    impulse_out: wp.array(dtype=wp.vec3d),
+    turn_out: wp.array(dtype=wp.vec3d),
+    velocity_out: wp.array(dtype=wp.vec3d),
+    rate_out: wp.array(dtype=wp.mat33d),
+    value_out: wp.array(dtype=wp.float64),
+):
+    """Close the rows of group k, whose bodies' motion is that without them, until rounding is what opens them."""
+    begin = rows.begin[k]
+    end = rows.begin[k + 1]
+    best = wp.float64(0.0)
+    for step in range(SOLVES):
+        worst = opening(begin, end, rows, normal, gap, velocity_out, rate_out, value_out)
+        if worst == wp.float64(0.0) or (step > 0 and worst >= best):
+            break
+        best = worst
+        solve(rows.entry[k], end - begin, begin, matrix, value_out)
+        give_impulses(
+            begin, end, counts, rows, rotation, normal, levers, value_out, momentum_out, spin_out, impulse_out
+        )
+        for place in range(rows.body[k], rows.body[k + 1]):
+            b = rows.member[place]
+            find_motion(b, bodies, span, rotation, momentum_out, spin_out, turn_out, velocity_out, rate_out)
