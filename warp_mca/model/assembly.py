@@ -16,6 +16,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.patches import PATCH, compact_order
 from warp_mca.model.stable_step import StableStep, stable_step
 from warp_mca.model.surfaces import Faces, make_faces
+from warp_mca.model.tied_nodes import within_bodies
 from warp_mca.scene import Body, Point, Scene, Surface
 from warp_mca.scene.materials import Material
 
@@ -137,7 +138,10 @@ def _sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
 
 
 def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
-    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum."""
+    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum.
+
+    Slaves of ties within a body have none: their masters carry it.
+    """
     masses = {}
     for body in scene.bodies:
         mesh = meshes[body.name]
@@ -148,7 +152,7 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
         for part in body_cells(body, mesh):
             total += _sum_to_nodes(part.conn, _masses(part, mesh.points, rho), len(total))
         masses[body.name] = total
-    return masses
+    return within_bodies(scene, meshes, masses)
 
 
 class Assembly:
@@ -241,10 +245,15 @@ class Assembly:
                     first += len(index)
         return tuple(blocks), np.concatenate(order)
 
-    def stable(self, added: Array) -> StableStep:
-        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
+    def stable(self, added: Array, relief: Array | None = None) -> StableStep:
+        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2].
+
+        Masses of nodes count for less by the divisor `relief` [-], see `TiedNodes.relief`.
+        """
+        added = added if relief is None else added * relief
         steps = []
-        for part, mass in zip(self.cells, self.element_mass, strict=True):
+        for part, own in zip(self.cells, self.element_mass, strict=True):
+            mass = own if relief is None else own / relief[part.conn]
             touched = np.flatnonzero((added != 0.0)[part.conn].any(axis=1))
             contact = np.zeros(len(part.conn))
             contact[touched] = added[part.conn[touched]].max(axis=1)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.model import Model
+from warp_mca.model.tied_nodes import joined
 
 Index = NDArray[np.int32]
 
@@ -51,6 +52,7 @@ def join_models(models: Sequence[Model]) -> Model:
         joint_tied=np.concatenate([model.joint_tied for model in models]),
         joint_slides=shifted("joint_slides", pairs),
         **_joints(models, nodes, pairs),
+        ties=joined([model.ties.moved(int(start)) for model, start in zip(models, nodes, strict=False)]),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)

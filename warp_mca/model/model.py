@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
+from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
+from warp_mca.model.tied_nodes import TiedNodes, check_ties, on_faces, tied_nodes
 from warp_mca.scene import Contact, RigidPlane, Scene
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Model:
     Attributes:
         X: reference positions, those at hand-off [m], shape (node_count, 3), float64.
         V: initial velocities [m/s], shape (node_count, 3), float64.
-        mass: lumped masses [kg], shape (node_count,), float64.
+        mass: lumped masses [kg], shape (node_count,), float64; slaves of ties have none, their masters carry it.
         blocks: elements by kernel.
         law: parameters of each material, as `Elastic.parameters` has them, then zeros, shape (material_count,
             parameters of the longest), float64.
@@ -57,6 +58,7 @@ class Model:
         joints: name of each joint and its pairs.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
+        ties: nodes tied to faces.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
@@ -88,6 +90,7 @@ class Model:
     joints: tuple[JointPairs, ...]
     hinge_loads: tuple[HingeLoad, ...]
     bases: tuple[MovableBase, ...]
+    ties: TiedNodes
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -233,7 +236,8 @@ def build_model(
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
-    parts = Assembly(scene, meshes, X)
+    ties = tied_nodes(scene, meshes, X)
+    parts = Assembly(scene, meshes, on_faces(ties, scene, X))
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints = join_bodies(parts)
     bases = movable_bases(parts, joints, chain, start)
@@ -243,19 +247,21 @@ def build_model(
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
+    check_ties(ties, held, nodes_of(pairs), velocity)
     passes, axes, added = _contacts(parts, velocity)
-    stable = parts.stable(added)
+    stable = parts.stable(added, ties.relief(parts.mass))
     return Model(
         X=parts.X,
         V=velocity,
-        mass=parts.mass,
+        mass=ties.carried(parts.mass),
         blocks=blocks,
         law=parts.law(),
         **held,
         **pairs,
         joints=joints,
-        hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
+        hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
         bases=bases,
+        ties=ties,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

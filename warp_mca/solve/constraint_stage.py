@@ -38,6 +38,7 @@ class ConstraintStage:
 
     Attributes:
         count: tied pairs and driven nodes.
+        bound: whether the nodal stage leaves any node to others, those of ties included.
         partial: whether some pairs are tied in some directions only.
         rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
         bonds: pairs, driven nodes and their tables.
@@ -52,15 +53,18 @@ class ConstraintStage:
         nodes, place = np.unique(model.prescribed_node, return_inverse=True)
         self.pairs, self.driven = len(model.joint_first), len(nodes)
         self.count = self.pairs + self.driven
+        self.bound = self.count > 0 or len(model.ties) > 0
         role = model.fixed_axes.astype(np.uint8)
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
             role[item.master] |= TOUCHABLE
-        if not self.count and not role.any():
+        if not self.bound and not role.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)
         for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes):
             role[bound] |= BOUND
+        for tied in (model.ties.slave, model.ties.carriers):
+            role[tied] |= BOUND
         self.role = wp.array(role, dtype=wp.uint8)
         begin, end = (np.full((len(nodes), 3), -1, dtype=np.int32) for _ in range(2))
         begin[place, model.prescribed_axis] = model.table_offset[model.prescribed_table]

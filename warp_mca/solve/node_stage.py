@@ -40,10 +40,10 @@ class NodeStage:
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
-        bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
+        early = rounds >= EARLY_ROUNDS
+        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, constraints.bound, each, early)
         self.bound_kernel = (
-            constraint.bound_kernel(precision, self.touched, each, constraints.partial) if bound else None
+            constraint.bound_kernel(precision, self.touched, each, constraints.partial) if constraints.count else None
         )
 
     def kernels(self) -> list[Any]:

@@ -36,6 +36,7 @@ from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.threads import ELEMENTS as RANGE
 from warp_mca.solve.threads import Split, whole
+from warp_mca.solve.tie_stage import TieStage
 from warp_mca.solve.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ class Solver:
         self.constraints = ConstraintStage(model, self.layout)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
+        self.ties = TieStage(model, self.nodes, self.precision, self.dt)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
         self._streams = Streams(wp.get_device().is_cuda)
@@ -99,7 +101,7 @@ class Solver:
     @property
     def _early(self) -> int:
         """Rounds of patches that the elements take, where nothing else waits for the nodes."""
-        if self.contacts or self.constraints.count:
+        if self.contacts or self.constraints.bound:
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
 
@@ -128,6 +130,7 @@ class Solver:
         advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
         advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
+        advance += [Stage("masters of ties", self.ties.advance, BESIDE)] if self.ties.count else []
         advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
             Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
@@ -136,7 +139,9 @@ class Solver:
         if self.loads.kernels():
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
         torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
-        return [forces, energies, sums, advance, torques if self.model.hinge_loads else [], motion]
+        after = [Stage("slaves of ties", self.ties.follow)] if self.ties.count else []
+        after += torques if self.model.hinge_loads else []
+        return [forces, energies, sums, advance, after, motion]
 
     def _before_step(self, step: Step) -> None:
         if self.output and step.is_row:
@@ -187,7 +192,7 @@ class Solver:
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + elements, ELEMENT_BLOCK),
+            (self.nodes.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
