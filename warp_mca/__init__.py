@@ -30,13 +30,14 @@ from warp_mca.scene import (
     Slide,
     Spherical,
     Surface,
+    Tie,
     Tip,
     Weld,
 )
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
-    from warp_mca.geometry import Box, Mesh, MeshFile, Plate, Rod, Sphere
+    from warp_mca.geometry import Box, Mesh, MeshFile, Part, Parts, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -51,6 +52,8 @@ _LAZY = {
     "Box": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
+    "Part": "warp_mca.geometry",
+    "Parts": "warp_mca.geometry",
     "Plate": "warp_mca.geometry",
     "Rod": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
@@ -77,6 +80,7 @@ __all__ = [
     "Weld",
     "Spherical",
     "Prismatic",
+    "Tie",
     "Fixed",
     "Prescribed",
     "Absorbing",
@@ -94,6 +98,8 @@ __all__ = [
     "Sphere",
     "Plate",
     "MeshFile",
+    "Part",
+    "Parts",
     "Mesh",
     "Param",
     "make_scene",

@@ -16,6 +16,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.patches import PATCH, compact_order
 from warp_mca.model.stable_step import StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.surfaces import Faces, make_faces
+from warp_mca.model.tied_nodes import within_bodies
 from warp_mca.scene import Body, Point, Scene, Surface
 from warp_mca.scene.materials import Material
 
@@ -137,7 +138,10 @@ def _sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
 
 
 def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
-    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum."""
+    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum.
+
+    Slaves of ties within a body have none: their masters carry it.
+    """
     masses = {}
     for body in scene.bodies:
         mesh = meshes[body.name]
@@ -148,7 +152,7 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
         for part in body_cells(body, mesh):
             total += _sum_to_nodes(part.conn, _masses(part, mesh.points, rho), len(total))
         masses[body.name] = total
-    return masses
+    return within_bodies(scene, meshes, masses)
 
 
 class Assembly:
@@ -161,6 +165,8 @@ class Assembly:
         K, G: moduli [Pa], and volume [m^3], of each element.
         rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
         mass: lumped masses [kg], shape (node_count,).
+        relief: divisor of each node's mass in eigenvalues [-], shape (node_count,), see `TiedNodes.relief`; None
+            where it is 1.
     """
 
     def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> None:
@@ -173,6 +179,7 @@ class Assembly:
             nodes += len(meshes[body.name].points)
             elements += meshes[body.name].cell_count
         self.element_count = elements
+        self.relief: Array | None = None
         self.X = np.concatenate([X[body.name] for body in scene.bodies])
         self.rigid = np.repeat([b.rigid for b in scene.bodies], [meshes[b.name].cell_count for b in scene.bodies])
         self.cells = self._merged_cells()
@@ -248,6 +255,7 @@ class Assembly:
 
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
+        added = self._relieved(added)
         steps = []
         for part, mass in self._computed():
             moduli = self.K[part.index], self.G[part.index]
@@ -257,6 +265,7 @@ class Assembly:
 
     def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
         """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
+        added = self._relieved(added)
         steps = np.full(self.element_count, np.inf)  # of elements of rigid bodies
         for part, mass in self._computed():
             moduli = self.K[part.index], self.G[part.index]
@@ -264,9 +273,14 @@ class Assembly:
             steps[part.index] = element_steps(part.element, self.X, part.conn, *moduli, mass, contact, coarse=coarse)
         return steps
 
+    def _relieved(self, added: Array) -> Array:
+        """Eigenvalues that springs add at nodes, with masses less by `relief`."""
+        return added if self.relief is None else added * self.relief
+
     def _computed(self) -> Iterator[tuple[Cells, Array]]:
-        """Cells that are computed, with their lumped masses as `element_mass` has them."""
-        for part, mass in zip(self.cells, self.element_mass, strict=True):
+        """Cells that are computed, with their lumped masses as `element_mass` has them, less by `relief`."""
+        for part, own in zip(self.cells, self.element_mass, strict=True):
+            mass = own if self.relief is None else own / self.relief[part.conn]
             kept = ~self.rigid[part.index]
             if kept.all():
                 yield part, mass

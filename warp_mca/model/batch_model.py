@@ -14,6 +14,7 @@ from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, offsets
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
+from warp_mca.model.tied_nodes import joined
 
 Index = NDArray[np.int32]
 
@@ -59,6 +60,7 @@ def join_models(models: Sequence[Model]) -> Model:
             stiffness=np.concatenate([model.absorbing.stiffness for model in models]),
             velocity=np.concatenate([model.absorbing.velocity for model in models]),
         ),
+        ties=joined([model.ties.moved(int(start)) for model, start in zip(models, nodes, strict=False)]),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)

@@ -11,6 +11,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
 from warp_mca.model.couplings import Coupling, coupling
+from warp_mca.model.tied_nodes import TiedNodes
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Clusters, Rails, Side
 
@@ -169,23 +170,25 @@ def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, 
         "joint_tied": np.concatenate([np.zeros((0, 3, 3)), *(item.tied for item in found)]),
         "joint_slides": np.concatenate(slides).astype(np.int32),
     }
-    nodes = _nodes_of(pairs)
+    nodes = nodes_of(pairs)
     if len(np.unique(nodes)) < len(nodes):
         raise RequestError("Scene.joints: a node is tied twice; give each joint, of two bodies, nodes of its own")
     return pairs, tuple(joints), tuple(item.coupling for item in found if item.coupling is not None)
 
 
-def _nodes_of(pairs: dict[str, NDArray]) -> Index:
+def nodes_of(pairs: dict[str, NDArray]) -> Index:
     """All nodes of the pairs, without the ground."""
     both = np.concatenate([pairs["joint_first"], pairs["joint_second"]])
     return both[both != GROUND]
 
 
-def free_nodes(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> NDArray[np.bool_]:
-    """Nodes that no joint ties and nothing holds or drives, shape (node_count,)."""
+def free_nodes(held: dict[str, NDArray], pairs: dict[str, NDArray], ties: TiedNodes) -> NDArray[np.bool_]:
+    """Nodes that no joint or tie binds and nothing holds or drives, shape (node_count,)."""
     free = held["fixed_axes"] == 0
     free[held["prescribed_node"]] = False
-    free[_nodes_of(pairs)] = False
+    free[nodes_of(pairs)] = False
+    free[ties.slave] = False
+    free[ties.carriers] = False
     return free
 
 
@@ -197,5 +200,5 @@ def check_bindings(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> None:
     """
     bound = held["fixed_axes"] != 0
     bound[held["prescribed_node"]] = True
-    if bound[_nodes_of(pairs)].any():
+    if bound[nodes_of(pairs)].any():
         raise RequestError("Scene.joints: a node of a joint is also fixed or driven; bind other nodes of that body")

@@ -48,13 +48,16 @@ def scale_masses(parts: Assembly, contact: Array, plain: StableStep) -> tuple[St
     lambda_e is exact or an upper bound. `plain` is the step without.
 
     Raises:
-        RequestError: the scene has rigid bodies.
+        RequestError: the scene has rigid bodies or ties.
     """
     asked = parts.scene.impact.mass_scaling
     if asked is None:
         return plain, None
     if parts.rigid.any():
         remedy = "rigid bodies must keep their mass; leave mass_scaling out, or Body.rigid"
+        raise bad_value("ImpactPhase.mass_scaling", asked, remedy)
+    if parts.scene.ties:
+        remedy = "masters of ties carry the mass of their slaves; leave mass_scaling out, or the ties"
         raise bad_value("ImpactPhase.mass_scaling", asked, remedy)
     wanted = float(asked.rstrip("s")) if isinstance(asked, str) else asked * plain.dt
     before, count, stable = parts.mass.copy(), 0, replace(plain, dt=max(wanted, plain.dt))

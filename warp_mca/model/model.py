@@ -13,7 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.absorbing import AbsorbingNodes, absorbing_nodes
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies
+from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
@@ -23,6 +23,7 @@ from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, flexib
 from warp_mca.model.rigid_step import stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
+from warp_mca.model.tied_nodes import TiedNodes, check_ties, on_faces, tied_nodes
 from warp_mca.scene import Contact, RigidPlane, Scene
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Model:
     Attributes:
         X: reference positions, those at hand-off [m], shape (node_count, 3), float64.
         V: initial velocities [m/s], shape (node_count, 3), float64.
-        mass: lumped masses [kg], shape (node_count,), float64.
+        mass: lumped masses [kg], shape (node_count,), float64; slaves of ties have none, their masters carry it.
         blocks: elements by kernel.
         law: parameters of each material, as `Elastic.parameters` has them, then zeros, shape (material_count,
             parameters of the longest), float64.
@@ -65,6 +66,7 @@ class Model:
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
         absorbing: nodes of absorbing boundaries.
+        ties: nodes tied to faces.
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
@@ -102,6 +104,7 @@ class Model:
     hinge_loads: tuple[HingeLoad, ...]
     bases: tuple[MovableBase, ...]
     absorbing: AbsorbingNodes
+    ties: TiedNodes
     passes: tuple[ContactPass, ...]
     contact_axes: Array
     gravity: Array
@@ -251,7 +254,8 @@ def build_model(
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
-    parts = Assembly(scene, meshes, X)
+    ties = tied_nodes(scene, meshes, X)
+    parts = Assembly(scene, meshes, on_faces(ties, scene, X))
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints, couplings = join_bodies(parts)
     bases = movable_bases(parts, joints, chain, start)
@@ -266,23 +270,26 @@ def build_model(
     passes, axes, added = _contacts(parts, velocity)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
+    parts.relief = ties.relief(parts.mass)
     bodies, rows = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in bodies)], velocity)
     plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
     check_masses(parts, scaling)
     return Model(
         X=parts.X,
         V=velocity,
-        mass=parts.mass,
+        mass=ties.carried(parts.mass),
         blocks=blocks,
         law=parts.law(),
         **held,
         **pairs,
         joints=joints,
         couplings=flexible(couplings, pairs, bodies),
-        hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
+        hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
         bases=bases,
         absorbing=absorbing,
+        ties=ties,
         passes=passes,
         contact_axes=axes,
         gravity=np.array([scene.gravity], dtype=np.float64),

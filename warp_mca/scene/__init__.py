@@ -13,6 +13,7 @@ from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
+from warp_mca.scene.tied_surfaces import Tie
 
 __all__ = [
     "OVERLAP_CHOICES",
@@ -36,6 +37,7 @@ __all__ = [
     "Spherical",
     "Slide",
     "Surface",
+    "Tie",
     "Tip",
     "Vec3",
     "Weld",

@@ -15,10 +15,12 @@ from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
+from warp_mca.scene.tied_surfaces import Tie
 
 _PARTS = {
     "bodies": Body,
     "contacts": Contact,
+    "ties": Tie,
     "fixed": Fixed,
     "prescribed": Prescribed,
     "absorbing": Absorbing,
@@ -37,7 +39,7 @@ class Scene:
         rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
         t_end: the run goes through as many swings and impacts as occur until then, counted from the release [s]; None
             for one impact.
-        joints, contacts, fixed, prescribed: what binds the bodies.
+        joints, contacts, fixed, prescribed, ties: what binds the bodies.
         absorbing: sides of bodies through which waves leave.
         gravity: [m/s^2].
         paths: lines along which stress is recorded.
@@ -58,6 +60,7 @@ class Scene:
     fixed: tuple[Fixed, ...] = ()
     prescribed: tuple[Prescribed, ...] = ()
     absorbing: tuple[Absorbing, ...] = ()
+    ties: tuple[Tie, ...] = ()
     paths: tuple[Path, ...] = ()
     gravity: Vec3 = (0.0, 0.0, 0.0)
     tip: Point | None = None
@@ -136,6 +139,7 @@ class Scene:
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
         named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
+        named += [(f"{t.title}.{name}.body", getattr(t, name).body) for t in self.ties for name in ("slave", "master")]
         named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]
         named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
         if self.rigid:

@@ -39,6 +39,8 @@ class ConstraintStage:
 
     Attributes:
         count: tied pairs and driven nodes; 0 where all pairs hold nodes of rigid bodies.
+        bound: whether the nodal stage leaves any node to others, those of ties, absorbing boundaries and rigid bodies
+            included.
         partial: whether some pairs are tied in some directions only.
         skips: whether some pairs are not advanced here, because they hold nodes of a rigid body.
         rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
@@ -56,18 +58,17 @@ class ConstraintStage:
         rigid = rigid_nodes(model)
         held = rigid[model.joint_first] | (rigid[model.joint_second] & (model.joint_second >= 0))  # by `RigidStage`
         self.count = 0 if held.all() and not self.driven else self.pairs + self.driven
+        others = (model.absorbing.node, model.ties.slave, model.ties.carriers, np.flatnonzero(rigid))
+        self.bound = self.count > 0 or any(map(len, others))
         role = model.fixed_axes.astype(np.uint8)
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
             role[item.master] |= TOUCHABLE
-        absorbing = model.absorbing.node
-        if not self.count and not len(absorbing) and not role.any() and not rigid.any():
+        if not self.bound and not role.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)
-        for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes, absorbing):
+        for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes, *others):
             role[bound] |= BOUND
-        if rigid.any():
-            role[rigid] |= BOUND
         self.role = wp.array(role, dtype=wp.uint8)
         begin, end = (np.full((len(nodes), 3), -1, dtype=np.int32) for _ in range(2))
         begin[place, model.prescribed_axis] = model.table_offset[model.prescribed_table]

@@ -47,12 +47,11 @@ class NodeStage:
             each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
-        bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
-        left_out = bound or len(model.absorbing.node) > 0 or bool(model.rigid_bodies)
-        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, left_out, each, early)
+        early = rounds >= EARLY_ROUNDS
+        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, constraints.bound, each, early)
         self.bound_kernel = (
             constraint.bound_kernel(precision, self.touched, each, constraints.partial, constraints.skips)
-            if bound
+            if constraints.count
             else None
         )
 

@@ -39,6 +39,7 @@ from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.threads import ELEMENTS as RANGE
 from warp_mca.solve.threads import Split, whole
+from warp_mca.solve.tie_stage import TieStage
 from warp_mca.solve.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -101,6 +102,7 @@ class Solver:
         self.rigid = RigidStage(model, self.work, self.precision, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision, self.dt)
+        self.ties = TieStage(model, self.nodes, self.precision, self.dt)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
         self._streams = Streams(wp.get_device().is_cuda)
@@ -108,7 +110,7 @@ class Solver:
     @property
     def _early(self) -> int:
         """Rounds of patches that the elements take, where nothing else waits for the nodes."""
-        if self.contacts or self.constraints.count or self.rigid.count or len(self.model.absorbing.node):
+        if self.contacts or self.constraints.bound:
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
 
@@ -140,6 +142,7 @@ class Solver:
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
         advance += self.absorbing.stages()
         advance += [Stage("rigid bodies", self.rigid.advance, BESIDE)] if self.rigid.count else []
+        advance += [Stage("masters of ties", self.ties.advance, BESIDE)] if self.ties.count else []
         advance.append(Stage("free nodes", self.nodes.advance))
         motion = [
             Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
@@ -149,7 +152,9 @@ class Solver:
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
         motion += self.absorbing.record_stages(self.records)
         torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
-        return [forces, energies, sums, advance, torques if self.model.hinge_loads else [], motion]
+        after = [Stage("slaves of ties", self.ties.follow)] if self.ties.count else []
+        after += torques if self.model.hinge_loads else []
+        return [forces, energies, sums, advance, after, motion]
 
     def _before_step(self, step: Step) -> None:
         if self.output and step.is_row:
@@ -204,7 +209,7 @@ class Solver:
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + self.absorbing.kernels() + elements, ELEMENT_BLOCK),
+            (self.nodes.kernels() + self.absorbing.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 

@@ -21,7 +21,8 @@ class Workspace:
 
     Attributes:
         X: reference positions [m], shape (node_count,), vec3d.
-        mass, inverse_mass: lumped masses [kg], [1/kg], shape (node_count,), float64.
+        mass, inverse_mass: lumped masses [kg], [1/kg], shape (node_count,), float64; slaves of ties, which have none,
+            are divided by 1 kg.
         heavy_mass: those that have weight [kg], shape (node_count,), float64; `mass` itself without mass scaling.
         law: parameters of each material, see `Model.law`, in the scalars of the precision.
         first_slots, more_slots: slots of the forces on each node, see `gather_lists`.
@@ -43,7 +44,7 @@ class Workspace:
         t, passes = scalars(precision), len(model.passes) // layout.count
         self.X = wp.array(model.X, dtype=wp.vec3d)
         self.mass = wp.array(model.mass, dtype=wp.float64)
-        self.inverse_mass = wp.array(1.0 / model.mass, dtype=wp.float64)
+        self.inverse_mass = wp.array(1.0 / np.where(model.mass > 0.0, model.mass, 1.0), dtype=wp.float64)
         self.heavy_mass = wp.array(heavy_mass(model), dtype=wp.float64) if model.scaling else self.mass
         self.law = wp.array(limited(model.law, precision), dtype=t.real)
         self.first_slots, self.more_slots = wp.array(first_slots, dtype=wp.vec2i), wp.array(more_slots, dtype=wp.vec4i)

@@ -1,0 +1,82 @@
+"""Owns `Parts`: one mesh of several that share no node, for parts that are tied to each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.geometry.mesh import Mesh
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.recipe import Recipe
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A mesh in a body of several.
+
+    Attributes:
+        name: unique in the body.
+        geometry: a recipe or a finished mesh.
+        at: where its origin lies in the body's frame [m].
+    """
+
+    name: str
+    geometry: Recipe | Mesh
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Part", name=self.name)
+        if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
+            raise bad_value(f"Part {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
+        validate.vectors(f"Part {self.name}", at=self.at)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parts:
+    """Several meshes as the mesh of one body; a `Tie` of two of their surfaces holds them together.
+
+    Node set and cell set S of part P are called "P.S"; S alone is what the parts that have it hold together.
+
+    Attributes:
+        parts: at least one.
+    """
+
+    parts: tuple[Part, ...]
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.members("Parts", Part, parts=self.parts)
+        names = [part.name for part in self.parts]
+        if not names or len(set(names)) < len(names):
+            raise bad_value("Parts.parts", names, "give at least one part, each with a name of its own")
+
+    def build(self) -> Mesh:
+        """The mesh: nodes of the parts one after the other; of the cells first all hexahedra, then all tetrahedra."""
+        meshes = [part.geometry if isinstance(part.geometry, Mesh) else part.geometry.build() for part in self.parts]
+        nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+        hexahedra = np.cumsum([0, *(len(mesh.hexahedra) for mesh in meshes)])
+        tetrahedra = hexahedra[-1] + np.cumsum([0, *(len(mesh.tetrahedra) for mesh in meshes)])
+        node_sets: dict[str, list] = {}
+        cell_sets: dict[str, list] = {}
+        for k, (part, mesh) in enumerate(zip(self.parts, meshes, strict=True)):
+            for name, members in mesh.node_sets.items():
+                for key in (f"{part.name}.{name}", name):
+                    node_sets.setdefault(key, []).append(members + nodes[k])
+            count = len(mesh.hexahedra)
+            for name, members in mesh.cell_sets.items():
+                moved = np.where(members < count, members + hexahedra[k], members - count + tetrahedra[k])
+                for key in (f"{part.name}.{name}", name):
+                    cell_sets.setdefault(key, []).append(moved)
+        return Mesh(
+            np.concatenate([mesh.points + np.asarray(p.at) for p, mesh in zip(self.parts, meshes, strict=True)]),
+            np.concatenate([mesh.hexahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
+            {name: np.concatenate(items).astype(np.int32) for name, items in node_sets.items()},
+            {name: np.concatenate(items).astype(np.int32) for name, items in cell_sets.items()},
+            np.concatenate([mesh.tetrahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
+        )

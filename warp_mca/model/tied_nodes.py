@@ -1,0 +1,232 @@
+"""Owns nodes tied to faces: where slaves lie on their masters' faces, and what of their mass the corners carry.
+
+With u_s = sum_k N_sk u_k the equations of motion of the masters are (M u'')_k = f_k + sum_s N_sk f_s. Their mass is
+lumped, M_k = m_k + sum_s N_sk m_s: as sum_k N_sk = 1 and x_s = sum_k N_sk x_k, the total mass, its centre, momentum and
+angular momentum are those of the nodes (Belytschko et al., Nonlinear Finite Elements, 2014, on explicit ties).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry.face_projection import project
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+    from warp_mca.scene import Scene, Tie
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+MOST_BEYOND = 0.25  # of a face's width: a fine mesh's nodes on a curved rim lie so far beyond the coarse one's chords
+MOVING = 1e-6  # of the greatest speed: difference of a slave's velocity from its place's at the start
+
+
+@dataclass(frozen=True, kw_only=True)
+class TiedNodes:
+    """Slave nodes and the corners of the faces that carry them.
+
+    Attributes:
+        slave: shape (slave_count,), int32.
+        master: corners of the face of each, shape (slave_count, 4), int32; a triangle has its last corner twice.
+        weight: shape functions of these corners at the slave [-], shape (slave_count, 4), float64; their sum is 1.
+        facts: of each tie, for the summary.
+    """
+
+    slave: Index
+    master: Index
+    weight: Array
+    facts: tuple[Mapping[str, object], ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.slave)
+
+    @property
+    def carriers(self) -> Index:
+        """Nodes that carry slaves, each once."""
+        return np.unique(self.master[self.weight != 0.0])
+
+    def place(self, field: Array) -> Array:
+        """A field's value at the slaves by the shape functions, shape (slave_count, 3), of (node_count, 3)."""
+        return np.einsum("sk,ski->si", self.weight, field[self.master])
+
+    def follow(self, field: Array) -> Array:
+        """A copy of a field, shape (node_count, 3), whose slaves have the value at their place."""
+        found = field.copy()
+        found[self.slave] = self.place(field)
+        return found
+
+    def carried(self, value: Array) -> Array:
+        """What nodes have, shape (node_count, ...), with that of the slaves given to the masters."""
+        if not len(self):
+            return value
+        found, own = value.copy(), value[self.slave]
+        for k in range(4):
+            share = self.weight[:, k].reshape(-1, *[1] * (own.ndim - 1))
+            np.add.at(found, self.master[:, k], share * own)
+        found[self.slave] = 0.0
+        return found
+
+    def relief(self, mass: Array) -> Array | None:
+        """Divisor of each node's mass in the elements' eigenvalues [-], shape (node_count,); None where it is 1.
+
+        For N >= 0 the bound by elements holds as it is: (sum_k N_k v_k)^2 <= sum_k N_k v_k^2, so that
+        v^T T^T K T v <= max_e(lambda_e) (T v)^T m (T v) <= max_e(lambda_e) v^T M v. Where slaves lie beyond an edge and
+        some N are negative, (sum_k N_k v_k)^2 <= S sum_k |N_k| v_k^2 with S = sum_k |N_k|: the share of M_k that the
+        bound may count on shrinks by m_k + sum_s S_s |N_sk| m_s over M_k.
+        """
+        if not len(self) or self.weight.min() >= 0.0:
+            return None
+        size = np.abs(self.weight)
+        total = self.carried(mass)
+        counted = mass.copy()
+        for k in range(4):
+            np.add.at(counted, self.master[:, k], size[:, k] * size.sum(axis=1) * mass[self.slave])
+        found = np.ones(len(mass))
+        found[self.carriers] = np.maximum(1.0, (counted / np.where(total > 0.0, total, 1.0))[self.carriers])
+        found[self.slave] = np.where(self.weight != 0.0, found[self.master], 1.0).max(axis=1)
+        return found
+
+    def moved(self, start: int) -> TiedNodes:
+        """The same with nodes that are counted from `start` on."""
+        return TiedNodes(
+            slave=(self.slave + start).astype(np.int32),
+            master=(self.master + start).astype(np.int32),
+            weight=self.weight,
+            facts=self.facts,
+        )
+
+
+def joined(items: Sequence[TiedNodes]) -> TiedNodes:
+    """All of them."""
+    return TiedNodes(
+        slave=np.concatenate([np.zeros(0, np.int32), *(item.slave for item in items)]),
+        master=np.concatenate([np.zeros((0, 4), np.int32), *(item.master for item in items)]),
+        weight=np.concatenate([np.zeros((0, 4)), *(item.weight for item in items)]),
+        facts=tuple(fact for item in items for fact in item.facts),
+    )
+
+
+def tied_nodes(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> TiedNodes:
+    """The ties of a scene whose bodies stand at X [m], by body, shape (node_count, 3), float64.
+
+    Raises:
+        RequestError: a slave lies off the master's faces, or nodes are tied twice or to each other.
+    """
+    first, start = {}, 0
+    for body in scene.bodies:
+        first[body.name] = start
+        start += len(meshes[body.name].points)
+    found = joined([_tied(tie, meshes, X, first) for tie in scene.ties])
+    if len(np.unique(found.slave)) < len(found):
+        raise RequestError("Scene.ties: a slave node is tied twice; give each tie slave nodes of its own")
+    if np.isin(found.slave, found.carriers).any():
+        raise RequestError("Scene.ties: a slave node carries another tie's slaves; tie these to the same master")
+    return found
+
+
+def _tied(tie: Tie, meshes: Mapping[str, Mesh], X: Mapping[str, Array], first: Mapping[str, int]) -> TiedNodes:
+    slave, master = tie.slave, tie.master
+    own, _ = meshes[slave.body].surface(slave.nodes)
+    faces, _ = meshes[master.body].surface(master.nodes)
+    nodes = np.unique(own)
+    if slave.body == master.body and np.isin(nodes, faces).any():
+        remedy = f"it shares nodes with {slave.nodes}; tie surfaces that have no node in common"
+        raise bad_value(f"{tie.title}.master", master.nodes, remedy)
+    at, points = X[slave.body][nodes], X[master.body]
+    found = project(at, points, faces)
+    corner = points[faces[found.face]]
+    edge = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    off = np.hypot(found.distance, found.beyond * edge)
+    bad = (found.distance > tie.gap * edge) | (found.beyond > MOST_BEYOND)
+    if bad.any():
+        k = int(np.argmax(np.where(bad, off, -1.0)))
+        x, y, z = at[k]
+        remedy = (
+            f"its node at ({x:.4g}, {y:.4g}, {z:.4g}) m lies {off[k]:.3g} m off the faces of {master.nodes} of "
+            f"{master.body}, whose edges are {edge[k]:.3g} m long; let the surfaces meet, or raise gap"
+        )
+        raise bad_value(f"{tie.title}.slave", slave.nodes, remedy)
+    widths = (_edge(X[body], quads) for body, quads in ((slave.body, own), (master.body, faces)))
+    finer, coarser = widths
+    return TiedNodes(
+        slave=(nodes + first[slave.body]).astype(np.int32),
+        master=(faces[found.face] + first[master.body]).astype(np.int32),
+        weight=found.weight,
+        facts=(
+            {
+                "slave": f"{slave.body}:{slave.nodes}",
+                "master": f"{master.body}:{master.nodes}",
+                "nodes": len(nodes),
+                "gap": float(found.distance.max()),
+                "beyond": float(found.beyond.max()),
+                "size_ratio": coarser / finer,
+            },
+        ),
+    )
+
+
+def _edge(X: Array, faces: Index) -> float:
+    """Usual edge of faces [m]."""
+    corner = X[faces]
+    return float(np.median(np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)))
+
+
+def on_faces(ties: TiedNodes, scene: Scene, X: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Positions with each slave on its face; a share `Tie.gap` of a face's edge is the most that one moves."""
+    if not len(ties):
+        return X
+    placed = ties.follow(np.concatenate([X[body.name] for body in scene.bodies]))
+    ends = np.cumsum([len(X[body.name]) for body in scene.bodies])[:-1]
+    return {body.name: part for body, part in zip(scene.bodies, np.split(placed, ends), strict=True)}
+
+
+def within_bodies(scene: Scene, meshes: Mapping[str, Mesh], masses: Mapping[str, Array]) -> dict[str, Array]:
+    """Nodal masses by body [kg], those of slaves of ties within the body given to the masters."""
+    found = dict(masses)
+    for tie in scene.ties:
+        body = tie.slave.body
+        if body == tie.master.body:
+            points = {body: meshes[body].points}
+            found[body] = _tied(tie, meshes, points, {body: 0}).carried(found[body])
+    return found
+
+
+def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Index], V: Array) -> None:
+    """Refuse slaves and masters that something else moves, as the nodes `moved`, and slaves that do not move with their masters.
+
+    A slave may be fixed along an axis where all of its masters are: it stays at rest with them.
+
+    Raises:
+        RequestError: there is such a node.
+    """
+    if not len(ties):
+        return
+    driven = np.concatenate([held["prescribed_node"], *moved])
+    if np.isin(np.concatenate([ties.slave, ties.carriers]), driven).any():
+        raise RequestError(
+            "Scene.ties: a tied node is also in a joint, driven, rigid or absorbing; bind other nodes, off the tie"
+        )
+    fixed = held["fixed_axes"]
+    shared = np.bitwise_and.reduce(np.where(ties.weight != 0.0, fixed[ties.master], 7), axis=1)
+    if (fixed[ties.slave] & ~shared).any():
+        raise RequestError("Scene.ties: a slave node is fixed where its masters are free; fix the masters, too")
+    speed = float(np.abs(V).max())
+    if np.abs(V[ties.slave] - ties.place(V)).max() > MOVING * speed:
+        raise RequestError("Scene.ties: a slave moves against its master at the start; give tied bodies one motion")
+
+
+def tie_warnings(ties: TiedNodes) -> list[str]:
+    """Ties whose slave is coarser than its master, one sentence each."""
+    return [
+        f"faces of the tied slave {fact['slave']} are {1.0 / fact['size_ratio']:.2g} times as wide as those of its "  # type: ignore[operator]
+        f"master {fact['master']}, whose nodes between them are tied to nothing: swap slave and master"
+        for fact in ties.facts
+        if fact["size_ratio"] < 1.0 - 1e-6  # type: ignore[operator]
+    ]
