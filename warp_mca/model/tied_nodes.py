@@ -199,7 +199,7 @@ def within_bodies(scene: Scene, meshes: Mapping[str, Mesh], masses: Mapping[str,
 
 
 def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Index], V: Array) -> None:
-    """Refuse slaves and masters that something else moves, as the nodes `moved`, and slaves that do not move with their masters.
+    """Refuse slaves and masters that something else moves, as `moved` nodes, and slaves that leave their masters.
 
     A slave may be fixed along an axis where all of its masters are: it stays at rest with them.
 
