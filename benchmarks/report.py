@@ -12,6 +12,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks import knobs
 from benchmarks.blocks import SIZES
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -243,6 +244,7 @@ def render(paths: list[Path]) -> str:
         "memory": sections(devices, memory),
         "startup": startup(devices),
         "host": host(devices),
+        "knobs": sections(devices, lambda d: table(knobs.HEAD, knobs.lines(d["knobs"])) if "knobs" in d else ""),
         "peers": peers([r for r in rows if r["problem"] != "taylor"]),
         "peers_taylor": peers_taylor([r for r in rows if r["problem"] == "taylor"]),
     }
