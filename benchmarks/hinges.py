@@ -83,7 +83,7 @@ def measure(
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.hinges", description=(__doc__ or "").splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.hinges", description=__doc__.splitlines()[0])
     parser.add_argument("scene", nargs="?", default="two_link")
     parser.add_argument("--preset", nargs="+", default=["quick"])
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
