@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 from test_cycle import scene as cycling
 from test_joint import SOFT
+from test_joint_loads import ALL, SLIDE
 
 import warp_mca as mca
 from warp_mca.base.rotation import mean_pose
@@ -117,7 +118,9 @@ def pinned(**given):
 
 
 @pytest.mark.parametrize(
-    "given", [{}, {"torques": (TORQUE,)}, {"joint_friction": (0.2, 0.1)}], ids=["free", "torque", "friction"]
+    "given",
+    [{}, {"torques": (TORQUE,)}, {"joint_friction": (0.2, 0.1)}, {"base_motion": BASE}, {"slide": SLIDE}, ALL],
+    ids=["free", "torque", "friction", "base", "slide", "all"],
 )
 def test_pins_go_on_as_the_rigid_phase_would(given):
     found = impact(pinned(theta_dot=(-3.0, 4.0), **given))
@@ -192,5 +195,5 @@ def test_what_pins_cannot_do_is_refused():
             prepared(replace(scene, joints=(replace(pin, **change),)))
     with pytest.raises(mca.RequestError, match=r"a node is tied twice"):
         prepared(replace(scene, joints=(pin, replace(pin, name="B"))))
-    with pytest.raises(mca.RequestError, match=r"Revolute O.nodes = 'pin': a base that moves or slides"):
-        ready(pinned(base_motion=BASE))
+    with pytest.raises(mca.RequestError, match=r"Slide.carriage_mass = 0.0: a pin needs a carriage with mass"):
+        ready(pinned(slide=replace(SLIDE, carriage_mass=0.0)))

@@ -239,7 +239,7 @@ def build_model(
     parts = Assembly(scene, meshes, X)
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints, couplings = join_bodies(parts)
-    bases = movable_bases(parts, joints, chain, start)
+    bases = movable_bases(parts, joints, couplings, chain, start)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
     blocks, order = parts.blocks()
