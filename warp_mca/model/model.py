@@ -258,7 +258,7 @@ def build_model(
     parts = Assembly(scene, meshes, on_faces(ties, scene, X))
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints, couplings = join_bodies(parts)
-    bases = movable_bases(parts, joints, chain, start)
+    bases = movable_bases(parts, joints, couplings, chain, start)
     check_loads(scene, chain, bases)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0

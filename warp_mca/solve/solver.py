@@ -97,9 +97,9 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
-        self.couplings = CouplingStage(model, self.work, self.constraints, self.dt)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
         self.rigid = RigidStage(model, self.work, self.precision, self.dt)
+        self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision, self.dt)
         self.ties = TieStage(model, self.nodes, self.precision, self.dt)
