@@ -15,6 +15,7 @@ from test_style import entries
 
 import warp_mca as mca
 from warp_mca.elements.state import ElementState
+from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.load_stage import LoadState
@@ -90,7 +91,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node."""
+    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node, a side that absorbs."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -103,6 +104,7 @@ def everything() -> mca.Scene:
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
+        absorbing=(mca.Absorbing(body="cart", nodes="zmax"),),
         contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
         impact=mca.ImpactPhase(duration=1e-5),
     )
@@ -130,6 +132,7 @@ STATE_PARTS = {
     "contacts/0/": ContactState,
     "constraints/": ConstraintState,
     "loads/": LoadState,
+    "absorbing/": AbsorbingState,
 }
 
 

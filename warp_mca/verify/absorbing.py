@@ -49,8 +49,8 @@ def reflected_share(wave: str, slowness: Array, wave_speeds: dict[str, float]) -
     back = np.stack([imbalance(c_p, -1.0), imbalance(c_s, -1.0)], axis=1)
     own = c_p if wave == "P" else c_s
     amplitudes = np.linalg.solve(np.moveaxis(back, 2, 0), -imbalance(own, 1.0).T[:, :, None])[:, :, 0].T
-    flux = sum(abs(a) ** 2 * c * cosine[c].real for a, c in zip(amplitudes, (c_p, c_s), strict=True))
-    return np.asarray(flux / (own * cosine[own].real))
+    flux = sum(np.abs(a) ** 2 * c * np.real(cosine[c]) for a, c in zip(amplitudes, (c_p, c_s), strict=True))
+    return np.asarray(flux / (own * np.real(cosine[own])))
 
 
 def _slab(setup: Setup, angle: float, cells: int) -> mca.Scene:
