@@ -200,7 +200,7 @@ def absorbing_angles(setup: Setup) -> list[Row]:
                 exact=found[-1][0],
                 measured=tuple(measured for _, measured in found),
                 unit="-",
-                tolerance=0.05,
+                tolerance=0.01 if angle < 45.0 else setup.by_element(0.05, tet4=0.08),
                 scale=1.0,
                 why=f"dispersion of the mesh, with {counts[-1]} cells in the wavelength",
                 sizes=tuple(1.0 / count for count in counts),
