@@ -16,6 +16,7 @@ from test_style import entries
 
 import warp_mca as mca
 from warp_mca.elements.state import ElementState
+from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.coupling_stage import CouplingState
@@ -92,7 +93,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node."""
+    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node, a side that absorbs."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -105,6 +106,7 @@ def everything() -> mca.Scene:
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
+        absorbing=(mca.Absorbing(body="cart", nodes="zmax"),),
         contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
         impact=mca.ImpactPhase(duration=1e-5),
     )
@@ -135,6 +137,7 @@ STATE_PARTS = {
     "constraints/": ConstraintState,
     "couplings/": CouplingState,
     "loads/": LoadState,
+    "absorbing/": AbsorbingState,
 }
 
 

@@ -34,6 +34,13 @@ def test_energies_are_drawn_in_a_fitting_unit_and_split_into_elastic_and_plastic
     assert last["kinetic, change"] == pytest.approx(-1e3, rel=0.01)
 
 
+def test_energy_that_sides_absorbed_is_drawn_where_there_are_such_sides():
+    plain = result()
+    absorbing = replace(plain, history=plain.history | {"E_absorbed": plain["E_friction"]})
+    drawn = [{line.get_label() for line in plot_energies(item).axes[0].lines} for item in (plain, absorbing)]
+    assert drawn[1] - drawn[0] == {"absorbed by sides"} and not drawn[0] - drawn[1]
+
+
 def test_file_is_a_png(tmp_path):
     assert save_energies(tmp_path / "energies.png", result()).read_bytes().startswith(b"\x89PNG")
 

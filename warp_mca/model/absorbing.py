@@ -141,12 +141,12 @@ def _bound(parts: Assembly, node: NDArray, held: dict[str, NDArray], pairs: dict
     given[held["prescribed_node"], held["prescribed_axis"]] = True
     touched = np.zeros(len(given), dtype=bool)
     touched[held["prescribed_node"]] = True
-    grounded = pairs["joint_second"] == GROUND
-    welded = grounded & (pairs["joint_tied"] == np.eye(3)).all(axis=(1, 2))
+    grounded: NDArray[np.bool_] = pairs["joint_second"] == GROUND
+    welded = grounded & np.all(pairs["joint_tied"] == np.eye(3), axis=(1, 2))
     given[pairs["joint_first"][welded]] = True
     for side in (pairs["joint_first"], pairs["joint_second"][~grounded]):
         touched[side] = True
-    whole = given.all(axis=1)
+    whole: NDArray[np.bool_] = np.all(given, axis=1)
     part = node[touched[node] & ~whole[node]]
     if len(part):
         starts = parts.node_start

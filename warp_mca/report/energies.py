@@ -34,6 +34,7 @@ CURVES = (
     ("E_plastic", "plastic work", VERMILION, "-."),
     ("E_friction", "friction", GREEN, ":"),
     ("E_contact", "contact springs", ORANGE, (0, (5, 1, 1, 1, 1, 1))),
+    ("E_absorbed", "absorbed by sides", PURPLE, (0, (1, 2))),
 )
 
 
@@ -41,13 +42,14 @@ def plot_energies(result: Result) -> Figure:
     """The figure: energies [J] above, error of their balance [J] below, over time [ms]."""
     figure = new_figure(7.0, 5.0)
     energies, balance = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    values = {name: result[name] for name in ("E_kinetic", "E_plastic", "E_friction", "E_contact")}
+    names = ("E_kinetic", "E_plastic", "E_friction", "E_contact", "E_absorbed")
+    values = {name: result[name] for name in names if name in result.history}
     values["E_elastic"] = result["E_internal"] - result["E_plastic"]
     values["E_kinetic"] = values["E_kinetic"] - values["E_kinetic"][:1]
     scale, unit = engineering(max(float(np.max(np.abs(v), initial=0.0)) for v in values.values()), "J")
     time = 1e3 * result.time
     energies.axhline(0.0, color="0.5", linewidth=0.8)
-    for name, label, color, style in CURVES:
+    for name, label, color, style in (curve for curve in CURVES if curve[0] in values):
         energies.plot(time, scale * values[name], color=color, linestyle=style, label=label, linewidth=1.4)
     energies.set_ylabel(f"energy [{unit}]")
     error = result["E_total_error"]
