@@ -18,6 +18,10 @@ def build(
     E: Annotated[float, Param("Young's modulus", unit="Pa", low=0.0, exclusive=True)] = 210e9,
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.3,
     rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 7850.0,
+    E_sphere: Annotated[
+        float | None, Param("Young's modulus of the sphere; None: E", unit="Pa", low=0.0, exclusive=True)
+    ] = None,
+    rigid_sphere: Annotated[bool, Param("the sphere stays rigid")] = False,
     target: Annotated[str, Param("what is struck", choices=("plane", "block"))] = "plane",
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 3.0,
     section: Annotated[int, Param("cells across the fine patch at the pole, even", low=2)] = 8,
@@ -33,7 +37,8 @@ def build(
     moving = mca.Body(
         name="sphere",
         geometry=sphere,
-        material=material,
+        material=mca.Elastic(E=E_sphere or E, nu=nu, rho=rho),
+        rigid=rigid_sphere,
         position=(0.0, radius, 0.0),
         rotation=(0.0, 0.0, -0.5 * math.pi),  # the pole points downwards
         velocity=(0.0, -v, 0.0),
