@@ -1,4 +1,4 @@
-"""Two links on hinges swing under gravity, already in motion: elastic ones nearly as rigid ones do, if they are stiff."""
+"""Two links on hinges swing under gravity, already in motion: elastic ones, or rigid ones, which these come near."""
 
 from __future__ import annotations
 

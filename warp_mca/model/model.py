@@ -17,7 +17,8 @@ from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
-from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_rows import RigidPin, RigidRow
 from warp_mca.model.rigid_step import stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
@@ -59,7 +60,7 @@ class Model:
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
         joints: name of each joint and its pairs.
         couplings: of joints between clusters of nodes; their pairs count as tied in no direction. Those of rigid bodies
-            are in `rigid_rows`.
+            are in `rigid_rows` and `rigid_pins`.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
         passes: contact passes; those of each scene in turn.
@@ -72,7 +73,7 @@ class Model:
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
         batch: where the scenes of a batch lie, or None for a model of one scene.
-        rigid_bodies, rigid_rows: rigid bodies, those of each scene in turn, and what binds them.
+        rigid_bodies, rigid_rows, rigid_pins: rigid bodies, those of each scene in turn, and what binds them.
         rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
             in a batch.
     """
@@ -108,6 +109,7 @@ class Model:
     batch: Layout | None = None
     rigid_bodies: tuple[RigidBody, ...] = ()
     rigid_rows: tuple[RigidRow, ...] = ()
+    rigid_pins: tuple[RigidPin, ...] = ()
     rigid_blocks: tuple[Block, ...] = ()
 
     def owner(self, element: int) -> tuple[str, int]:
@@ -258,8 +260,8 @@ def build_model(
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
-    bodies, rows = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
-    stable = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
+    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    stable = stable_with_rigid(parts, rigid.bodies, added, velocity) if rigid.bodies else parts.stable(added)
     return Model(
         X=parts.X,
         V=velocity,
@@ -269,7 +271,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
-        couplings=flexible(couplings, pairs, bodies),
+        couplings=flexible(couplings, pairs, rigid.bodies),
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
         passes=passes,
@@ -281,7 +283,8 @@ def build_model(
         element_of=np.concatenate([order, rigid_order]),
         stable=stable,
         batch=None,
-        rigid_bodies=bodies,
-        rigid_rows=rows,
+        rigid_bodies=rigid.bodies,
+        rigid_rows=rigid.rows,
+        rigid_pins=rigid.pins,
         rigid_blocks=rigid_blocks,
     )
