@@ -19,7 +19,7 @@ from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, mova
 from warp_mca.model.layout import Layout
 from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
 from warp_mca.model.rigid_rows import RigidPin, RigidRow
-from warp_mca.model.rigid_step import stable_with_rigid
+from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.scene import Contact, RigidPlane, Scene
@@ -141,7 +141,7 @@ def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...]
             sides = (slave, master) if item.sign > 0.0 else (master, slave)
             assert sides[0] is not None
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
-            np.add.at(added, nodes, value)
+            np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             passes.append(item)
         axes[index] = _axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added

@@ -142,7 +142,7 @@ def joint_rows(
 
 def across(along: Array) -> Array:
     """Two unit vectors perpendicular to another and to each other, shape (2, 3)."""
-    one: Array = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    one = np.asarray(np.cross(along, np.eye(3)[np.abs(along).argmin()]), dtype=np.float64)
     one = one / np.linalg.norm(one)
     return np.stack([one, np.cross(along, one)])
 
