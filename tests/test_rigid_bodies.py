@@ -40,7 +40,7 @@ def momenta(impact: Impact) -> tuple[NDArray, float]:
 
 
 def keeps_momentum(scene: mca.Scene, axes: Sequence[int] = range(6), **settings: str) -> Impact:
-    """The finished impact, which kept the momenta of these axes: float64, where forces of elements cancel to rounding."""
+    """The finished impact, which kept these momenta; in float64, where forces of elements cancel to rounding."""
     impact = begun(scene, **{"precision": "float64", **settings})  # type: ignore[arg-type]
     before, size = momenta(impact)
     impact.advance()
@@ -54,7 +54,12 @@ def block(**change: object) -> mca.Scene:
     """A box with three different moments of inertia, turning freely near its middle axis."""
     box = mca.Box(size=(0.1, 0.2, 0.3), divisions=(2, 2, 2), origin=(-0.05, -0.1, -0.15))
     body = mca.Body(
-        name="block", geometry=box, material=SOFT, rigid=True, velocity=(1.0, -2.0, 3.0), angular_velocity=(0.1, 9.0, 0.2)
+        name="block",
+        geometry=box,
+        material=SOFT,
+        rigid=True,
+        velocity=(1.0, -2.0, 3.0),
+        angular_velocity=(0.1, 9.0, 0.2),
     )
     return mca.Scene(name="block", bodies=(body,), impact=mca.ImpactPhase(duration=2.0, output_interval=1e-3), **change)
 
@@ -130,26 +135,28 @@ def test_hinges_of_rigid_bodies_keep_momentum_and_hold(rigid: str, nodes: str):
 
 def test_pins_of_a_rigid_and_of_an_elastic_bar_are_alike():
     """A pendulum of two stiff bars swings alike with pins between elastic, mixed and rigid bars."""
-    scene = mca.make_scene("double_pendulum", duration=0.05, samples=100, axial=4, deep=4, wide=2, E=2e9)
+    scene = mca.make_scene("double_pendulum", duration=0.02, samples=100, axial=4, deep=4, wide=1, E=2e9)
     pins = tuple(replace(joint, nodes="pin", pin_radius=0.09) for joint in scene.joints)
     ends = []
     for rigid in ("", "OA", "AB", "OA AB"):
         bodies = tuple(replace(body, rigid=body.name in rigid) for body in scene.bodies)
         impact = finished(replace(scene, bodies=bodies, joints=pins))
-        ends.append(impact.state.u.numpy()[impact.solver.model.points[0]])
-    assert np.abs(np.array(ends) - ends[-1]).max() < 2e-3 * np.linalg.norm(ends[-1])
+        ends.append(impact.at_last_record()[0][impact.solver.model.points[0]])
+    assert np.abs(np.array(ends) - ends[-1]).max() < 1e-3 * np.linalg.norm(ends[-1])
 
 
 def test_a_weld_of_a_rigid_and_an_elastic_body_is_one_body():
-    left = mca.Body(name="left", geometry=BAR, material=SOFT, rigid=True, velocity=(0.0, 1.0, 0.0))
-    right = mca.Body(name="right", geometry=BAR, material=SOFT, position=(0.3, 0.0, 0.0), kinematics="finite")
+    spin = {"material": SOFT, "kinematics": "finite", "angular_velocity": (0.0, 0.0, 30.0)}
+    left = mca.Body(name="left", geometry=BAR, rigid=True, **spin)  # type: ignore[arg-type]
+    right = mca.Body(name="right", geometry=BAR, position=(0.3, 0.0, 0.0), velocity=(0.0, 9.0, 0.0), **spin)  # type: ignore[arg-type]
     weld = mca.Weld(name="w", body="right", nodes="xmin", other="left", other_nodes="xmax")
     impact = mca.ImpactPhase(duration=2e-4, output_interval=1e-5)
-    found = keeps_momentum(mca.Scene(name="weld", bodies=(left, right), joints=(weld,), impact=impact))
+    scene = mca.Scene(name="weld", bodies=(left, right), joints=(weld,), impact=impact)
+    start, found = begun(scene, precision="float64").state.v.numpy(), keeps_momentum(scene)
     gained = np.array(result_of(found).summary["joint_impulse"]["w"])
     right_nodes = slice(found.solver.model.node_start["right"], None)
-    p = found.solver.model.mass[right_nodes] @ found.state.v.numpy()[right_nodes]
-    assert np.abs(p - gained).max() < ROUND_OFF * np.abs(p).max() and p[1] > 0.0
+    p = found.solver.model.mass[right_nodes] @ (found.state.v.numpy() - start)[right_nodes]
+    assert np.abs(p - gained).max() < 1e-14 and p[0] < -5e-3  # pulled inwards
 
 
 def ball(rigid: str, **contact: object) -> mca.Scene:
@@ -319,7 +326,10 @@ def refusals() -> dict[str, tuple[mca.Scene, str]]:
     assert torque.rigid is not None
     base = mca.BaseMotion(times=(0.0,), vx=(1.0,), vy=(0.0,))
     return {
-        "driven": (replace(bars, joints=(), prescribed=(turned,)), "Prescribed.body = 'B': its nodes move as one rigid body"),
+        "driven": (
+            replace(bars, joints=(), prescribed=(turned,)),
+            "Prescribed.body = 'B': its nodes move as one rigid body",
+        ),
         "slide": (replace(bars, joints=(slide,)), "Prismatic s.body = 'B': nodes of rigid bodies are tied in all"),
         "fixed": (replace(struck, bodies=moving, fixed=fixed), "Fixed.axes = 'y': nodes of rigid body plate move"),
         "friction": (
@@ -344,7 +354,7 @@ def test_what_rigid_bodies_cannot_do_is_refused(case: str):
 def test_unknown_names_of_rigid_bodies_are_refused():
     with pytest.raises(mca.RequestError, match="rigid_bodies = 'OB': name some of OA, AB, plate"):
         mca.make_scene("two_link", rigid_bodies="OB")
-    with pytest.raises(mca.RequestError, match="Body b.rigid"):
+    with pytest.raises(mca.RequestError, match=r"Body b\.rigid"):
         mca.Body(name="b", geometry=BAR, material=SOFT, rigid="yes")  # type: ignore[arg-type]
 
 
