@@ -1,4 +1,4 @@
-"""Two elastic links on hinges swing under gravity, already in motion: nearly as rigid ones do, if they are stiff."""
+"""Two links on hinges swing under gravity, already in motion: elastic ones, or rigid ones, which these come near."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ def build(
     length: Annotated[float, Param("length of each link", unit="m", low=0.0, exclusive=True)] = 1.0,
     depth: Annotated[float, Param("depth of the links, along y", unit="m", low=0.0, exclusive=True)] = 0.2,
     width: Annotated[float, Param("width of the links, along z", unit="m", low=0.0, exclusive=True)] = 0.1,
+    rigid: Annotated[bool, Param("the links stay rigid")] = False,
     E: Annotated[float, Param("Young's modulus", unit="Pa", low=0.0, exclusive=True)] = 200e6,
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.3,
     rho_OA: Annotated[float, Param("density of OA", unit="kg/m^3", low=0.0, exclusive=True)] = 1000.0,
@@ -54,6 +55,7 @@ def build(
             rotation=(0.0, 0.0, -theta - 0.5 * math.pi),
             velocity=speed,
             angular_velocity=(0.0, 0.0, -rate),
+            rigid=rigid,
         )
         for name, rho, place, theta, speed, rate in zip(
             ("OA", "AB"), (rho_OA, rho_AB), places, (theta_OA, theta_AB), speeds, rates, strict=True

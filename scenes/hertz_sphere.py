@@ -18,6 +18,8 @@ def build(
     E: Annotated[float, Param("Young's modulus", unit="Pa", low=0.0, exclusive=True)] = 210e9,
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.3,
     rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 7850.0,
+    E_ratio: Annotated[float, Param("Young's modulus of the sphere over E", low=0.0, exclusive=True)] = 1.0,
+    rigid_sphere: Annotated[bool, Param("the sphere stays rigid")] = False,
     target: Annotated[str, Param("what is struck", choices=("plane", "block"))] = "plane",
     penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 3.0,
     section: Annotated[int, Param("cells across the fine patch at the pole, even", low=2)] = 8,
@@ -27,13 +29,13 @@ def build(
     """A quarter of the sphere, which moves along -y onto y = 0, with its planes of symmetry held."""
     material = mca.Elastic(E=E, nu=nu, rho=rho)
     ring = max(2, section // 2)
-    sphere = mca.Sphere(
-        radius=radius, part="quarter", section=section, ring=ring, pole_size=pole_size, pole_layers=pole_layers
-    )
+    patch = {"section": section, "ring": ring, "pole_size": pole_size, "pole_layers": pole_layers}
+    sphere = mca.Sphere(radius=radius, part="quarter", **patch)  # pyright: ignore[reportArgumentType]
     moving = mca.Body(
         name="sphere",
         geometry=sphere,
-        material=material,
+        material=mca.Elastic(E=E_ratio * E, nu=nu, rho=rho),
+        rigid=rigid_sphere,
         position=(0.0, radius, 0.0),
         rotation=(0.0, 0.0, -0.5 * math.pi),  # the pole points downwards
         velocity=(0.0, -v, 0.0),

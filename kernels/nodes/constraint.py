@@ -174,11 +174,9 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
         wait_for_previous()
         let_next_begin()
         k = wp.tid()
-        pairs = bonds.first.shape[0]
         i = bound_node(k, bonds)
-        if wp.static(skips):
-            if i < 0:
-                return
+        if wp.static(skips) and i < 0:
+            return
         total = total_force(i, first_slots, more_slots, force, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         free = v_out[i] + dt * a
@@ -187,7 +185,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
             v_before_out[i] = v_out[i]
         u = wp.vec3d()
         v = wp.vec3d()
-        if k < pairs:
+        if k < bonds.first.shape[0]:
             j = bonds.second[k]
             if j >= 0:
                 if v_before_out.shape[0] > 0:
@@ -209,7 +207,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
                 v = free + bonds.tied[k] * (v - free)
             impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
         else:
-            v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
+            v = drive(k - bonds.first.shape[0], mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
             u = u_free + dt * (v - free)
         move(i, u, v, u_out, v_out, speed_square_out)
 

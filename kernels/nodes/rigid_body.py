@@ -10,10 +10,14 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.cluster import Clusters, Mean
+from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.joint_torque import block_sum, wait_for_block
 from warp_mca.kernels.nodes.node import gather_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
-from warp_mca.kernels.nodes.rigid_rows import RigidRows, factorise, place_row, row_lightness, satisfy
+from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster, spin_of
+from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
+from warp_mca.kernels.nodes.symmetric import factorise
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -64,15 +68,19 @@ def load_function(precision: str, contact: bool) -> Any:
 def move_on(
     b: int,
     span: wp.float64,
+    moves: bool,
     turn: wp.array(dtype=wp.vec3d),
     velocity: wp.array(dtype=wp.vec3d),
     centre_out: wp.array(dtype=wp.vec3d),
     rotation_out: wp.array(dtype=wp.quatd),
+    turned_out: wp.array(dtype=wp.mat33d),
 ):
-    """Take the pose of a body from t(n) to t(n+1)."""
-    f = turn[b]
-    centre_out[b] = centre_out[b] + span * velocity[b]
-    rotation_out[b] = wp.normalize(rotation_out[b] * wp.quatd(f[0], f[1], f[2], wp.float64(1.0)))
+    """Take the pose of a body from t(n) to t(n+1), if it moves, and say what Q - I is then."""
+    if moves:
+        f = turn[b]
+        centre_out[b] = centre_out[b] + span * velocity[b]
+        rotation_out[b] = wp.normalize(rotation_out[b] * wp.quatd(f[0], f[1], f[2], wp.float64(1.0)))
+    turned_out[b] = turned_by(rotation_out[b])
 
 
 @wp.func
@@ -103,101 +111,74 @@ def advance_kernel(precision: str, contact: bool) -> Any:
 
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
-    Q - I after the step, the other outputs from force_out on are as in `find_motion` and `rigid_rows`.
+    Q - I after the step, the other outputs from force_out on are as in `find_motion`, `rigid_rows` and `rigid_pins`.
     """
     vec3 = scalars(precision).vec3
     load = load_function(precision, contact)
 
+    # fmt: off
     @wp.kernel(enable_backward=False, module="unique")
     def advance_rigid(
-        bodies: RigidBodies,
-        rows: RigidRows,
-        mass: wp.array(dtype=wp.float64),
-        v: wp.array(dtype=wp.vec3d),
-        first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i),
-        force: wp.array(dtype=vec3),
-        kick: wp.float64,
-        span: wp.float64,
-        moves: bool,
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        centre_out: wp.array(dtype=wp.vec3d),
-        rotation_out: wp.array(dtype=wp.quatd),
-        momentum_out: wp.array(dtype=wp.vec3d),
-        spin_out: wp.array(dtype=wp.vec3d),
-        impulse_out: wp.array(dtype=wp.vec3d),
-        force_out: wp.array(dtype=wp.vec3d),
-        turn_out: wp.array(dtype=wp.vec3d),
-        velocity_out: wp.array(dtype=wp.vec3d),
-        rate_out: wp.array(dtype=wp.mat33d),
-        turned_out: wp.array(dtype=wp.mat33d),
-        normal_out: wp.array(dtype=wp.vec3d),
-        lever_out: wp.array2d(dtype=wp.vec3d),
-        gap_out: wp.array(dtype=wp.float64),
-        value_out: wp.array(dtype=wp.float64),
-        matrix_out: wp.array(dtype=wp.float64),
+        bodies: RigidBodies, rows: RigidRows, clusters: Clusters, X: wp.array(dtype=wp.vec3d),
+        mass: wp.array(dtype=wp.float64), first_slots: wp.array(dtype=wp.vec2i),
+        more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), kick: wp.float64, span: wp.float64,
+        moves: bool, contact_force_out: wp.array(dtype=wp.vec3d), u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d), speed_square_out: wp.array(dtype=wp.float32),
+        centre_out: wp.array(dtype=wp.vec3d), rotation_out: wp.array(dtype=wp.quatd),
+        momentum_out: wp.array(dtype=wp.vec3d), spin_out: wp.array(dtype=wp.vec3d),
+        orientation_out: wp.array(dtype=wp.quatd), impulse_out: wp.array(dtype=wp.vec3d),
+        force_out: wp.array(dtype=wp.vec3d), turn_out: wp.array(dtype=wp.vec3d),
+        velocity_out: wp.array(dtype=wp.vec3d), rate_out: wp.array(dtype=wp.mat33d),
+        turned_out: wp.array(dtype=wp.mat33d), normal_out: wp.array(dtype=wp.vec3d),
+        twist_out: wp.array(dtype=wp.vec3d), lever_out: wp.array2d(dtype=wp.vec3d),
+        gap_out: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64),
+        matrix_out: wp.array(dtype=wp.float64), mean_out: wp.array(dtype=Mean),
+        point_out: wp.array(dtype=wp.vec3d), pin_impulse_out: wp.array2d(dtype=wp.vec3d),
+        place_out: wp.array(dtype=wp.vec3d), axis_out: wp.array(dtype=wp.vec3d),
     ):
         k, lane = wp.tid()
         begin = rows.begin[k]
         size = rows.begin[k + 1] - begin
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
-            load(
-                b,
-                lane,
-                kick,
-                bodies,
-                rotation_out,
-                first_slots,
-                more_slots,
-                force,
-                contact_force_out,
-                momentum_out,
-                spin_out,
-                force_out,
-            )
+            load(b, lane, kick, bodies, rotation_out, first_slots, more_slots, force,
+                 contact_force_out, momentum_out, spin_out, force_out)
             if lane == 0:
                 find_motion(b, bodies, span, rotation_out, momentum_out, spin_out, turn_out, velocity_out, rate_out)
+        for p in range(rows.pins[k], rows.pins[k + 1]):
+            find_cluster(p, lane, clusters, X, mass, span, orientation_out, u_out, v_out,
+                         mean_out, point_out, pin_impulse_out)
         if size > 0:
             for r in range(begin + lane, begin + size, wp.block_dim()):
-                place_row(r, rows, span, centre_out, rotation_out, normal_out, lever_out, gap_out)
+                place_row(r, rows, span, centre_out, rotation_out, normal_out, twist_out, lever_out, gap_out)
             wait_for_block()
             for e in range(lane, size * size, wp.block_dim()):
                 r = begin + e // size
                 s = begin + e % size
-                matrix_out[rows.entry[k] + e] = row_lightness(r, s, bodies, rows, normal_out, lever_out)
+                x = row_lightness(r, s, bodies, rows, moves, normal_out, twist_out, lever_out, mean_out)
+                matrix_out[rows.entry[k] + e] = x
             wait_for_block()
             if lane == 0:
                 factorise(rows.entry[k], size, matrix_out)
-                satisfy(
-                    k,
-                    span,
-                    moves,
-                    bodies,
-                    rows,
-                    rotation_out,
-                    normal_out,
-                    lever_out,
-                    gap_out,
-                    matrix_out,
-                    momentum_out,
-                    spin_out,
-                    impulse_out,
-                    turn_out,
-                    velocity_out,
-                    rate_out,
-                    value_out,
-                )
+                satisfy(k, span, moves, bodies, rows, clusters, orientation_out, mean_out, point_out, rotation_out,
+                        normal_out, twist_out, lever_out, gap_out, matrix_out, momentum_out, spin_out, impulse_out,
+                        pin_impulse_out, place_out, axis_out, turn_out, velocity_out, rate_out, value_out)
         wait_for_block()
+        if moves:
+            for p in range(rows.pins[k], rows.pins[k + 1]):
+                pull_cluster(p, lane, clusters, X, span, mean_out, point_out, pin_impulse_out,
+                             u_out, v_out, speed_square_out)
+                if lane == 0:
+                    w = spin_of(mean_out[p], pin_impulse_out[p, 0], pin_impulse_out[p, 1])
+                    orientation_out[p] = turned(orientation_out[p], span * w)
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
             if moves:
-                count_riders(b, lane, kick, bodies, mass, v, force_out, velocity_out, rate_out, impulse_out)
-                if lane == 0:
-                    move_on(b, span, turn_out, velocity_out, centre_out, rotation_out)
+                count_riders(b, lane, kick, bodies, mass, v_out, force_out, velocity_out, rate_out, impulse_out)
             if lane == 0:
-                turned_out[b] = turned_by(rotation_out[b])
+                move_on(b, span, moves, turn_out, velocity_out, centre_out, rotation_out, turned_out)
 
+    # fmt: on
     return advance_rigid
 
 

@@ -8,12 +8,14 @@ steps reach rounding.
 
 import warp as wp
 
+from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
+from warp_mca.kernels.nodes.rigid_pins import move_pin, pin_lightness
+from warp_mca.kernels.nodes.symmetric import solve
 
 wp.set_module_options({"enable_backward": False})
 
 SOLVES = 50  # steps of Newton's method at most
-DEPENDENT = 1e-10  # of its diagonal entry: pivot below which a row follows from those before it
 
 
 @wp.struct
@@ -24,25 +26,34 @@ class RigidRows:
         member: bodies, group by group, shape (body_count,), int32.
         body, begin: first place in `member` and first row of each group, and the numbers of all, shape
             (group_count + 1,), int32.
+        pins: first pin of each group, and the number of all, shape (group_count + 1,), int32.
         entry: first entry of each group's matrix, shape (group_count,), int32.
         first, second: bodies of each row, second -1 where that is the ground, shape (row_count,), int32.
         first_arm, second_arm: reference position of the common point from the bodies' mass centres [m], shape
             (row_count,), vec3d.
         direction: n at the reference positions [-], shape (row_count,), vec3d; it turns with the first body, unless the
             second is the ground.
+        pin: that the row belongs to, -1 where the second side is no cluster, shape (row_count,), int32.
+        twist: axis of a pin's row that holds a direction, at the reference positions, and 0 of other rows, whose n is 0
+            there [-], shape (row_count,), vec3d.
         pair: that takes the row's impulse, -1 where none does, shape (row_count,), int32.
+        sign: of this impulse, 1 where the first body is the joint's first one, else -1, shape (row_count,), float64.
     """
 
     member: wp.array(dtype=wp.int32)
     body: wp.array(dtype=wp.int32)
     begin: wp.array(dtype=wp.int32)
+    pins: wp.array(dtype=wp.int32)
     entry: wp.array(dtype=wp.int32)
     first: wp.array(dtype=wp.int32)
     second: wp.array(dtype=wp.int32)
     first_arm: wp.array(dtype=wp.vec3d)
     second_arm: wp.array(dtype=wp.vec3d)
     direction: wp.array(dtype=wp.vec3d)
+    pin: wp.array(dtype=wp.int32)
+    twist: wp.array(dtype=wp.vec3d)
     pair: wp.array(dtype=wp.int32)
+    sign: wp.array(dtype=wp.float64)
 
 
 @wp.func
@@ -69,10 +80,11 @@ def place_row(
     centre: wp.array(dtype=wp.vec3d),
     rotation: wp.array(dtype=wp.quatd),
     normal_out: wp.array(dtype=wp.vec3d),
+    twist_out: wp.array(dtype=wp.vec3d),
     lever_out: wp.array2d(dtype=wp.vec3d),
     gap_out: wp.array(dtype=wp.float64),
 ):
-    """n at t(n), levers on both bodies, and the speed that closes what is open along n at t(n) in the step [m/s]."""
+    """n and twist at t(n), levers on both bodies, and the speed that closes what is open along n in the step [m/s]."""
     a = rows.first[r]
     b = rows.second[r]
     n = rows.direction[r]
@@ -83,7 +95,8 @@ def place_row(
         apart -= centre[b] + turned_by(rotation[b]) * rows.second_arm[r]
         lever_out[r, 1] = lever(rotation[b], rows.second_arm[r], n)
     normal_out[r] = n
-    lever_out[r, 0] = lever(q, rows.first_arm[r], n)
+    twist_out[r] = wp.quat_rotate(q, rows.twist[r])
+    lever_out[r, 0] = lever(q, rows.first_arm[r], n) + rows.twist[r]
     gap_out[r] = wp.dot(n, apart) / span
 
 
@@ -93,10 +106,15 @@ def row_lightness(
     s: int,
     bodies: RigidBodies,
     rows: RigidRows,
+    moves: bool,
     normal: wp.array(dtype=wp.vec3d),
+    twist: wp.array(dtype=wp.vec3d),
     levers: wp.array2d(dtype=wp.vec3d),
+    mean: wp.array(dtype=Mean),
 ) -> wp.float64:
-    """Entry of the matrix of a group: speed that opens row r by a unit impulse of row s [1/kg]."""
+    """Entry of the matrix of a group: speed that opens row r by a unit impulse of row s [1/kg]; 0 of idle pins."""
+    if not moves and (rows.pin[r] >= 0 or rows.pin[s] >= 0):
+        return wp.float64(0.0)
     a = rows.first[r]
     b = rows.second[r]
     c = rows.first[s]
@@ -106,67 +124,31 @@ def row_lightness(
     found = lightness(a, c, bodies, n, levers[r, 0], m, levers[s, 0])
     found -= lightness(a, d, bodies, n, levers[r, 0], m, levers[s, 1])
     found -= lightness(b, c, bodies, n, levers[r, 1], m, levers[s, 0])
-    return found + lightness(b, d, bodies, n, levers[r, 1], m, levers[s, 1])
-
-
-@wp.func
-def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
-    """L D L^T of a symmetric matrix in place, D on the diagonal; it is 0 for rows that follow from those before."""
-    for j in range(size):
-        pivot = matrix_out[first + j * size + j]
-        least = wp.float64(DEPENDENT) * pivot
-        for k in range(j):
-            x = matrix_out[first + j * size + k]
-            pivot -= x * x * matrix_out[first + k * size + k]
-        if pivot <= least:
-            pivot = wp.float64(0.0)
-        matrix_out[first + j * size + j] = pivot
-        for i in range(j + 1, size):
-            x = matrix_out[first + i * size + j]
-            for k in range(j):
-                y = matrix_out[first + j * size + k] * matrix_out[first + k * size + k]
-                x -= matrix_out[first + i * size + k] * y
-            if pivot > wp.float64(0.0):
-                x = x / pivot
-            else:
-                x = wp.float64(0.0)
-            matrix_out[first + i * size + j] = x
-
-
-@wp.func
-def solve(first: int, size: int, begin: int, matrix: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64)):
-    """Solution for the right-hand side in value_out[begin:]; 0 for rows that follow from others."""
-    for i in range(size):
-        x = value_out[begin + i]
-        for k in range(i):
-            x -= matrix[first + i * size + k] * value_out[begin + k]
-        value_out[begin + i] = x
-    for i in range(size):
-        pivot = matrix[first + i * size + i]
-        if pivot > wp.float64(0.0):
-            value_out[begin + i] = value_out[begin + i] / pivot
-        else:
-            value_out[begin + i] = wp.float64(0.0)
-    for back in range(size):
-        i = size - 1 - back
-        x = value_out[begin + i]
-        for k in range(i + 1, size):
-            x -= matrix[first + k * size + i] * value_out[begin + k]
-        value_out[begin + i] = x
+    found += lightness(b, d, bodies, n, levers[r, 1], m, levers[s, 1])
+    if rows.pin[r] >= 0 and rows.pin[r] == rows.pin[s]:
+        found += pin_lightness(mean[rows.pin[r]], n, twist[r], m, twist[s])
+    return found
 
 
 @wp.func
 def opening(
     begin: int,
     end: int,
+    span: wp.float64,
+    moves: bool,
     rows: RigidRows,
+    clusters: Clusters,
+    rotation: wp.array(dtype=wp.quatd),
     normal: wp.array(dtype=wp.vec3d),
+    twist: wp.array(dtype=wp.vec3d),
     gap: wp.array(dtype=wp.float64),
     velocity: wp.array(dtype=wp.vec3d),
     rate: wp.array(dtype=wp.mat33d),
+    place: wp.array(dtype=wp.vec3d),
+    axis: wp.array(dtype=wp.vec3d),
     value_out: wp.array(dtype=wp.float64),
 ) -> wp.float64:
-    """Speeds at which rows would be open at t(n+1), negative [m/s]; the greatest."""
+    """Speeds at which rows would be open at t(n+1), negative [m/s]; the greatest. Directions open in rad/s."""
     worst = wp.float64(0.0)
     for r in range(begin, end):
         a = rows.first[r]
@@ -175,6 +157,12 @@ def opening(
         if b >= 0:
             v -= velocity[b] + rate[b] * rows.second_arm[r]
         speed = wp.dot(normal[r], v) + gap[r]
+        p = rows.pin[r]
+        if p >= 0:
+            d = wp.quat_rotate(rotation[a], clusters.axis[p]) + span * (rate[a] * clusters.axis[p])
+            speed += (wp.dot(twist[r], wp.cross(axis[p], d)) - wp.dot(normal[r], place[p])) / span
+            if not moves:
+                speed = wp.float64(0.0)
         value_out[r] = -speed
         worst = wp.max(worst, wp.abs(speed))
     return worst
@@ -188,13 +176,15 @@ def give_impulses(
     rows: RigidRows,
     rotation: wp.array(dtype=wp.quatd),
     normal: wp.array(dtype=wp.vec3d),
+    twist: wp.array(dtype=wp.vec3d),
     levers: wp.array2d(dtype=wp.vec3d),
     value: wp.array(dtype=wp.float64),
     momentum_out: wp.array(dtype=wp.vec3d),
     spin_out: wp.array(dtype=wp.vec3d),
     impulse_out: wp.array(dtype=wp.vec3d),
+    pin_impulse_out: wp.array2d(dtype=wp.vec3d),
 ):
-    """Impulses [N s] of rows on their bodies, equal and opposite at the common point."""
+    """Impulses [N s] of rows on their bodies, equal and opposite at the common point, and those of pins' clusters."""
     for r in range(begin, end):
         a = rows.first[r]
         b = rows.second[r]
@@ -205,7 +195,11 @@ def give_impulses(
             momentum_out[b] = momentum_out[b] - J
             spin_out[b] = spin_out[b] - value[r] * wp.quat_rotate(rotation[b], levers[r, 1])
         if counts and rows.pair[r] >= 0:
-            impulse_out[rows.pair[r]] = impulse_out[rows.pair[r]] + J
+            impulse_out[rows.pair[r]] = impulse_out[rows.pair[r]] + rows.sign[r] * J
+        p = rows.pin[r]
+        if p >= 0:
+            pin_impulse_out[p, 0] = pin_impulse_out[p, 0] - J
+            pin_impulse_out[p, 1] = pin_impulse_out[p, 1] - value[r] * twist[r]
 
 
 @wp.func
@@ -215,32 +209,51 @@ def satisfy(
     counts: bool,
     bodies: RigidBodies,
     rows: RigidRows,
+    clusters: Clusters,
+    orientation: wp.array(dtype=wp.quatd),
+    mean: wp.array(dtype=Mean),
+    point: wp.array(dtype=wp.vec3d),
     rotation: wp.array(dtype=wp.quatd),
     normal: wp.array(dtype=wp.vec3d),
+    twist: wp.array(dtype=wp.vec3d),
     levers: wp.array2d(dtype=wp.vec3d),
     gap: wp.array(dtype=wp.float64),
     matrix: wp.array(dtype=wp.float64),
     momentum_out: wp.array(dtype=wp.vec3d),
     spin_out: wp.array(dtype=wp.vec3d),
     impulse_out: wp.array(dtype=wp.vec3d),
+    pin_impulse_out: wp.array2d(dtype=wp.vec3d),
+    place_out: wp.array(dtype=wp.vec3d),
+    axis_out: wp.array(dtype=wp.vec3d),
     turn_out: wp.array(dtype=wp.vec3d),
     velocity_out: wp.array(dtype=wp.vec3d),
     rate_out: wp.array(dtype=wp.mat33d),
     value_out: wp.array(dtype=wp.float64),
 ):
-    """Close the rows of group k, whose bodies' motion is that without them, until rounding is what opens them."""
+    """Close the rows of group k, whose bodies' motion is that without them, until rounding is what opens them.
+
+    `counts`: impulses count, and pins act; neither does before the first step.
+    """
     begin = rows.begin[k]
     end = rows.begin[k + 1]
     best = wp.float64(0.0)
+    # fmt: off
     for step in range(SOLVES):
-        worst = opening(begin, end, rows, normal, gap, velocity_out, rate_out, value_out)
+        for p in range(rows.pins[k], rows.pins[k + 1]):
+            move_pin(p, clusters, span, orientation, mean, point, pin_impulse_out, place_out, axis_out)
+        worst = opening(
+            begin, end, span, counts, rows, clusters, rotation, normal, twist, gap, velocity_out, rate_out,
+            place_out, axis_out, value_out,
+        )
         if worst == wp.float64(0.0) or (step > 0 and worst >= best):
             break
         best = worst
         solve(rows.entry[k], end - begin, begin, matrix, value_out)
         give_impulses(
-            begin, end, counts, rows, rotation, normal, levers, value_out, momentum_out, spin_out, impulse_out
+            begin, end, counts, rows, rotation, normal, twist, levers, value_out,
+            momentum_out, spin_out, impulse_out, pin_impulse_out,
         )
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
             find_motion(b, bodies, span, rotation, momentum_out, spin_out, turn_out, velocity_out, rate_out)
+    # fmt: on

@@ -187,6 +187,7 @@ def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, An
 def _rigid(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any]:
     """Rigid bodies of all scenes, and what binds them; arguments as of `_joints`."""
     first = offsets([len(model.rigid_bodies) for model in models])
+    first_pin = offsets([len(model.rigid_pins) for model in models])
     bodies = tuple(
         replace(
             body,
@@ -205,11 +206,17 @@ def _rigid(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any
             first=row.first + int(first[k]),
             second=row.second if row.second == GROUND else row.second + int(first[k]),
             pair=row.pair if row.pair < 0 else row.pair + int(pairs[k]),
+            pin=row.pin if row.pin < 0 else row.pin + int(first_pin[k]),
         )
         for k, model in enumerate(models)
         for row in model.rigid_rows
     )
-    return {"rigid_bodies": bodies, "rigid_rows": rows}
+    pins = tuple(
+        replace(pin, body=pin.body + int(first[k]), start=pin.start + int(pairs[k]), end=pin.end + int(pairs[k]))
+        for k, model in enumerate(models)
+        for pin in model.rigid_pins
+    )
+    return {"rigid_bodies": bodies, "rigid_rows": rows, "rigid_pins": pins}
 
 
 def _starts(models: Sequence[Model], name: str, first: Index) -> dict[str, int]:

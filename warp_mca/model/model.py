@@ -19,8 +19,9 @@ from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling, check_masses, scale_masses
-from warp_mca.model.rigid_bodies import RigidBody, RigidRow, check_loads, flexible, rigid_bodies
-from warp_mca.model.rigid_step import stable_with_rigid
+from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_rows import RigidPin, RigidRow
+from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.model.tied_nodes import TiedNodes, check_ties, on_faces, tied_nodes
@@ -62,7 +63,7 @@ class Model:
             `joint_first`, shape (rail_count, 3), int32. They count as pairs that are tied in no direction.
         joints: name of each joint and its pairs.
         couplings: of joints between clusters of nodes; their pairs count as tied in no direction. Those of rigid bodies
-            are in `rigid_rows`.
+            are in `rigid_rows` and `rigid_pins`.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
         absorbing: nodes of absorbing boundaries.
@@ -78,7 +79,7 @@ class Model:
         stable: the stable time step.
         scaling: what mass scaling added to `mass`, or None.
         batch: where the scenes of a batch lie, or None for a model of one scene.
-        rigid_bodies, rigid_rows: rigid bodies, those of each scene in turn, and what binds them.
+        rigid_bodies, rigid_rows, rigid_pins: rigid bodies, those of each scene in turn, and what binds them.
         rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
             in a batch.
     """
@@ -117,6 +118,7 @@ class Model:
     batch: Layout | None = None
     rigid_bodies: tuple[RigidBody, ...] = ()
     rigid_rows: tuple[RigidRow, ...] = ()
+    rigid_pins: tuple[RigidPin, ...] = ()
     rigid_blocks: tuple[Block, ...] = ()
 
     def owner(self, element: int) -> tuple[str, int]:
@@ -148,7 +150,7 @@ def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...]
             sides = (slave, master) if item.sign > 0.0 else (master, slave)
             assert sides[0] is not None
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
-            np.add.at(added, nodes, value)
+            np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             passes.append(item)
         axes[index] = _axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added
@@ -271,9 +273,9 @@ def build_model(
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     parts.relief = ties.relief(parts.mass)
-    bodies, rows = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
-    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in bodies)], velocity)
-    plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
+    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
+    plain = stable_with_rigid(parts, rigid.bodies, added, velocity) if rigid.bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
     check_masses(parts, scaling)
     return Model(
@@ -285,7 +287,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
-        couplings=flexible(couplings, pairs, bodies),
+        couplings=flexible(couplings, pairs, rigid.bodies),
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
         bases=bases,
         absorbing=absorbing,
@@ -300,7 +302,8 @@ def build_model(
         stable=stable,
         scaling=scaling,
         batch=None,
-        rigid_bodies=bodies,
-        rigid_rows=rows,
+        rigid_bodies=rigid.bodies,
+        rigid_rows=rigid.rows,
+        rigid_pins=rigid.pins,
         rigid_blocks=rigid_blocks,
     )

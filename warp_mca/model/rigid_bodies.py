@@ -1,10 +1,10 @@
-"""Owns the rigid bodies of the impact phase on the host: mass properties, riders, and rows that bind them."""
+"""Owns the rigid bodies of the impact phase on the host: mass properties and riders."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,9 @@ from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.model.constraints import JointPairs
 from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import MovableBase
+from warp_mca.model.rigid_rows import RigidPin, RigidRow, check_joint, fixed_rows, joint_rows, pin_of, pin_rows
 from warp_mca.model.surfaces import ContactPass
 from warp_mca.scene import Scene
-from warp_mca.scene.joints import Joint
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
-
-HELD = 1e-4  # least share of a rigid motion that shows at fixed axes
-APART = 1e-6  # of the extent of a joint's nodes: distance at which two of them differ
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,27 +55,22 @@ class RigidBody:
     scene: int = 0
 
     @property
+    def radius(self) -> float:
+        """Of inertia [m]."""
+        return float(np.sqrt(0.5 * np.trace(self.inertia) / self.mass))
+
+    @property
     def nodes(self) -> Index:
         """All that move with the body, shape (node_count + rider_count,), int32."""
         return np.concatenate([self.own, self.riders]).astype(np.int32)
 
 
-@dataclass(frozen=True, kw_only=True)
-class RigidRow:
-    """A scalar condition of `kernels.nodes.rigid_rows`.
+class Rigid(NamedTuple):
+    """Rigid bodies of a scene, rows and pins, as `Model` has them."""
 
-    Attributes:
-        first, second: places of the bodies in `Model.rigid_bodies`; second is GROUND for the ground.
-        point: reference position of the common point [m], shape (3,), float64.
-        direction: n at the reference positions [-], shape (3,), float64.
-        pair: of `Model.joint_first` that takes the impulse, -1 where none does.
-    """
-
-    first: int
-    second: int
-    point: Array
-    direction: Array
-    pair: int = -1
+    bodies: tuple[RigidBody, ...] = ()
+    rows: tuple[RigidRow, ...] = ()
+    pins: tuple[RigidPin, ...] = ()
 
 
 def own_nodes(parts: Assembly) -> dict[str, Index]:
@@ -123,8 +115,8 @@ def rigid_bodies(
     couplings: Sequence[Coupling],
     passes: Sequence[ContactPass],
     velocity: Array,
-) -> tuple[tuple[RigidBody, ...], tuple[RigidRow, ...]]:
-    """The rigid bodies of a scene, and what binds them.
+) -> Rigid:
+    """The rigid bodies of a scene and what binds them.
 
     Args:
         parts: of the scene.
@@ -138,21 +130,29 @@ def rigid_bodies(
     """
     nodes = own_nodes(parts)
     if not nodes:
-        return (), ()
+        return Rigid()
     owner = np.full(len(parts.X), GROUND, dtype=np.int32)
     for place, own in enumerate(nodes.values()):
         owner[own] = place
     _check_drives(parts)
     coupled = {item.start: item for item in couplings}
     for joint, found in zip(parts.scene.joints, joints, strict=True):
-        _check_joint(joint, pairs, found, owner, found.start in coupled)
+        check_joint(joint, pairs, found, owner, found.start in coupled)
     touched = np.zeros(len(parts.X), dtype=bool)
     for item in passes:
         touched[item.slave], touched[item.master] = True, True
     bodies = [_body(parts, name, own, touched, pairs, owner) for name, own in nodes.items()]
-    rows = [row for found in joints for row in _joint_rows(parts, pairs, found, owner, coupled.get(found.start))]
-    rows += [row for place, name in enumerate(nodes) for row in _fixed_rows(parts, place, name, bodies, velocity)]
-    return tuple(bodies), tuple(rows)
+    pins: list[RigidPin] = []
+    rows = []
+    for found in joints:
+        if found.start in coupled and (item := pin_of(coupled[found.start], pairs, owner)):
+            rows += pin_rows(item, len(pins), found.start, bool(owner[pairs["joint_first"][found.start]] == GROUND))
+            pins.append(item)
+        else:
+            rows += joint_rows(parts, pairs, found, owner, coupled.get(found.start))
+    for place, body in enumerate(bodies):
+        rows += fixed_rows(parts, place, body.name, body.centre, body.radius, velocity)
+    return Rigid(tuple(bodies), tuple(rows), tuple(pins))
 
 
 def _check_drives(parts: Assembly) -> None:
@@ -160,19 +160,6 @@ def _check_drives(parts: Assembly) -> None:
         if parts.scene.body(item.body).rigid:
             remedy = "its nodes move as one rigid body, which no table drives; give it a velocity, or leave rigid off"
             raise bad_value("Prescribed.body", item.body, remedy)
-
-
-def _check_joint(joint: Joint, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupled: bool) -> None:
-    first, second = (pairs[name][found.start : found.end] for name in ("joint_first", "joint_second"))
-    sides = np.concatenate([owner[first], owner[second[second != GROUND]]])
-    tied = pairs["joint_tied"][found.start : found.end]
-    if (sides != GROUND).any() and coupled:
-        if (sides == GROUND).any():
-            remedy = "a pin joins two flexible bodies or two rigid ones; choose axis or ends, or leave rigid off"
-            raise bad_value(f"{joint.title}.nodes", "pin", remedy)
-    elif (sides != GROUND).any() and (tied != np.eye(3)).any():
-        remedy = "nodes of rigid bodies are tied in all directions or not at all; leave rigid off, or the joint out"
-        raise bad_value(f"{joint.title}.body", joint.body, remedy)
 
 
 def check_loads(scene: Scene, chain: Chain | None, bases: Sequence[MovableBase]) -> None:
@@ -225,78 +212,3 @@ def _body(
         centre=centre,
         inertia=np.trace(squares) * np.eye(3) - squares,
     )
-
-
-def _joint_rows(
-    parts: Assembly, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupling: Coupling | None
-) -> list[RigidRow]:
-    """Independent rows that hold the common nodes of two rigid bodies, or of one and the ground, together.
-
-    A coupling of rigid bodies joins two points of its axis.
-    """
-    first, second = (pairs[name][found.start : found.end] for name in ("joint_first", "joint_second"))
-    a = owner[first[0]]
-    if coupling:
-        b = owner[first[-1]] if coupling.end > coupling.middle else GROUND
-    else:
-        b = GROUND if second[0] == GROUND else owner[second[0]]
-    if a == GROUND or (b == GROUND and not coupling and second[0] != GROUND):
-        return []  # flexible bodies alone, or riders
-    points = parts.X[first]
-    if coupling:
-        reach = np.ptp(points, axis=0).max()
-        points = np.stack([coupling.place, coupling.place + reach * coupling.axis])
-    away = np.linalg.norm(points - points[0], axis=1)
-    far = int(away.argmax())
-    rows = [(0, direction) for direction in np.eye(3)]
-    if away[far] > 0.0:
-        along = (points[far] - points[0]) / away[far]
-        off = points - points[0] - np.outer((points - points[0]) @ along, along)
-        aside = np.linalg.norm(off, axis=1)
-        third = int(aside.argmax())
-        rows += [(far, direction) for direction in _across(along)]
-        if aside[third] > APART * away[far]:
-            rows.append((third, np.cross(along, off[third] / aside[third])))
-    return [
-        RigidRow(first=int(a), second=int(b), point=points[k], direction=direction, pair=found.start + k)
-        for k, direction in rows
-    ]
-
-
-def _across(along: Array) -> Array:
-    """Two unit vectors perpendicular to another and to each other, shape (2, 3)."""
-    one = np.cross(along, np.eye(3)[np.abs(along).argmin()])
-    one /= np.linalg.norm(one)
-    return np.stack([one, np.cross(along, one)])
-
-
-def _fixed_rows(parts: Assembly, place: int, name: str, bodies: Sequence[RigidBody], velocity: Array) -> list[RigidRow]:
-    """Independent rows that hold the fixed axes of a rigid body's nodes.
-
-    Raises:
-        RequestError: such an axis moves at the start.
-    """
-    from scipy.linalg import qr
-
-    node, axis = [np.zeros(0, np.int32)], [np.zeros(0, np.int64)]
-    for item in parts.scene.fixed:
-        if item.body == name:
-            nodes = parts.nodes(item.body, item.nodes)
-            for letter in item.axes:
-                k = "xyz".index(letter)
-                if (velocity[nodes, k] != 0.0).any():
-                    remedy = f"nodes of rigid body {name} move along {letter} at the start; start at rest there"
-                    raise bad_value("Fixed.axes", item.axes, remedy)
-                node.append(nodes)
-                axis.append(np.full(len(nodes), k))
-    nodes, axes = np.concatenate(node), np.concatenate(axis)
-    if not len(nodes):
-        return []
-    body = bodies[place]
-    radius = float(np.sqrt(np.trace(body.inertia) / body.mass))
-    n = np.eye(3)[axes]
-    motions = np.concatenate([n, np.cross((parts.X[nodes] - body.centre) / radius, n)], axis=1)
-    _, R, order = qr(motions.T, mode="economic", pivoting=True)
-    size = np.abs(np.diag(R))
-    chosen = order[: int((size > HELD * size[0]).sum())]
-    return [RigidRow(first=place, second=GROUND, point=parts.X[nodes[k]], direction=n[k]) for k in chosen]

@@ -12,10 +12,22 @@ from numpy.typing import NDArray
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.rigid_bodies import RigidBody
 from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE, StableStep
+from warp_mca.scene import Contact, RigidPlane, Scene
 
 Array = NDArray[np.float64]
 
+WHOLE = 100.0
 TURN = 0.01  # of a body in a step at most [rad]: its scheme is then off by some 1e-5 of the angle
+
+
+def bounce_factor(contact: Contact, scene: Scene) -> float:
+    """How many times the springs of a contact count in the step: WHOLE of a rigid body on a plane or on a rigid one.
+
+    All that its motion has then goes through springs alone. A spring that closes within a step makes or takes up to
+    (omega dt)^2 of it.
+    """
+    alone = isinstance(contact.master, RigidPlane) or scene.body(contact.master.body).rigid
+    return WHOLE if alone and scene.body(contact.slave.body).rigid else 1.0
 
 
 def stable_with_rigid(parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array) -> StableStep:

@@ -23,6 +23,7 @@ from warp_mca.solve.state_figures import (
     max_penetration,
     max_plastic_strain,
     max_speed,
+    rigid_bodies,
 )
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ class SceneRun:
             "refine": scene.refine,
         }
         if scene.rigid_names:
-            more["rigid_bodies"] = scene.rigid_names
+            more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= mass_report(scene, model)

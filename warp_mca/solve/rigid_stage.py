@@ -10,8 +10,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.rotation import mean_pose
 from warp_mca.elements.stage import BLOCK_DIM
 from warp_mca.kernels.nodes import rigid_body
+from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
 from warp_mca.model.assembly import GROUND
@@ -20,7 +22,9 @@ from warp_mca.solve.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
-    from warp_mca.model.rigid_bodies import RigidBody, RigidRow
+    from warp_mca.model.rigid_bodies import RigidBody
+    from warp_mca.model.rigid_rows import RigidPin, RigidRow
+    from warp_mca.solve.constraint_stage import ConstraintStage
     from warp_mca.solve.stage import Step
     from warp_mca.solve.state import State
     from warp_mca.solve.workspace import Workspace
@@ -39,12 +43,15 @@ class RigidState:
         rotation: of each body since then, a unit quaternion [-], shape (body_count,), quatd.
         momentum: of each body at the latest half step [kg m/s], shape (body_count,), vec3d.
         spin: angular momentum of each body about its mass centre then [kg m^2/s], shape (body_count,), vec3d.
+        orientation: rotation of the cluster of each pin in `Model.rigid_pins` since the start [-], shape (pin_count,),
+            quatd.
     """
 
     centre: wp.array
     rotation: wp.array
     momentum: wp.array
     spin: wp.array
+    orientation: wp.array
 
 
 def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[list[int]]:
@@ -60,7 +67,7 @@ def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[lis
 class RigidStage:
     """What `kernels.nodes.rigid_body` reads and writes; of no use for a model without rigid bodies."""
 
-    def __init__(self, model: Model, work: Workspace, precision: str, dt: float) -> None:
+    def __init__(self, model: Model, work: Workspace, constraints: ConstraintStage, precision: str, dt: float) -> None:
         """Allocate on the current device."""
         self.model, self.work, self.dt = model, work, dt
         self.count = len(model.rigid_bodies)
@@ -71,6 +78,8 @@ class RigidStage:
         self.own = own = model.rigid_bodies
         self._make_bodies(model, own)
         self._make_rows(own, model.rigid_rows)
+        self._make_pins(model.rigid_pins, constraints)
+        self._make_outputs()
         nodes = [body.nodes for body in own]
         arms = [model.X[body.nodes] - body.centre for body in own]
         self.node = wp.array(np.concatenate(nodes), dtype=wp.int32)
@@ -97,7 +106,7 @@ class RigidStage:
     def _make_rows(self, own: Sequence[RigidBody], unsorted: Sequence[RigidRow]) -> None:
         groups = groups_of(own, unsorted)
         self.groups = len(groups)
-        group_of = {k: g for g, group in enumerate(groups) for k in group}
+        self.group_of = group_of = {k: g for g, group in enumerate(groups) for k in group}
         rows = sorted(unsorted, key=lambda row: group_of[row.first])
         count = np.bincount(np.array([group_of[row.first] for row in rows], dtype=np.int64), minlength=len(groups))
         first = [row.first for row in rows]
@@ -113,20 +122,48 @@ class RigidStage:
         found.first_arm, found.second_arm = wp.array(arms, dtype=wp.vec3d), wp.array(others, dtype=wp.vec3d)
         found.direction = wp.array([row.direction for row in rows], dtype=wp.vec3d)
         found.pair = wp.array([row.pair for row in rows], dtype=wp.int32)
-        self.rows = found
-        bodies, size = len(own), len(rows)
+        found.sign = wp.array([row.sign for row in rows], dtype=wp.float64)
+        found.twist = wp.array([row.twist for row in rows], dtype=wp.vec3d)
+        # pins of a group follow each other
+        pins = self.model.rigid_pins
+        self.pin_order = sorted(range(len(pins)), key=lambda p: group_of[pins[p].body])
+        place = {p: k for k, p in enumerate(self.pin_order)} | {-1: -1}
+        found.pin = wp.array([place[row.pin] for row in rows], dtype=wp.int32)
+        of_groups = np.array([group_of[pin.body] for pin in pins], dtype=np.int64)
+        found.pins = wp.array(offsets(np.bincount(of_groups, minlength=len(groups)).tolist()), dtype=wp.int32)
+        self.rows, self.entries = found, int((count**2).sum())
+
+    def _make_pins(self, pins: Sequence[RigidPin], constraints: ConstraintStage) -> None:
+        items, found = [pins[p] for p in self.pin_order], Clusters()
+        weight = np.zeros(len(self.model.joint_first))
+        for item in items:
+            weight[item.start : item.end] = item.weight
+        found.begin = wp.array([(item.start, item.end, item.end) for item in items], dtype=wp.vec3i)
+        found.node = constraints.bonds.first
+        found.weight = wp.array(weight, dtype=wp.float64)
+        found.place = wp.array([item.place for item in items], dtype=wp.vec3d)
+        found.axis = wp.array([item.axis for item in items], dtype=wp.vec3d)
+        found.arm = wp.array(np.array([(item.arm, item.arm) for item in items]).reshape(-1, 2, 3), dtype=wp.vec3d)
+        self.clusters = found
+
+    def _make_outputs(self) -> None:
+        bodies, size, pins = self.count, len(self.rows.first), len(self.pin_order)
         # as `rigid_body.advance_kernel` lists them, from force_out on
         self.found = [wp.zeros(len(self.bodies.node), dtype=wp.vec3d)]
         self.found += [wp.zeros(bodies, dtype=kind) for kind in (wp.vec3d, wp.vec3d, wp.mat33d, wp.mat33d)]
-        self.found += [wp.zeros(size, dtype=wp.vec3d), wp.zeros((size, 2), dtype=wp.vec3d)]
-        self.found += [wp.zeros(size, dtype=wp.float64), wp.zeros(size, dtype=wp.float64)]
-        self.found.append(wp.zeros(int((count**2).sum()), dtype=wp.float64))
+        self.found += [wp.zeros(size, dtype=wp.vec3d), wp.zeros(size, dtype=wp.vec3d)]
+        self.found += [wp.zeros((size, 2), dtype=wp.vec3d)]
+        self.found += [wp.zeros(n, dtype=wp.float64) for n in (size, size, self.entries)]
+        self.found += [wp.zeros(pins, dtype=kind) for kind in (Mean, wp.vec3d)]
+        self.found += [wp.zeros((pins, 2), dtype=wp.vec3d)]
+        self.found += [wp.zeros(pins, dtype=wp.vec3d), wp.zeros(pins, dtype=wp.vec3d)]
 
     def new_state(self) -> RigidState:
         """State before `start`, on the current device."""
-        at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (self.count, 1))
+        at_rest, pins = ([(0.0, 0.0, 0.0, 1.0)] * n for n in (self.count, len(self.model.rigid_pins)))
         vectors = {name: wp.zeros(self.count, dtype=wp.vec3d) for name in ("centre", "momentum", "spin")}
-        return RigidState(rotation=wp.array(at_rest, dtype=wp.quatd), **vectors)
+        turns = {"rotation": wp.array(at_rest, dtype=wp.quatd), "orientation": wp.array(pins, dtype=wp.quatd)}
+        return RigidState(**turns, **vectors)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -134,7 +171,7 @@ class RigidStage:
 
     def start(self, state: State) -> None:
         """Take pose and momentum from the nodes, and the velocities half a step back, from t = 0 to t = -dt / 2."""
-        u = state.u.numpy()
+        u = np.asarray(state.u.numpy(), dtype=np.float64)
         poses = [_pose(self.model, body, u) for body in self.own]
         state.rigid.centre.assign(np.array([centre for centre, _, _, _ in poses]))
         state.rigid.rotation.assign(np.array([rotation for _, rotation, _, _ in poses]))
@@ -150,9 +187,10 @@ class RigidStage:
 
     def _advance(self, state: State, kick: float, span: float, moves: bool) -> None:
         work, own = self.work, state.rigid
-        inputs = [self.bodies, self.rows, work.mass, state.v, work.first_slots, work.more_slots, work.force]
-        inputs += [kick, span, moves]
-        outputs = [work.contact_force, own.centre, own.rotation, own.momentum, own.spin, state.constraints.impulse]
+        inputs = [self.bodies, self.rows, self.clusters, work.X, work.mass]
+        inputs += [work.first_slots, work.more_slots, work.force, kick, span, moves]
+        outputs = [work.contact_force, state.u, state.v, state.speed_square]
+        outputs += [own.centre, own.rotation, own.momentum, own.spin, own.orientation, state.constraints.impulse]
         threads = (self.groups, self.lanes)
         wp.launch(self.kernel, threads, inputs=inputs, outputs=[*outputs, *self.found], block_dim=BLOCK)
 
@@ -170,12 +208,11 @@ class RigidStage:
 def _pose(model: Model, body: RigidBody, u: Array) -> tuple[Array, Array, Array, Array]:
     """Displacement of the mass centre [m], quaternion, momentum [kg m/s] and spin [kg m^2/s] from the nodes."""
     nodes = body.nodes
-    mass, arm, rotation = model.mass[nodes], model.X[nodes] - body.centre, np.array([0.0, 0.0, 0.0, 1.0])
+    mass, turned, rotation = model.mass[nodes], model.X[nodes] - body.centre, np.array([0.0, 0.0, 0.0, 1.0])
     centre = mass @ u[nodes] / body.mass
-    turned = arm
     if u[nodes].any():
         from scipy.spatial.transform import Rotation
 
-        fit, _ = Rotation.align_vectors(arm + u[nodes] - centre, arm, weights=mass)
-        rotation, turned = fit.as_quat(), fit.apply(arm)
+        _, _, R = mean_pose(model.X[nodes], model.X[nodes] + u[nodes], mass)
+        rotation, turned = Rotation.from_matrix(R).as_quat(), turned @ R.T
     return centre, rotation, mass @ model.V[nodes], mass @ np.cross(turned, model.V[nodes])

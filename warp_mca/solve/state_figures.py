@@ -34,6 +34,16 @@ def max_speed(solver: Solver, state: State, scene: int = 0) -> float:
     return math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
 
 
+def rigid_bodies(solver: Solver, state: State, scene: int = 0) -> dict[str, dict[str, object]]:
+    """Mass, momentum and spin of each rigid body of a scene at the latest half step, by name; see `RigidState`."""
+    momentum, spin = state.rigid.momentum.numpy(), state.rigid.spin.numpy()
+    return {
+        body.name: {"mass": body.mass, "momentum": momentum[k].tolist(), "spin": spin[k].tolist()}
+        for k, body in enumerate(solver.model.rigid_bodies)
+        if body.scene == scene
+    }
+
+
 def joint_impulses(solver: Solver, state: State, scene: int = 0) -> dict[str, list[float]]:
     """Impulse that each joint of a scene gave to its first body [N s], by name."""
     impulse = state.constraints.impulse.numpy()

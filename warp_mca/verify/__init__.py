@@ -27,6 +27,7 @@ FILES = (
     "rolling",
     "rigid",
     "hinges",
+    "rigid_bodies",
 )
 
 __all__ = ["FILES", "GROUPS", "Case", "Level", "Row", "Setup", "case", "cases"]

@@ -121,7 +121,7 @@ THETA, THETA_DOT = (1.2, 0.4), (-1.0, 3.0)  # of the double pendulum at first [r
 SPAN = 0.4  # of its motion [s]
 
 
-def _rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[Array, Array, float]:
+def rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[Array, Array, float]:
     """Displacement of tip and of hinge A [m], each shape (2,), float64, and kinetic energy [J] after SPAN."""
     from warp_mca.rigid.chain import Chain, mesh_link
     from warp_mca.rigid.swing import swing
@@ -209,7 +209,7 @@ def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
     start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}
     scenes = [setup.scene("double_pendulum", E=E, length=LENGTH, duration=SPAN, **start, **parameters) for E in moduli]
     meshes = mesh(scenes[0])
-    tip_exact, hinge_exact, kinetic_exact = _rigid_pendulum(meshes, nodal_masses(scenes[0], meshes))
+    tip_exact, hinge_exact, kinetic_exact = rigid_pendulum(meshes, nodal_masses(scenes[0], meshes))
     tip, hinge, kinetic = [], [], []
     for scene in scenes:
         ends = _Ends()

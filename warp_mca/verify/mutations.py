@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from warp_mca.verify.element_mutations import ELEMENT_MUTATIONS
 from warp_mca.verify.mutation import Mutation
+from warp_mca.verify.rigid_mutations import RIGID_MUTATIONS
 
 MUTATIONS: dict[str, Mutation] = {
     "shear_modulus_doubled": Mutation(
@@ -277,3 +278,5 @@ MUTATIONS: dict[str, Mutation] = {
         "inverse * total - of(gravity",
     ),
 } | ELEMENT_MUTATIONS
+
+MUTATIONS |= RIGID_MUTATIONS

@@ -1,0 +1,98 @@
+"""Owns pins between a rigid body and a cluster: nodes of a flexible body that share a mean motion.
+
+`cluster` says what the mean motion is and how it answers impulses. Here the cluster's side takes part in the rows of
+`rigid_rows`: three hold the pin's point on both sides together, two the directions of its axis.
+"""
+
+import warp as wp
+
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, cluster_sums, mean_motion, pull
+from warp_mca.kernels.nodes.coupling import turned
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def find_cluster(
+    p: int,
+    lane: int,
+    clusters: Clusters,
+    X: wp.array(dtype=wp.vec3d),
+    mass: wp.array(dtype=wp.float64),
+    dt: wp.float64,
+    orientation: wp.array(dtype=wp.quatd),
+    u: wp.array(dtype=wp.vec3d),
+    v: wp.array(dtype=wp.vec3d),
+    mean_out: wp.array(dtype=Mean),
+    point_out: wp.array(dtype=wp.vec3d),
+    impulse_out: wp.array2d(dtype=wp.vec3d),
+):
+    """Mean motion of a pin's cluster after the free step, and its point P at t(n), from the place at the start."""
+    begin = clusters.begin[p]
+    total = cluster_sums(begin[0], begin[1], lane, clusters.place[p], clusters, X, mass, u, v, dt)
+    if lane == 0:
+        P = wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(orientation[p], clusters.arm[p, 0])
+        mean_out[p] = mean_motion(total, P)
+        point_out[p] = P
+        impulse_out[p, 0] = wp.vec3d()
+        impulse_out[p, 1] = wp.vec3d()
+
+
+@wp.func
+def spin_of(mean: Mean, J: wp.vec3d, T: wp.vec3d) -> wp.vec3d:
+    """Angular velocity of a cluster with the impulse J and the angular impulse T at its pin [rad/s]."""
+    return mean.spin + wp.transpose(mean.response.mixed) * J + mean.response.turn * T
+
+
+@wp.func
+def move_pin(
+    p: int,
+    clusters: Clusters,
+    dt: wp.float64,
+    orientation: wp.array(dtype=wp.quatd),
+    mean: wp.array(dtype=Mean),
+    point: wp.array(dtype=wp.vec3d),
+    impulse: wp.array2d(dtype=wp.vec3d),
+    place_out: wp.array(dtype=wp.vec3d),
+    axis_out: wp.array(dtype=wp.vec3d),
+):
+    """Where the point of a pin, from its place at the start, and its axis are on the cluster at t(n+1)."""
+    m = mean[p]
+    J = impulse[p, 0]
+    T = impulse[p, 1]
+    arm = point[p] - m.centre
+    w = spin_of(m, J, T)
+    v = m.velocity + wp.cross(m.spin, arm) + m.response.point * J + m.response.mixed * T - wp.cross(w, arm)
+    ahead = turned(orientation[p], dt * w)
+    place_out[p] = m.centre + dt * v + wp.quat_rotate(ahead, clusters.arm[p, 0])
+    axis_out[p] = wp.quat_rotate(ahead, clusters.axis[p])
+
+
+@wp.func
+def pin_lightness(mean: Mean, n: wp.vec3d, t: wp.vec3d, m: wp.vec3d, s: wp.vec3d) -> wp.float64:
+    """Speed of a cluster along n at its pin, and about t, that an impulse along m and an angular one about s give."""
+    point = mean.response.point * m + mean.response.mixed * s
+    turn = wp.transpose(mean.response.mixed) * m + mean.response.turn * s
+    return wp.dot(n, point) + wp.dot(t, turn)
+
+
+@wp.func
+def pull_cluster(
+    p: int,
+    lane: int,
+    clusters: Clusters,
+    X: wp.array(dtype=wp.vec3d),
+    dt: wp.float64,
+    mean: wp.array(dtype=Mean),
+    point: wp.array(dtype=wp.vec3d),
+    impulse: wp.array2d(dtype=wp.vec3d),
+    u_out: wp.array(dtype=wp.vec3d),
+    v_out: wp.array(dtype=wp.vec3d),
+    speed_square_out: wp.array(dtype=wp.float32),
+):
+    """Give the nodes of a cluster what its pin gave to their mean motion."""
+    begin = clusters.begin[p]
+    m = mean[p]
+    J = impulse[p, 0]
+    T = wp.cross(point[p] - m.centre, J) + impulse[p, 1]
+    pull(begin[0], begin[1], lane, clusters.place[p], m, J, T, clusters, X, dt, u_out, v_out, speed_square_out)

@@ -1,0 +1,53 @@
+"""Owns small symmetric systems of equations, some of whose rows may follow from others."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+DEPENDENT = 1e-10  # of its diagonal entry: pivot below which a row follows from those before it
+
+
+@wp.func
+def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
+    """L D L^T of a symmetric matrix in place, D on the diagonal; it is 0 for rows that follow from those before."""
+    for j in range(size):
+        pivot = matrix_out[first + j * size + j]
+        least = wp.float64(DEPENDENT) * pivot
+        for k in range(j):
+            x = matrix_out[first + j * size + k]
+            pivot -= x * x * matrix_out[first + k * size + k]
+        if pivot <= least:
+            pivot = wp.float64(0.0)
+        matrix_out[first + j * size + j] = pivot
+        for i in range(j + 1, size):
+            x = matrix_out[first + i * size + j]
+            for k in range(j):
+                y = matrix_out[first + j * size + k] * matrix_out[first + k * size + k]
+                x -= matrix_out[first + i * size + k] * y
+            if pivot > wp.float64(0.0):
+                x = x / pivot
+            else:
+                x = wp.float64(0.0)
+            matrix_out[first + i * size + j] = x
+
+
+@wp.func
+def solve(first: int, size: int, begin: int, matrix: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64)):
+    """Solution for the right-hand side in value_out[begin:]; 0 for rows that follow from others."""
+    for i in range(size):
+        x = value_out[begin + i]
+        for k in range(i):
+            x -= matrix[first + i * size + k] * value_out[begin + k]
+        value_out[begin + i] = x
+    for i in range(size):
+        pivot = matrix[first + i * size + i]
+        if pivot > wp.float64(0.0):
+            value_out[begin + i] = value_out[begin + i] / pivot
+        else:
+            value_out[begin + i] = wp.float64(0.0)
+    for back in range(size):
+        i = size - 1 - back
+        x = value_out[begin + i]
+        for k in range(i + 1, size):
+            x -= matrix[first + k * size + i] * value_out[begin + k]
+        value_out[begin + i] = x

@@ -1,0 +1,26 @@
+"""Owns the deliberate errors in rigid bodies of the impact phase."""
+
+from __future__ import annotations
+
+from warp_mca.verify.mutation import Mutation
+
+RIGID_MUTATIONS: dict[str, Mutation] = {
+    "spin_term_dropped": Mutation(
+        "the rotation of a rigid body forgets the gyroscopic term f x J f",
+        "kernels/nodes/rigid_motion.py",
+        "off = Jf + wp.cross(f, Jf) - ",
+        "off = Jf - ",
+    ),
+    "rigid_gravity_halved": Mutation(
+        "a rigid body feels half of gravity",
+        "kernels/nodes/rigid_body.py",
+        "sum_F + bodies.mass[b] * bodies.gravity[b]",
+        "sum_F + wp.float64(0.5) * bodies.mass[b] * bodies.gravity[b]",
+    ),
+    "row_forgets_second": Mutation(
+        "joints between rigid bodies give the second one no moment",
+        "kernels/nodes/rigid_rows.py",
+        "spin_out[b] = spin_out[b] - value[r]",
+        "spin_out[b] = spin_out[b] - wp.float64(0.0) * value[r]",
+    ),
+}
