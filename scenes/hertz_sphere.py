@@ -19,7 +19,7 @@ def build(
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.3,
     rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 7850.0,
     target: Annotated[str, Param("what is struck", choices=("plane", "block"))] = "plane",
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 3.0,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 3.0,
     section: Annotated[int, Param("cells across the fine patch at the pole, even", low=2)] = 8,
     pole_size: Annotated[float, Param("edge of the cells there", unit="m", low=0.0, exclusive=True)] = 1e-4,
     pole_layers: Annotated[int, Param("cells from the patch to the coarse mesh around it", low=1)] = 8,

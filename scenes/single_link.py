@@ -42,7 +42,7 @@ def build(
     sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "mesh",
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 0.1,
     t_end: Annotated[
         float | None,
         Param(

@@ -93,7 +93,7 @@ def build(
     plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
     joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends"))] = "ends",
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
     t_end: Annotated[
         float | None,

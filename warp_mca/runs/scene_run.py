@@ -109,6 +109,9 @@ class SceneRun:
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= mass_report(scene, model)
+        if any(model.penalties):
+            names = contact_names(scene.contacts)
+            more["penalty"] = {name: vars(item) for name, item in zip(names, model.penalties, strict=True) if item}
         more |= {"contact_spring_share": self._shares(), "contact_spring_loss": peak_losses(self._shares())}
         if scene.paths:
             body = scene.body(scene.paths[0].lines[0].body)

@@ -1,4 +1,4 @@
-"""Owns what contact springs give away: their energy when the force is greatest, and what that does to the force peak."""
+"""Owns what contact springs give away: their energy at the greatest force, and what that does to the peak."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def soft_springs(shares: Mapping[str, float | None], contacts: Sequence[Contact]
         if share is not None and share > SOFT:
             default = "" if contact.penalty is None else " or leave it to its default"
             yield (
-                f"contact springs held {share:.0%} of the energy that bodies had exchanged when the force of {name} was "
-                f"greatest: its peak is some {PEAK_LOSS * share:.0%} below that of stiff springs, and comes later; raise "
+                f"contact springs held {share:.0%} of the energy that bodies had exchanged when the force of {name} "
+                f"was greatest: its peak is some {PEAK_LOSS * share:.0%} below that of stiff springs, and later; raise "
                 f"the contact's penalty{default}, or refine the mesh there"
             )
