@@ -19,7 +19,7 @@ def build(
     side: Annotated[float, Param("of their section", unit="m", low=0.0, exclusive=True)] = 0.04,
     E: Annotated[float, Param("Young's modulus", unit="Pa", low=0.0, exclusive=True)] = 200e9,
     rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 7800.0,
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 1.0,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 1.0,
     axial: Annotated[int, Param("cells along the short rod", low=1)] = 40,
     section: Annotated[int, Param("cells along each side of the section", low=1)] = 2,
 ) -> mca.Scene:

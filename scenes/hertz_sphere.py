@@ -21,7 +21,7 @@ def build(
     E_ratio: Annotated[float, Param("Young's modulus of the sphere over E", low=0.0, exclusive=True)] = 1.0,
     rigid_sphere: Annotated[bool, Param("the sphere stays rigid")] = False,
     target: Annotated[str, Param("what is struck", choices=("plane", "block"))] = "plane",
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 3.0,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 3.0,
     section: Annotated[int, Param("cells across the fine patch at the pole, even", low=2)] = 8,
     pole_size: Annotated[float, Param("edge of the cells there", unit="m", low=0.0, exclusive=True)] = 1e-4,
     pole_layers: Annotated[int, Param("cells from the patch to the coarse mesh around it", low=1)] = 8,

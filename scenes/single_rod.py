@@ -23,7 +23,7 @@ def build(
     nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.27,
     rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 2700.0,
     mu: Annotated[float, Param("coefficient of friction", low=0.0, high=10.0)] = 0.0,
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 1.0,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 1.0,
     duration: Annotated[float, Param("simulated time", unit="s", low=0.0, exclusive=True)] = 1.2e-4,
     output_interval: Annotated[
         float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)

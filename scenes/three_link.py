@@ -59,7 +59,7 @@ def build(
         ),
     ] = None,
     rigid_bodies: Annotated[str | None, Param("bodies that stay rigid in the impact, as OA,AB; None: none")] = None,
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 0.1,
     t_end: Annotated[
         float | None,
         Param(

@@ -105,7 +105,7 @@ def build(
     rigid_bodies: Annotated[
         str | None, Param("bodies that stay rigid in the impact, as OA or OA,plate; None: none")
     ] = None,
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True)] = 0.1,
+    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
     t_end: Annotated[
         float | None,

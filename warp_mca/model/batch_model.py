@@ -67,6 +67,7 @@ def join_models(models: Sequence[Model]) -> Model:
             for item in model.passes
         ),
         contact_axes=np.concatenate([model.contact_axes for model in models]),
+        penalties=tuple(penalty for model in models for penalty in model.penalties),
         gravity=np.concatenate([model.gravity for model in models]),
         points=shifted("points", nodes),
         node_start=_starts(models, "node_start", nodes),

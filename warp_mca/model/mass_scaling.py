@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 PEAK_ERROR = 6.0
 LIMIT = 0.1  # estimated error of the first force peak above which mass scaling is refused
 CLOSE = 1e-3  # relative excess of an eigenvalue that is close enough: half of it in the step
-ROUNDS = 200  # of adding mass at most; two to ten are usual
+ROUNDS = 200  # of adding mass at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ def scale_masses(parts: Assembly, contact: Array, plain: StableStep) -> tuple[St
 
 
 def check_masses(parts: Assembly, scaling: MassScaling | None) -> None:
-    """Refuse so much mass that it would move the first force peak by more than LIMIT, by estimate.
+    """Refuse so much mass that a body, or by estimate the first force peak, would change by more than LIMIT.
 
     Raises:
         RequestError: so it is.
@@ -82,12 +82,13 @@ def check_masses(parts: Assembly, scaling: MassScaling | None) -> None:
         striking_body(parts.scene, shares),
         peak_error(parts.scene, parts.node_start, parts.mass, scaling.added),
     )
-    if error > LIMIT:
-        remedy = (
-            f"it would add {shares[body]:.2g} times its mass to body {body} and move the first force peak by about "
-            f"{error:.0%}, more than {LIMIT:.0%}; ask for less, or make the smallest cells larger"
-        )
-        raise bad_value("ImpactPhase.mass_scaling", parts.scene.impact.mass_scaling, remedy)
+    moved = f" and move the first force peak by about {error:.0%}" if error > LIMIT else ""
+    if not moved:
+        body = max(shares, key=lambda name: shares[name])
+    if moved or shares[body] > LIMIT:
+        remedy = f"ask for less, at most {LIMIT:.0%} of each, or make the smallest cells larger"
+        what = f"it would add {shares[body]:.2g} times its mass to body {body}{moved}"
+        raise bad_value("ImpactPhase.mass_scaling", parts.scene.impact.mass_scaling, f"{what}; {remedy}")
 
 
 class _Slow:

@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.absorbing import AbsorbingNodes, absorbing_nodes
 from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
+from warp_mca.model.auto_penalty import ChosenPenalty, settled
 from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.couplings import Coupling
@@ -71,6 +72,7 @@ class Model:
         passes: contact passes; those of each scene in turn.
         contact_axes: normal and tangent along which forces of each contact are reported [-], shape (contact_count, 2,
             3), float64; a closed master has no normal, which is zero then: normal forces add up as they are.
+        penalties: what was chosen for each contact; None where the scene gives it.
         gravity: of each scene [m/s^2], shape (scene_count, 3), float64.
         points: nodes whose velocity is recorded (tip, target, others; those of each scene in turn), shape
             (point_count,), int32; GROUND where there is none.
@@ -108,6 +110,7 @@ class Model:
     ties: TiedNodes
     passes: tuple[ContactPass, ...]
     contact_axes: Array
+    penalties: tuple[ChosenPenalty | None, ...]
     gravity: Array
     points: Index
     node_start: Mapping[str, int]
@@ -137,15 +140,21 @@ class Model:
         return sum(block.conn.shape[1] for block in self.blocks)
 
 
-def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...], Array, Array]:
-    """Passes, the axes along which each contact's force is reported, and what the springs add at each node."""
+def _contacts(
+    parts: Assembly, velocity: Array
+) -> tuple[tuple[ContactPass, ...], Array, Array, tuple[ChosenPenalty | None, ...]]:
+    """Passes, the axes along which each contact's force is reported, what the springs add at each node, and penalties
+    that were chosen."""
     passes: list[ContactPass] = []
+    penalties: list[ChosenPenalty | None] = []
     axes = np.zeros((len(parts.scene.contacts), 2, 3))
     added = np.zeros(len(parts.X))
     for index, contact in enumerate(parts.scene.contacts):
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
         check_spacing(contact, parts.X, velocity, slave, master)
+        contact, chosen = settled(parts, contact, slave, master, velocity)
+        penalties.append(chosen)
         for item in contact_passes(contact, index, slave, master):
             sides = (slave, master) if item.sign > 0.0 else (master, slave)
             assert sides[0] is not None
@@ -153,7 +162,7 @@ def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...]
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             passes.append(item)
         axes[index] = _axes(parts.X, contact, slave, master)
-    return tuple(passes), axes, added
+    return tuple(passes), axes, added, tuple(penalties)
 
 
 def _axes(X: Array, contact: Contact, slave: Faces, master: Faces | None) -> tuple[Array, Array]:
@@ -269,7 +278,7 @@ def build_model(
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     held = constraints(parts, velocity)
     check_bindings(held, pairs)
-    passes, axes, added = _contacts(parts, velocity)
+    passes, axes, added, penalties = _contacts(parts, velocity)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     parts.relief = ties.relief(parts.mass)
@@ -294,6 +303,7 @@ def build_model(
         ties=ties,
         passes=passes,
         contact_axes=axes,
+        penalties=penalties,
         gravity=np.array([scene.gravity], dtype=np.float64),
         points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target), *others], dtype=np.int32),
         node_start=parts.node_start,

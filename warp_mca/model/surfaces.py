@@ -148,6 +148,7 @@ def spring_stiffness(contact: Contact, slave: Faces, master: Faces | None) -> tu
         factor = CURVED if any(is_curved(faces.node, faces.normal) for faces in surfaces) else FLAT
         found = [faces.contact for faces in surfaces]
     else:
+        assert not isinstance(contact.penalty, str)  # `auto_penalty.settled` has replaced it
         factor, found = contact.penalty, [faces.bulk for faces in surfaces]
     return 0.5 * factor if contact.two_way else factor, found[0], found[-1]
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SOFT = 0.5  # share of the exchanged energy in contact springs from which on they decide the answer
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
 POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
 BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
@@ -34,7 +33,7 @@ def resolution_warnings(
         contacts: of the scene. model: of the scene alone. ledger: of the run.
         depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,).
     """
-    found = list(_soft(ledger))
+    found: list[str] = []
     for k, item in enumerate(model.passes):
         contact = contacts[item.contact]
         if item.sign > 0.0:
@@ -42,15 +41,6 @@ def resolution_warnings(
         if item.plane is not None:
             found += _pushed_through(contact, model, item, depths[k])
     return found
-
-
-def _soft(ledger: Ledger) -> Iterator[str]:
-    share = ledger.greatest_contact_share
-    if share > SOFT:
-        yield (
-            f"contact springs held up to {share:.0%} of the energy that the bodies exchanged, so forces and durations "
-            "are those of the springs: raise the contact's penalty or leave it to its default, or refine the mesh there"
-        )
 
 
 def _small_patch(contact: Contact, model: Model, item: ContactPass, ledger: Ledger, k: int) -> Iterator[str]:

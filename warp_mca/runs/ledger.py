@@ -224,12 +224,6 @@ class Ledger:
         scale = max(self.kept.exchanged, MIN_EXCHANGE * self.kept.energy_scale, self.rounding)
         return self.kept.imbalance / scale if scale > 0.0 else 0.0
 
-    @property
-    def greatest_contact_share(self) -> float:
-        """Greatest energy of all contact springs in a record as a share of `exchanged` [-]; 0 where hardly any was."""
-        kept = self.kept
-        return kept.contact_energy / kept.exchanged if kept.exchanged > MIN_EXCHANGE * kept.energy_scale else 0.0
-
     def nodes_at_peak(self, k: int) -> float:
         """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""
         force, squares = self.kept.peaks[k]
@@ -237,7 +231,6 @@ class Ledger:
 
     def _note_peaks(self, sums: Array) -> None:
         """Keep what records say of contact at its greatest."""
-        self.kept.contact_energy = float(self._energies(sums)["contact"].max(initial=self.kept.contact_energy))
         springs = self.springs(sums)
         for k, found in enumerate(
             springs[springs[:, :, PRESSURE].argmax(axis=0), range(springs.shape[1])] if len(sums) else ()

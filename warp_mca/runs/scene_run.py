@@ -17,6 +17,7 @@ from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
+from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
 from warp_mca.solve.state_figures import (
     joint_impulses,
     max_normal_force,
@@ -113,6 +114,10 @@ class SceneRun:
         more |= mass_report(scene, model)
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
+        if any(model.penalties):
+            names = contact_names(scene.contacts)
+            more["penalty"] = {name: vars(item) for name, item in zip(names, model.penalties, strict=True) if item}
+        more |= {"contact_spring_share": self._shares(), "contact_spring_loss": peak_losses(self._shares())}
         if scene.stress_paths:
             body = scene.body(scene.stress_paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
@@ -138,6 +143,10 @@ class SceneRun:
             theta_dot=tuple(float(x) for x in start.theta_dot),
             more=more,
         )
+
+    def _shares(self) -> dict[str, float | None]:
+        """As `spring_shares`."""
+        return spring_shares(self.ledger, self.ready.model, contact_names(self.ready.scene.contacts))
 
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
@@ -173,6 +182,7 @@ class SceneRun:
                 "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
             )
         depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
+        found += soft_springs(self._shares(), scene.contacts)
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths)
         found += self.ready.warnings
         if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:

@@ -60,7 +60,8 @@ class Contact:
         master: surface of another body, or a rigid plane.
         mu: coefficient of friction [-]; 0 runs no friction at all.
         penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes k = c E / (1 - nu^2) A^2 / V, with
-            c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1.
+            c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1. "auto"
+            chooses f from mesh, curvature, mass and speed, so that springs hold at most some 7 % of the energy.
         law: force along the normal over depth and stiffness; the linear spring k g by default.
         two_way: the master's nodes are also kept out of the slave's faces.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
@@ -77,7 +78,7 @@ class Contact:
     slave: Surface
     master: Surface | RigidPlane
     mu: float = 0.0
-    penalty: float | None = None
+    penalty: float | Literal["auto"] | None = None
     two_way: bool = False
     initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
     name: str | None = None
@@ -92,7 +93,10 @@ class Contact:
         if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
             remedy = f"give a {' or a '.join(CONTACT_LAWS)}; other classes must be listed in CONTACT_LAWS"
             raise bad_value("Contact.law", validate.brief(self.law), remedy)
-        if self.penalty is not None:
+        if isinstance(self.penalty, str):
+            if self.penalty != "auto":
+                raise bad_value("Contact.penalty", self.penalty, "give a finite number above 0, auto or None")
+        elif self.penalty is not None:
             validate.positive("Contact", penalty=self.penalty)
         if self.initial_overlap not in OVERLAP_CHOICES:
             raise bad_value("Contact.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")

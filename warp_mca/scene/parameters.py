@@ -23,6 +23,7 @@ class Param:
         low, high: smallest and largest value, themselves allowed unless `exclusive`; None where there is no limit.
         exclusive: the limits themselves are not allowed.
         choices: the only values allowed, or empty.
+        words: texts that are allowed in place of a number.
     """
 
     description: str = ""
@@ -31,10 +32,15 @@ class Param:
     high: float | None = None
     exclusive: bool = False
     choices: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
 
     @property
     def range(self) -> str:
         """The values allowed, in words: "above 0", "0 to 10", "slender or mesh"; empty when all are."""
+        return " or ".join([self._numbers or "any", *self.words]) if self.words else self._numbers
+
+    @property
+    def _numbers(self) -> str:
         if self.choices:
             return " or ".join(self.choices)
         if self.low is not None and self.high is not None:
@@ -72,6 +78,8 @@ class Parameter:
         """
         if self.default is None and (value is None or value == "none"):
             return None
+        if isinstance(value, str) and value in self.param.words:
+            return value
         try:
             result = _converted(value, self.kind)
         except (TypeError, ValueError, OverflowError):

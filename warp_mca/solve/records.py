@@ -26,7 +26,6 @@ class SceneRecords:
         energy_error: greatest imbalance, as a share of initial energy and external work [-].
         max_strain: greatest deviatoric strain of any step [-].
         min_jacobian: least ratio of volumes [-], 1 at most.
-        contact_energy: greatest energy of all contact springs in a record [J].
         initial_energy: stored at the start [J].
         initial_kinetic: kinetic energy at the start [J].
         initial_work: that driven nodes do in the half step before the start [J].
@@ -48,7 +47,6 @@ class SceneRecords:
     energy_error: float = 0.0
     max_strain: float = 0.0
     min_jacobian: float = 1.0
-    contact_energy: float = 0.0
     initial_energy: float = np.nan
     initial_kinetic: float = 0.0
     initial_work: float = 0.0

@@ -1,0 +1,102 @@
+"""Tests of what contact springs give away: the share that is reported, and `penalty="auto"`, which bounds it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from impacts import prepared
+
+import warp_mca as mca
+from warp_mca.model.auto_penalty import SHARE
+from warp_mca.runs.spring_share import PEAK_LOSS
+from warp_mca.scene import catalogue
+
+STEEL = mca.Elastic(E=200e9, nu=0.0, rho=7800.0)
+
+
+@cache
+def ball(penalty: float | str, target: str = "plane") -> mca.Result:
+    """A ball that strikes, until after its greatest force."""
+    made = mca.make_scene("hertz_sphere", section=6, pole_size=1.5e-4, pole_layers=5, penalty=penalty, target=target)
+    return mca.run(made, duration=0.45 * made.impact.duration)
+
+
+@pytest.mark.parametrize("target", ["plane", "block"])
+@pytest.mark.parametrize("penalty", [0.2, 1.0])
+def test_loss_of_the_peak_follows_the_share(target: str, penalty: float):
+    """It is within a factor of 2 of the estimate, against springs that are an order stiffer."""
+    (loss,) = ball(penalty, target).summary["contact_spring_loss"].values()
+    (rest,) = ball(10.0, target).summary["contact_spring_loss"].values()
+    measured = ball(penalty, target).F_n.max() / ball(10.0, target).F_n.max() - 1.0
+    assert 0.5 < (loss - rest) / measured < 2.0
+
+
+@pytest.mark.parametrize("target", ["plane", "block"])
+def test_a_ball_gets_the_springs_that_hertz_asks_for(target: str):
+    """Radius, mass and speed are those of the scene, and springs hold the share that was foreseen."""
+    summary = ball("auto", target).summary
+    (chosen,), (share,) = summary["penalty"].values(), summary["contact_spring_share"].values()
+    assert chosen["why"] == "curved"
+    assert chosen["radius"] == pytest.approx(0.01, rel=0.03)
+    assert chosen["mass"] == pytest.approx(4.0 / 3.0 * np.pi * 0.01**3 * 7850.0, rel=0.05)
+    assert chosen["speed"] == pytest.approx(1.0)
+    assert chosen["share"] == pytest.approx(SHARE, rel=0.01)
+    assert 0.5 * SHARE < share < 1.2 * SHARE
+    assert -0.03 < ball("auto", target).F_n.max() / ball(10.0, target).F_n.max() - 1.0 < 0.005
+    assert summary["contact_spring_loss"]["sphere–" + target] == -PEAK_LOSS * share
+
+
+def test_finer_meshes_take_softer_springs():
+    """The layer of springs of one cell's depth is as thin as the cell: its factor falls with it."""
+    found = [
+        prepared(mca.make_scene("hertz_sphere", penalty="auto", pole_size=size)).model.penalties
+        for size in (1e-4, 5e-5)
+    ]
+    assert found[0][0].penalty / found[1][0].penalty == pytest.approx(2.0, rel=0.05)
+
+
+def drop(speed: float, penalty: Any = "auto") -> mca.Scene:
+    """A cube over a plane."""
+    box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2))
+    body = mca.Body(name="cube", geometry=box, material=STEEL, velocity=(0.0, -speed, 0.0))
+    contact = mca.Contact(slave=mca.Surface(body="cube", nodes="ymin"), master=mca.RigidPlane(), penalty=penalty)
+    impact = mca.ImpactPhase(duration=1e-6, output_interval=1e-7)
+    return mca.Scene(name="drop", bodies=(body,), contacts=(contact,), impact=impact)
+
+
+def test_flat_contacts_take_the_default():
+    """The same springs as without a penalty."""
+    chosen, default = (prepared(drop(1.0, penalty)).model for penalty in ("auto", None))
+    assert chosen.penalties[0] is not None and chosen.penalties[0].why == "flat"
+    assert default.penalties == (None,)
+    np.testing.assert_allclose(chosen.passes[0].stiffness, default.passes[0].stiffness, rtol=1e-12)
+
+
+def test_a_ball_at_rest_takes_the_default():
+    """There is no impact to tell the size of the contact."""
+    made = mca.make_scene("hertz_sphere", penalty="auto")
+    still = replace(made, bodies=tuple(replace(body, velocity=(0.0, 0.0, 0.0)) for body in made.bodies))
+    (chosen,) = prepared(still).model.penalties
+    assert chosen is not None and chosen.why == "no approach"
+
+
+def test_shares_without_force():
+    """None where nothing was touched, and no word of a choice where the scene gives the penalty."""
+    summary = mca.run(drop(-1.0, 1.0)).summary
+    assert summary["contact_spring_share"] == summary["contact_spring_loss"] == {"cube–plane": None}
+    assert "penalty" not in summary
+
+
+def test_words():
+    """auto is the only one, in scenes and on the command line."""
+    with pytest.raises(mca.RequestError, match=r"Contact\.penalty = 'stiff': give a finite number above 0, auto"):
+        drop(1.0, "stiff")
+    source = catalogue.load_source("two_link")
+    assert source.resolve(None, {"penalty": "auto"})["penalty"] == "auto"
+    assert source.parameters["penalty"].param.range == "above 0 or auto"
+    with pytest.raises(mca.RequestError, match=r"penalty = 'stiff': give a finite number, above 0 or auto"):
+        source.resolve(None, {"penalty": "stiff"})
