@@ -90,7 +90,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node."""
+    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node, a tie."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -99,11 +99,18 @@ def everything() -> mca.Scene:
         name="everything",
         bodies=tuple(
             mca.Body(name=name, geometry=box, material=STEEL, position=(0.0, 0.0, z))
-            for name, box, z in (("rail", rail, 0.0), ("cart", cart, 0.0), ("driven", cart, 0.1))
+            for name, box, z in (
+                ("rail", rail, 0.0),
+                ("cart", cart, 0.0),
+                ("driven", cart, 0.1),
+                ("carrier", cart, 0.21),
+                ("tied", cart, 0.2),
+            )
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
         contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
+        ties=(mca.Tie(slave=mca.Surface(body="tied", nodes="zmax"), master=mca.Surface(body="carrier", nodes="zmin")),),
         impact=mca.ImpactPhase(duration=1e-5),
     )
 

@@ -105,6 +105,8 @@ class SceneRun:
         }
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
+        if scene.ties:
+            more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
         if scene.paths:
             body = scene.body(scene.paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
