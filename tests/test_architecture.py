@@ -98,14 +98,8 @@ def everything() -> mca.Scene:
     return mca.Scene(
         name="everything",
         bodies=tuple(
-            mca.Body(name=name, geometry=box, material=STEEL, position=(0.0, 0.0, z))
-            for name, box, z in (
-                ("rail", rail, 0.0),
-                ("cart", cart, 0.0),
-                ("driven", cart, 0.1),
-                ("carrier", cart, 0.21),
-                ("tied", cart, 0.2),
-            )
+            mca.Body(name=name, geometry=rail if name == "rail" else cart, material=STEEL, position=(0.0, 0.0, z))
+            for name, z in (("rail", 0.0), ("cart", 0.0), ("driven", 0.1), ("carrier", 0.21), ("tied", 0.2))
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),

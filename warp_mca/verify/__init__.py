@@ -19,6 +19,7 @@ FILES = (
     "material",
     "large_strain",
     "waves",
+    "tied",
     "bending",
     "impact",
     "taylor",
