@@ -244,3 +244,54 @@ def test_points_project_on_skew_faces_and_triangles():
     assert found.distance.max() < 1e-12 and found.beyond.max() == 0.0
     beside = project(np.array([[5.2, -0.1, 0.0]]), points, faces)
     assert beside.weight.sum() == pytest.approx(1.0, abs=1e-15) and beside.beyond[0] > 0.05
+
+
+def test_a_nested_plate_fills_the_plate_and_passes_constant_stress():
+    plate = mca.NestedPlate(length=0.2, width=0.06, height=0.03, core=(6, 6), core_size=1e-3, shell=2, extension=3)
+    body = mca.Body(name="plate", geometry=plate, material=SOFT)
+    ties = tuple(
+        mca.Tie(slave=mca.Surface(body="plate", nodes=slave), master=mca.Surface(body="plate", nodes=master))
+        for slave, master in plate.tied
+    )
+    impact = mca.ImpactPhase(duration=1e-5)
+    model = prepared(mca.Scene(name="plate", bodies=(body,), ties=ties, impact=impact)).model
+    assert len(ties) > 1 and [fact["size_ratio"] for fact in model.ties.facts] == pytest.approx([3.0] * len(ties))
+    assert model.mass.sum() == pytest.approx(1000.0 * 0.2 * 0.06 * 0.03, rel=1e-12)
+    u = 1e-6 * model.X * [1.0, -0.3, -0.3]
+    force = model.ties.carried(Displaced(Solver(model, device="cpu", precision="float64", dt=1e-9)).forces(u))
+    x = model.X[:, 0]
+    inner = np.abs(x) < 0.1 - 1e-9
+    assert np.abs(force[inner]).max() < 1e-7 * np.abs(force).max()
+    assert force[x > 0.1 - 1e-9, 0].sum() == pytest.approx(-1e9 * 1e-6 * 0.06 * 0.03, rel=1e-5)
+
+
+def test_bad_plates_and_parts_are_refused():
+    plate = {"length": 0.2, "width": 0.06, "height": 0.03}
+    with pytest.raises(mca.RequestError, match=r"NestedPlate.core = \(4, 6\): give multiples of 3"):
+        mca.NestedPlate(**plate, core=(4, 6))
+    with pytest.raises(mca.RequestError, match="multiples of 4, with ratio = 2"):
+        mca.NestedPlate(**plate, core=(6, 8), core_depth=2, ratio=2)
+    part = mca.Part(name="a", geometry=mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)))
+    with pytest.raises(mca.RequestError, match="each with a name of its own"):
+        mca.Parts(parts=(part, part))
+
+
+def test_tied_bodies_relax_together():
+    from warp_mca.runs.residual import Relaxation
+    from warp_mca.runs.settings import Settings
+
+    held = tuple(mca.Fixed(body=body, nodes="ymin", axes="xyz") for body in ("fine", "coarse"))
+    model = prepared(bar(fixed=held)).model
+    relaxation = Relaxation(model, Settings(device="cpu", precision="float64", threads=1))
+    u = 1e-5 * np.sin(1e3 * model.X[:, [1, 2, 0]])
+    u[model.fixed_axes == 7] = 0.0
+    shape = relaxation.settle(u, relaxation.solver.new_state())
+    assert 0.0 <= shape.elastic < 1e-4 * relaxation._energy(u)
+    assert np.abs(shape.u[model.ties.slave] - model.ties.place(shape.u)).max() == 0.0
+
+
+def test_a_link_is_not_tied_to_another_body():
+    scene = mca.make_scene("two_link")
+    tie = mca.Tie(slave=mca.Surface(body="AB", nodes="start"), master=mca.Surface(body="OA", nodes="end"))
+    with pytest.raises(mca.RequestError, match="a link of the rigid phase is one body; make both meshes Parts of it"):
+        prepared(dataclasses.replace(scene, ties=(tie,)))
