@@ -93,7 +93,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node, a side that absorbs."""
+    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, side that absorbs, tie."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -101,13 +101,14 @@ def everything() -> mca.Scene:
     return mca.Scene(
         name="everything",
         bodies=tuple(
-            mca.Body(name=name, geometry=box, material=STEEL, position=(0.0, 0.0, z))
-            for name, box, z in (("rail", rail, 0.0), ("cart", cart, 0.0), ("driven", cart, 0.1))
+            mca.Body(name=name, geometry=rail if name == "rail" else cart, material=STEEL, position=(0.0, 0.0, z))
+            for name, z in (("rail", 0.0), ("cart", 0.0), ("driven", 0.1), ("carrier", 0.21), ("tied", 0.2))
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
         absorbing=(mca.Absorbing(body="cart", nodes="zmax"),),
         contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
+        ties=(mca.Tie(slave=mca.Surface(body="tied", nodes="zmax"), master=mca.Surface(body="carrier", nodes="zmin")),),
         impact=mca.ImpactPhase(duration=1e-5),
     )
 

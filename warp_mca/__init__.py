@@ -37,7 +37,7 @@ from warp_mca.scene import (
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
-    from warp_mca.geometry import Box, Mesh, MeshFile, Part, Parts, Plate, Rod, Sphere
+    from warp_mca.geometry import Box, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -52,6 +52,7 @@ _LAZY = {
     "Box": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
+    "NestedPlate": "warp_mca.geometry",
     "Part": "warp_mca.geometry",
     "Parts": "warp_mca.geometry",
     "Plate": "warp_mca.geometry",
@@ -98,6 +99,7 @@ __all__ = [
     "Sphere",
     "Plate",
     "MeshFile",
+    "NestedPlate",
     "Part",
     "Parts",
     "Mesh",

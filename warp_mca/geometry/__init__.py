@@ -3,10 +3,11 @@
 from warp_mca.geometry.box import Box
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.mesh_file import MeshFile
+from warp_mca.geometry.nested_plate import NestedPlate
 from warp_mca.geometry.parts import Part, Parts
 from warp_mca.geometry.plate import Plate
 from warp_mca.geometry.recipe import Recipe
 from warp_mca.geometry.rod import Rod
 from warp_mca.geometry.sphere import Sphere
 
-__all__ = ["Box", "Mesh", "MeshFile", "Part", "Parts", "Plate", "Recipe", "Rod", "Sphere"]
+__all__ = ["Box", "Mesh", "MeshFile", "NestedPlate", "Part", "Parts", "Plate", "Recipe", "Rod", "Sphere"]

@@ -48,6 +48,7 @@ def chain_from_scene(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Map
         raise bad_value("Scene.gravity", scene.gravity, "the chain swings in the xy plane; leave the z component 0")
     spans = _spans(scene)
     tip, names = scene.rigid.tip, [span.body for span in spans]
+    _check_ties(scene, names)
     if len(scene.rigid.theta) != len(spans):
         remedy = f"give {len(spans)} angles and rates, one for each link from the ground outwards ({', '.join(names)})"
         raise bad_value("RigidPhase.theta", scene.rigid.theta, remedy)
@@ -89,6 +90,19 @@ def release(rigid: RigidPhase) -> tuple[Array, Array]:
     theta = rigid.theta if slide is None else (0.0, *rigid.theta)
     theta_dot = rigid.theta_dot if slide is None else (slide.velocity, *rigid.theta_dot)
     return np.array(theta, dtype=np.float64), np.array(theta_dot, dtype=np.float64)
+
+
+def _check_ties(scene: Scene, links: list[str]) -> None:
+    """Refuse ties of a link to another body, which would not swing with it.
+
+    Raises:
+        RequestError: there is one.
+    """
+    for tie in scene.ties:
+        ends = {tie.slave.body, tie.master.body}
+        if len(ends) > 1 and ends & set(links):
+            remedy = "a link of the rigid phase is one body; make both meshes Parts of it, or leave the rigid phase out"
+            raise bad_value(f"{tie.title}.master.body", tie.master.body, remedy)
 
 
 def _unit(direction: Vec3) -> Vec2:

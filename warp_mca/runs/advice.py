@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.geometry import Box, Mesh, Parts, Plate, Rod, Sphere
+from warp_mca.geometry import Box, Mesh, NestedPlate, Parts, Plate, Rod, Sphere
 from warp_mca.geometry.quality import doubled_nodes
 from warp_mca.model.surfaces import face_geometry
 from warp_mca.model.tied_nodes import tie_warnings
@@ -49,7 +49,7 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
             f"time step {stable.shortened:.0f} times shorter than half of the elements need; improve the mesh there"
         )
     for body in scene.bodies:
-        own = not isinstance(body.geometry, (Box, Parts, Plate, Rod, Sphere))
+        own = not isinstance(body.geometry, (Box, NestedPlate, Parts, Plate, Rod, Sphere))
         if own and (count := doubled_nodes(meshes[body.name])):
             found.append(
                 f"{count} nodes of body {body.name} lie where others of it do: unless cracks are meant, merge the "

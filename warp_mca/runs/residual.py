@@ -1,8 +1,9 @@
 """Owns the shape that bodies keep between two impacts: the equilibrium of their elements with the plastic strain.
 
-The bodies are relaxed together: nodes that joints tie stay together, and nodes on the ground, on a base, on held axes
-or of rigid bodies stay where they are. Hinges with pins give no forces, as the bodies of an open chain hold none
-against each other. Forces are those of the elements in float64, whatever the precision of the run.
+The bodies are relaxed together: nodes that joints tie stay together, slaves of ties on their faces, and nodes on the
+ground, on a base, on held axes or of rigid bodies stay where they are. Hinges with pins give no forces, as the bodies
+of an open chain hold none against each other. Forces are those of the elements in float64, whatever the precision of
+the run.
 """
 
 from __future__ import annotations
@@ -74,6 +75,7 @@ class Relaxation:
         self.held[self.ground] = True
         self.held[self.rigid] = True
         self.held[second[self.tied]] = True  # they follow the first node of their pair
+        self.held[model.ties.slave] = True  # they follow their masters
         self.masses = model.mass.copy()
         np.add.at(self.masses, model.joint_first[self.tied], model.mass[second[self.tied]])
         self.masses[second[self.tied]] = 0.0
@@ -122,10 +124,10 @@ class Relaxation:
         return self._followed(found)
 
     def _followed(self, u: Array) -> Array:
-        """Displacements with the second node of each tied pair where the first one is."""
+        """Displacements with the second node of each tied pair where the first one is, and slaves of ties on faces."""
         found = u.copy()
         found[self.model.joint_second[self.tied]] = u[self.model.joint_first[self.tied]]
-        return found
+        return self.model.ties.follow(found)
 
     def _evaluate(self, u: Array) -> None:
         """Let the trial state have displacements and what its elements make of them, from the history at the start."""
@@ -138,13 +140,14 @@ class Relaxation:
                 stage.launch(self.solver.work, self.trial)
 
     def _forces(self, u: Array) -> Array:
-        """Forces of the elements on the nodes [N], those on second nodes of tied pairs given to the first."""
+        """Forces of the elements on the nodes [N]; nodes that follow others give these their forces."""
         first, second = self.model.joint_first[self.tied], self.model.joint_second[self.tied]
         self._evaluate(self._followed(u))
         with wp.ScopedDevice(self.solver.device):
             self.trial.v.zero_()
             self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.constraints.at_rest)
-        force = self.model.mass[:, None] * (self.trial.v.numpy() - self.model.gravity[0])
+        inertia = np.where(self.model.mass > 0.0, self.model.mass, 1.0)  # as `Workspace.inverse_mass` divides
+        force = self.model.ties.carried(inertia[:, None] * (self.trial.v.numpy() - self.model.gravity[0]))
         force[first] += force[second]
         force[second] = 0.0
         force[self.rigid] = 0.0

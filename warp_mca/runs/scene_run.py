@@ -118,6 +118,8 @@ class SceneRun:
             names = contact_names(scene.contacts)
             more["penalty"] = {name: vars(item) for name, item in zip(names, model.penalties, strict=True) if item}
         more |= {"contact_spring_share": self._shares(), "contact_spring_loss": peak_losses(self._shares())}
+        if scene.ties:
+            more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
         if scene.stress_paths:
             body = scene.body(scene.stress_paths[0].lines[0].body)
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds

@@ -20,6 +20,7 @@ FILES = (
     "large_strain",
     "waves",
     "absorbing",
+    "tied",
     "bending",
     "impact",
     "taylor",

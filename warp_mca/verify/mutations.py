@@ -26,6 +26,12 @@ MUTATIONS: dict[str, Mutation] = {
         "        Fz = to_lines(Sz + half * Bz)\n"
         "        return edge_to_node(Fx, Fy, Fz, W)",
     ),
+    "tie_forces_lost": Mutation(
+        "masters of ties take half of the forces on their slaves",
+        "kernels/nodes/tied.py",
+        "total += tied.share[e] * f",
+        "total += wp.float64(0.5) * tied.share[e] * f",
+    ),
     "contact_soft": Mutation(
         "contact springs are ten times too soft",
         "kernels/contact/penalty.py",

@@ -1,0 +1,55 @@
+"""Owns the case of tied meshes: what a tie of a fine mesh to a coarse one sends back of a pulse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warp_mca.verify.case import Row, Setup, case
+
+
+@case(
+    group="waves",
+    title="A tie of a fine mesh to one of twice its cells sends back nothing of a pulse but what the cells do",
+    reference="One-dimensional wave theory: bars of one impedance send back nothing; Graff, Wave Motion in Elastic "
+    "Solids (1975), chapter 2.",
+    catches=("tie_forces_lost",),
+)
+def tied_bar(setup: Setup) -> list[Row]:
+    """Square bar, nu = 0; the pulse beside that in a bar of the fine mesh throughout, on both sides of the tie."""
+    counts = setup.choose((25, 50), (25, 50, 100))
+    back, on = [], []
+    for count in counts:
+        curves = []
+        for axial, coarse in ((count, 2), (2 * count, 4)):
+            scene = setup.scene("tied_bar", axial_fine=2 * count, axial=axial, fine=4, coarse=coarse)
+            path = setup.run(scene).paths[0]
+            probes = (int(np.argmin(np.abs(path.position - x))) for x in (0.15, 0.36))
+            curves.append([path.stress[:, probe, 0].astype(np.float64) for probe in probes])
+        (near, far), (alone, beyond) = curves
+        top = np.abs(alone).max()
+        back.append(float(np.abs(near - alone).max() / top))
+        on.append(float(np.abs(far).max() / np.abs(beyond).max()))
+    sizes = tuple(1.0 / count for count in counts)
+    why = "dispersion: cells of twice the length carry waves more slowly, with {} of them in the pulse"
+    return [
+        Row(
+            quantity="share of the stress that is sent back",
+            exact=0.0,
+            measured=tuple(back),
+            unit="-",
+            tolerance=5e-3,
+            scale=1.0,
+            why=why.format(counts[-1] * 2 // 5),
+            sizes=sizes,
+            least_order=setup.by_element(1.8, tet4=None),
+        ),
+        Row(
+            quantity="share of the stress that is let through",
+            exact=1.0,
+            measured=tuple(on),
+            unit="-",
+            tolerance=5e-3,
+            why=why.format(counts[-1] * 2 // 5),
+            sizes=sizes,
+        ),
+    ]
