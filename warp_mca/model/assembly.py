@@ -38,6 +38,7 @@ class Block:
         material: row of `Model.law`, shape (element_count,), int32.
         first: index of the first element in the model.
         ends: where the elements of each scene of a batch end in the block; empty for one scene.
+        level_ends: where the elements of each level of `Model.rates` end in the block; empty with one rate.
     """
 
     element: str
@@ -47,6 +48,7 @@ class Block:
     material: Index
     first: int
     ends: tuple[int, ...] = ()
+    level_ends: tuple[int, ...] = ()
 
     @property
     def plastic(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,8 @@ from warp_mca.model.constraints import JointPairs, check_bindings, constraints, 
 from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
+from warp_mca.model.own_steps import OwnSteps
+from warp_mca.model.rates import Rates
 from warp_mca.model.stable_step import StableStep
 from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
 from warp_mca.scene import Contact, RigidPlane, Scene
@@ -67,6 +69,7 @@ class Model:
         element_of: position of each element in the concatenated meshes, shape (element_count,), int32.
         stable: the stable time step.
         batch: where the scenes of a batch lie, or None for a model of one scene.
+        rates: groups of elements that take steps of their own, or None where all take the same.
     """
 
     X: Array
@@ -97,6 +100,7 @@ class Model:
     element_of: Index
     stable: StableStep
     batch: Layout | None = None
+    rates: Rates | None = None
 
     def owner(self, element: int) -> tuple[str, int]:
         """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""
@@ -109,9 +113,17 @@ class Model:
         return len(self.X)
 
     @property
+    def common_steps(self) -> int:
+        """Steps that contacts and joints take in a step of the solver."""
+        return self.rates.common_steps if self.rates else 1
+
+    @property
     def element_count(self) -> int:
         """Number of elements."""
         return len(self.element_of)
+
+
+Grouping = Callable[[Model, OwnSteps], Model]
 
 
 def _contacts(parts: Assembly, velocity: Array) -> tuple[tuple[ContactPass, ...], Array, Array]:
@@ -224,11 +236,13 @@ def build_model(
     *,
     chain: Chain | None = None,
     start: float = 0.0,
+    grouping: Grouping | None = None,
 ) -> Model:
     """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
 
     `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh. What
     acts in the joints of a `chain` and moves its base goes on, from `start` on [s], counted from the release.
+    `grouping` sorts the elements by steps of their own.
 
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
@@ -245,7 +259,7 @@ def build_model(
     check_bindings(held, pairs)
     passes, axes, added = _contacts(parts, velocity)
     stable = parts.stable(added)
-    return Model(
+    model = Model(
         X=parts.X,
         V=velocity,
         mass=parts.mass,
@@ -266,3 +280,4 @@ def build_model(
         stable=stable,
         batch=None,
     )
+    return grouping(model, OwnSteps(parts, added)) if grouping else model

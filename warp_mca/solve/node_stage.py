@@ -27,6 +27,8 @@ class NodeStage:
     """Advances all nodes by a step of central differences.
 
     Attributes:
+        dt: time step of bound nodes [s].
+        base: time step of the fastest nodes [s].
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
     """
 
@@ -35,38 +37,52 @@ class NodeStage:
     ) -> None:
         """Choose the kernels; `rounds` of elements that wait for nothing but the nodes."""
         self.work, self.constraints, self.dt, self.node_count = work, constraints, dt, model.node_count
+        self.base = dt
         each = bool((model.gravity != model.gravity[0]).any())
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         bound, early = constraints.count > 0, rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, bound, each, early)
-        self.bound_kernel = (
-            constraint.bound_kernel(precision, self.touched, each, constraints.partial) if bound else None
-        )
+        self._choose(precision, (self.touched, fixed, bound, early), each)
+
+    def _choose(self, precision: str, kind: tuple[bool, ...], each: bool) -> None:
+        """The kernels of a `kind`: contact, fixed, bound, early as `node.integrate_kernel` has them."""
+        contact, fixed, bound, early = kind
+        self.integrate_kernel = node.integrate_kernel(precision, contact, fixed, bound, each, early)
+        self.bound_kernel = constraint.bound_kernel(precision, contact, each, self.constraints.partial) if bound else None
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
         return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
 
-    def advance(self, step: Step) -> None:
-        """Free nodes; where the step records, `work.v_before` takes the velocities before it."""
-        before = self.work.v_before if step.records else None
-        self.integrate(step.state, self.dt, self.dt, self.constraints.role, step.split, before)
+    def advance(self, step: Step, level: int | None = None) -> None:
+        """Free nodes, those up to a `level` of `Model.rates` or all.
 
-    def advance_bound(self, step: Step) -> None:
-        """Nodes in joints and driven ones."""
+        Where the step records, `work.v_before` takes the velocities before it.
+        """
+        before = self.work.v_before if step.records else None
+        self.integrate(step.state, self.base, self.base, self.constraints.role, step.split, before, level)
+
+    def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
+        """`first_slots` and `more_slots` of elements up to a level, or of all."""
+        return self.work.first_slots, self.work.more_slots
+
+    def begin_record(self, state: State) -> None:
+        """Called at a record, before nodes move."""
+
+    def end_record(self, state: State) -> None:
+        """Called at a record, when nodes have moved."""
+
+    def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
+        """After the step that recorded: displacements [m], velocities before these [m/s], and the time [s] by which the
+        displacements have moved on with them since the record."""
+        return state.u, state.v, self.dt
+
+    def advance_bound(self, step: Step, level: int | None = None) -> None:
+        """Nodes in joints and driven ones, with forces of elements up to a level, or of all."""
         work, state, own = self.work, step.state, step.state.constraints
-        inputs = [
-            work.mass,
-            work.inverse_mass,
-            work.first_slots,
-            work.more_slots,
-            self.constraints.role,
-            work.force,
-            self.scene,
-        ]
+        inputs = [work.mass, work.inverse_mass, *self.slots(level), self.constraints.role, work.force, self.scene]
         inputs += [self.gravity, self.constraints.bonds, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
@@ -87,6 +103,7 @@ class NodeStage:
         role: wp.array,
         split: Split = whole,
         before: wp.array | None = None,
+        level: int | None = None,
     ) -> None:
         """v += kick a, u += drift v of nodes whose `role` leaves them free; `before` takes the old velocities."""
         work, squares = self.work, state.speed_square

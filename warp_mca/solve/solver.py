@@ -29,6 +29,7 @@ from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.node_stage import NodeStage
+from warp_mca.solve.rated_nodes import RatedNodeStage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
@@ -48,7 +49,7 @@ class Solver:
     Attributes:
         model: that it advances.
         layout: of the model's scenes.
-        dt: time step [s].
+        dt: time step [s]; with `Model.rates` that of their substeps together.
         threads: that compute; one on a GPU, and for a model that is too small to gain from more.
         work: the model on the device, and what a step computes and forgets.
         elements, contacts: stages of the model's blocks and contact passes.
@@ -90,10 +91,17 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
-        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
-        self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
+        self.common_dt = self.dt / model.common_steps
+        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.common_dt)
+        nodes = [self.precision, self.common_dt, self._early]
+        self.nodes = (
+            RatedNodeStage(model, self.work, self.constraints, self.elements, *nodes)
+            if model.rates
+            else NodeStage(model, self.work, self.constraints, *nodes)
+        )
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
+        self.subgroups = [self._groups(level) for level in range(model.rates.top if model.rates else 0)]
         self._streams = Streams(wp.get_device().is_cuda)
 
     @property
@@ -103,16 +111,20 @@ class Solver:
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
 
-    def _groups(self) -> list[Group]:
-        """The stages of a step, in their order.
+    def _groups(self, level: int | None = None) -> list[Group]:
+        """The stages of a step in their order, or those of a substep that computes elements up to a level.
 
         Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want
         it, and patches want another division than contact.
         """
-        work = self.work
-        forces = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split)) for e in self.elements]
+        work, rates = self.work, self.model.rates
+        common = level is None or rates is None or level >= rates.common
+        active = [e for e in self.elements if level is None or e.active(level)]
+        forces = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
         forces += [
-            Stage("contact", lambda s, c=c: c.launch(work, s.state, self.dt, s.split), BESIDE) for c in self.contacts
+            Stage("contact", lambda s, c=c: c.launch(work, s.state, self.common_dt, s.split), BESIDE)
+            for c in self.contacts
+            if common
         ]
         forces.append(Stage("next record", self.records.next_row, BESIDE, only_records=True))
         energies = [Stage("paths, frames: stress", self._before_step, only_records=True)]
@@ -125,20 +137,23 @@ class Solver:
             for c in self.contacts
         ]
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
-        advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
-        advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
-        advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
-        advance.append(Stage("free nodes", self.nodes.advance))
+        bound, rails = common and self.constraints.count, common and len(self.constraints.rails)
+        nodes = self.nodes
+        advance = [Stage("joints, driven nodes", lambda s: nodes.advance_bound(s, level), BESIDE)] if bound else []
+        advance += [Stage("sliders on rails", nodes.slide, BESIDE)] if rails else []
+        advance += [Stage("bases", self.loads.move_bases, BESIDE)] if common and self.model.bases else []
+        advance.append(Stage("free nodes", lambda s: nodes.advance(s, level)))
         motion = [
-            Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
+            Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, nodes), only_records=True),
             Stage("frames: velocity", self._after_step, only_records=True),
         ]
         if self.loads.kernels():
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
-        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
-        return [forces, energies, sums, advance, torques if self.model.hinge_loads else [], motion]
+        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.common_dt, self.common_dt))]
+        return [forces, energies, sums, advance, torques if common and self.model.hinge_loads else [], motion]
 
     def _before_step(self, step: Step) -> None:
+        self.nodes.begin_record(step.state)
         if self.output and step.is_row:
             self.output.before_step(step.state, step.needs)
 
@@ -211,15 +226,18 @@ class Solver:
         """
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
-            self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.constraints.at_rest)
+            self.nodes.integrate(state, -0.5 * self.nodes.base, 0.0, self.constraints.at_rest)
             if self.model.hinge_loads:
-                self.loads.torques(state, -0.5 * self.dt, 0.0)
+                self.loads.torques(state, -0.5 * self.common_dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
 
     def _step(self, step: Step) -> None:
         self._streams.run(self.groups, step)
+        for j in range(1, 1 << len(self.subgroups)):
+            level = (j & -j).bit_length() - 1
+            self._streams.run(self.subgroups[level], Step(step.state, step.split))
 
     def _schedule(self) -> None:
         for stage in self.elements:
