@@ -123,9 +123,7 @@ def move(
 
 
 @cache
-def bound_kernel(
-    precision: str, contact: bool, each: bool = False, partial: bool = False, rated: bool = False
-) -> Any:
+def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False, rated: bool = False) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With

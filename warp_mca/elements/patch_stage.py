@@ -68,7 +68,7 @@ class PatchStage(ElementStage):
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
         self.first_patches = [self._first_patches(count) for count in self.level_patches]
 
-    def _first_patches(self, count: int) -> patch.Patches:
+    def _first_patches(self, count: int) -> Any:
         """The first patches, which are those up to a level."""
         found = patch.Patches()
         found.head, found.turn = self.patches.head[:count], self.patches.turn[:count]

@@ -5,7 +5,7 @@ The costs are stored here and never measured in a run, so that runs repeat bit f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,8 +56,10 @@ def check_multi_rate(value: object) -> MultiRate:
     Raises:
         RequestError: it is none of them.
     """
-    if value is None or value == "auto":
-        return value
+    if value is None:
+        return None
+    if value == "auto":
+        return "auto"
     if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= MOST:
         remedy = f'give "auto" or a number of groups from 1 to {MOST}, or leave it out'
         raise bad_value("multi_rate", validate.brief(value), remedy)
@@ -100,6 +102,15 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
         return grouped(model, chosen.level, chosen.rates)
 
     return choose
+
+
+def rate_figures(rates: Rates, dt: float, steps: int, wall: Mapping[str, float]) -> dict[str, object]:
+    """What `summary.json` says of rates, after so many steps of dt [s] in `wall` seconds by stage."""
+    groups = [
+        {"step": dt / (1 << (rates.top - level)), "elements": count} for level, count in enumerate(rates.elements)
+    ]
+    rate = rates.work * steps / wall["fe"] if wall.get("fe", 0.0) > 0.0 else None
+    return {"multi_rate": len(groups), "rate_groups": groups, "element_steps_per_s": rate}
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
+from warp_mca.runs.rate_groups import rate_figures
 from warp_mca.solve.state_figures import (
     joint_impulses,
     max_normal_force,
@@ -103,6 +104,8 @@ class SceneRun:
             "joint_impulse": joint_impulses(self.solver, self.state, self.index),
             "threads": self.solver.threads,
         }
+        if model.rates:
+            more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         if scene.paths:

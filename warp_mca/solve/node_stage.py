@@ -50,7 +50,9 @@ class NodeStage:
         """The kernels of a `kind`: contact, fixed, bound, early as `node.integrate_kernel` has them."""
         contact, fixed, bound, early = kind
         self.integrate_kernel = node.integrate_kernel(precision, contact, fixed, bound, each, early)
-        self.bound_kernel = constraint.bound_kernel(precision, contact, each, self.constraints.partial) if bound else None
+        self.bound_kernel = (
+            constraint.bound_kernel(precision, contact, each, self.constraints.partial) if bound else None
+        )
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

@@ -130,3 +130,18 @@ class RatedNodeStage(NodeStage):
     def end_record(self, state: State) -> None:
         """As `NodeStage.end_record`: keep the velocities, before the next substep changes them."""
         wp.copy(self.v_record, state.v)
+
+
+def node_stage(
+    model: Model,
+    work: Workspace,
+    constraints: ConstraintStage,
+    elements: Sequence[ElementStage],
+    precision: str,
+    dt: float,
+    rounds: int,
+) -> NodeStage:
+    """The nodal stage of a model; arguments as `RatedNodeStage` has them."""
+    if model.rates:
+        return RatedNodeStage(model, work, constraints, elements, precision, dt, rounds)
+    return NodeStage(model, work, constraints, precision, dt, rounds)

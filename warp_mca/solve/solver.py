@@ -28,8 +28,7 @@ from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
-from warp_mca.solve.node_stage import NodeStage
-from warp_mca.solve.rated_nodes import RatedNodeStage
+from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
@@ -91,14 +90,9 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
-        self.common_dt = self.dt / model.common_steps
-        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.common_dt)
-        nodes = [self.precision, self.common_dt, self._early]
-        self.nodes = (
-            RatedNodeStage(model, self.work, self.constraints, self.elements, *nodes)
-            if model.rates
-            else NodeStage(model, self.work, self.constraints, *nodes)
-        )
+        dt = self.dt / model.common_steps
+        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, dt)
+        self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, self._early)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
         self.subgroups = [self._groups(level) for level in range(model.rates.top if model.rates else 0)]
@@ -117,14 +111,13 @@ class Solver:
         Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want
         it, and patches want another division than contact.
         """
-        work, rates = self.work, self.model.rates
+        work, nodes, rates = self.work, self.nodes, self.model.rates
         common = level is None or rates is None or level >= rates.common
         active = [e for e in self.elements if level is None or e.active(level)]
         forces = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
         forces += [
-            Stage("contact", lambda s, c=c: c.launch(work, s.state, self.common_dt, s.split), BESIDE)
-            for c in self.contacts
-            if common
+            Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
+            for c in (self.contacts if common else [])
         ]
         forces.append(Stage("next record", self.records.next_row, BESIDE, only_records=True))
         energies = [Stage("paths, frames: stress", self._before_step, only_records=True)]
@@ -138,7 +131,6 @@ class Solver:
         ]
         sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
         bound, rails = common and self.constraints.count, common and len(self.constraints.rails)
-        nodes = self.nodes
         advance = [Stage("joints, driven nodes", lambda s: nodes.advance_bound(s, level), BESIDE)] if bound else []
         advance += [Stage("sliders on rails", nodes.slide, BESIDE)] if rails else []
         advance += [Stage("bases", self.loads.move_bases, BESIDE)] if common and self.model.bases else []
@@ -149,7 +141,7 @@ class Solver:
         ]
         if self.loads.kernels():
             motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
-        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.common_dt, self.common_dt))]
+        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, nodes.dt, nodes.dt))]
         return [forces, energies, sums, advance, torques if common and self.model.hinge_loads else [], motion]
 
     def _before_step(self, step: Step) -> None:
@@ -228,7 +220,7 @@ class Solver:
             self.work.force.zero_()  # of a state that was advanced before
             self.nodes.integrate(state, -0.5 * self.nodes.base, 0.0, self.constraints.at_rest)
             if self.model.hinge_loads:
-                self.loads.torques(state, -0.5 * self.common_dt, 0.0)
+                self.loads.torques(state, -0.5 * self.nodes.dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
