@@ -22,6 +22,7 @@ FILES = (
     "bending",
     "impact",
     "taylor",
+    "rates",
     "friction",
     "rolling",
     "rigid",

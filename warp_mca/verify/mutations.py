@@ -252,6 +252,12 @@ MUTATIONS: dict[str, Mutation] = {
         "trial = f_start - k *",
         "trial = f_start + k *",
     ),
+    "slow_impulse_lost": Mutation(
+        "an element with a step of its own gives its nodes the impulse of one of their steps only",
+        "kernels/nodes/node.py",
+        "wp.float64(1 << (entry >> wp.static(LEVEL_BIT))) * f",
+        "f",
+    ),
     "gravity_reversed": Mutation(
         "gravity acts against its direction",
         "kernels/nodes/node.py",
