@@ -10,20 +10,21 @@ GROUPS = 4
 @case(
     group="impact",
     title="Two graded bars collide end on, their cells in up to four groups with steps of their own",
-    reference="Lew, Marsden, Ortiz and West, Int. J. Numer. Meth. Engng 60 (2004) 153, for the method. Wolff and Bucher, "
-    "Int. J. Numer. Meth. Engng 95 (2013) 562, for the problem; one-dimensional wave theory for its answer.",
+    reference="Method: Lew, Marsden, Ortiz, West, Int. J. Numer. Meth. Engng 60 (2004) 153. Problem: Wolff and Bucher, "
+    "Int. J. Numer. Meth. Engng 95 (2013) 562. Answer: one-dimensional wave theory.",
     catches=("slow_impulse_lost",),
 )
 def graded_bars(setup: Setup) -> list[Row]:
     """Bars 10 x 1 x 1, E = rho = 1, nu = 0, speeds +-0.1; cells grow eightfold from the contact to the free ends.
 
-    All tetrahedra have one step, since their pressure is averaged over neighbours. At 0.1 the bars of them buckle, since
-    their mesh is not symmetric; they take a hundredth of the speed.
+    All tetrahedra have one step, since their pressure is averaged over neighbours. Their mesh is not symmetric, so that
+    the bars would buckle: they take a hundredth of the speed, and softer contact springs.
     """
     counts, v = setup.choose((40, 80), (40, 80, 160)), setup.by_element(0.1, tet4=0.001)
     mean, ripple, end = [], [], []
     for count in counts:
-        scene = setup.scene("graded_bars", v=v, axial=count, section=setup.by_element(1, tet4=2))
+        more = setup.by_element({"section": 1}, tet4={"section": 2, "penalty": 0.3})
+        scene = setup.scene("graded_bars", v=v, axial=count, **more)
         grouped, plain = setup.run(scene, multi_rate=GROUPS), setup.run(scene)
         force, usual = (found.F_n[(found.time > 1.0) & (found.time < 19.0)] for found in (grouped, plain))
         mean.append(float(force.mean()) / v)
@@ -52,7 +53,7 @@ def graded_bars(setup: Setup) -> list[Row]:
             exact=20.0,
             measured=tuple(end),
             unit="s",
-            tolerance=0.02,
+            tolerance=0.03,
             why="the front is as wide as a few cells; rows are 0.1 s apart",
         ),
     ]
