@@ -25,7 +25,7 @@ from warp_mca.verify.mutations import MUTATIONS
 
 ROOT = Path(__file__).parent.parent
 STORE = ROOT / "docs" / "mutations.json"
-GUARD = ("warp_mca/scene/scene.py", "energy_tolerance: float = 0.01", "energy_tolerance: float = 1e9")
+GUARD = ("warp_mca/scene/phases.py", "energy_tolerance: float = 0.01", "energy_tolerance: float = 1e9")
 TREES = {"warp_mca": "warp_mca", "kernels": "warp_mca/kernels", "scenes": "warp_mca/scenes"}
 
 
