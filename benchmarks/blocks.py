@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.elements import ELEMENTS, Element
 from warp_mca.geometry.cell_types import TETRAHEDRON
-from warp_mca.model.model import Model, build_model
+from warp_mca.model.build import build_model
+from warp_mca.model.model import Model
 from warp_mca.model.stable_step import StableStep, stable_step
 from warp_mca.solve.solver import Solver
 

@@ -16,7 +16,7 @@ begun = time.perf_counter()
 import warp as wp
 wp.config.quiet = True
 import warp_mca as mca
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
 from warp_mca.solve.solver import Solver
 imported = time.perf_counter()
 scene = mca.make_scene("rod_on_wall")

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.model.model import build_model, nodal_masses
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import nodal_masses
 from warp_mca.results.paths import locate
 from warp_mca.rigid.handback import HandBack, carriage_motion, hand_back
 from warp_mca.rigid.handoff import HandOff, hand_off

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import warp_mca as mca
-from warp_mca.model.model import build_model, nodal_masses
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import nodal_masses
 from warp_mca.recorders.frames import skins
 from warp_mca.recorders.recorder import Frame, RunInfo, Volume
 from warp_mca.rigid.handoff import hand_off

@@ -16,6 +16,7 @@ import warp_mca as mca
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.prepare import Clock, Prepared, prepare
+from warp_mca.runs.rate_groups import grouping
 from warp_mca.solve.solver import Solver
 
 # least lengths of ranges that threads take, so short that small models are cut
@@ -29,9 +30,16 @@ SHORT_RANGES = {
 }
 
 
-def prepared(scene: mca.Scene, meshes: Mapping[str, mca.Mesh] | None = None) -> Prepared:
+def prepared(
+    scene: mca.Scene,
+    meshes: Mapping[str, mca.Mesh] | None = None,
+    duration: float | None = None,
+    multi_rate: int | str | None = None,
+    device: str = "cpu",
+) -> Prepared:
     """A scene at the start of its impact phase."""
-    return prepare(scene, meshes, Clock(), lambda stage, done: None)
+    groups = grouping(scene, scene.impact.duration if duration is None else duration, device, multi_rate)
+    return prepare(scene, meshes, Clock(), lambda stage, done: None, grouping=groups)
 
 
 def begun(
@@ -41,10 +49,11 @@ def begun(
     device: str = "cpu",
     precision: str = "mixed",
     threads: int = 1,
+    multi_rate: int | str | None = None,
 ) -> Impact:
     """The impact phase of scenes side by side, before its first step."""
     span = scenes[0].impact.duration if duration is None else duration
-    ready = [prepared(scene, meshes) for scene in scenes]
+    ready = [prepared(scene, meshes, span, multi_rate, device) for scene in scenes]
     return Impact(ready, span, device=device, precision=precision, threads=threads)
 
 

@@ -11,7 +11,7 @@ import pytest
 from impacts import finished, momentum, prepared, result_of
 
 import warp_mca as mca
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
 from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)

@@ -19,7 +19,7 @@ from warp_mca.geometry.degenerate import cell_names, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
 from warp_mca.kernels.nodes.node import gather_function
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
 from warp_mca.solve.solver import Solver
 from warp_mca.verify.small_meshes import mixed_cube
 

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 from warp_mca.base.errors import GuardError
-from warp_mca.model.model import build_model, nodal_masses
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import nodal_masses
 from warp_mca.rigid.equilibrium import equilibrium
 from warp_mca.solve.solver import Solver
 

@@ -5,7 +5,8 @@ import pytest
 from impacts import finished, momentum, result_of
 
 import warp_mca as mca
-from warp_mca.model.model import build_model, nodal_masses
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import nodal_masses
 from warp_mca.rigid.handoff import hand_off
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)

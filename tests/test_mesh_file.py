@@ -14,7 +14,7 @@ from flying_bars import FlyingBars
 import warp_mca as mca
 from warp_mca.base.errors import McaError, RequestError
 from warp_mca.geometry.cell_types import HEXAHEDRON
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
 from warp_mca.recorders import mesh_file
 from warp_mca.recorders.mesh_file import COMPONENTS, FinalState, cells
 

@@ -16,7 +16,7 @@ import warp_mca as mca
 from warp_mca.elements import ELEMENTS
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.geometry.degenerate import tetrahedral
-from warp_mca.model.assembly import body_cells
+from warp_mca.model.cells import body_cells
 from warp_mca.recorders import UsdFile, VtkHdfFile
 from warp_mca.solve.output import NodalStress
 from warp_mca.verify.runner import verify

@@ -210,7 +210,7 @@ def test_elements_of_a_model_come_patch_by_patch():
         ),
         impact=mca.ImpactPhase(duration=1e-6),
     )
-    from warp_mca.model.model import build_model
+    from warp_mca.model.build import build_model
 
     meshes = mca.mesh(scene)
     X = meshes["bar"].points

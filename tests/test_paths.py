@@ -10,7 +10,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.degenerate import tetrahedral
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
 from warp_mca.results.paths import Probes, locate
 from warp_mca.verify.small_meshes import mixed_cube
 

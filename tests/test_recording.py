@@ -12,7 +12,7 @@ from rrd import rows
 
 import warp_mca as mca
 from warp_mca.base.errors import GuardError, RequestError
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
 from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
 from warp_mca.recorders.frames import Recording, check_files, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame

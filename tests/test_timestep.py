@@ -10,7 +10,9 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.model import stable_step as timestep
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.model import Model, build_model, nodal_masses
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import nodal_masses
+from warp_mca.model.model import Model
 from warp_mca.model.stable_step import stable_step
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.solve.solver import Solver

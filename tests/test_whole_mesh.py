@@ -12,8 +12,9 @@ from warp_mca.base.errors import RequestError
 from warp_mca.geometry import Box, Mesh
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.quality import check
-from warp_mca.model.assembly import body_materials
-from warp_mca.model.model import Model, build_model
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import body_materials
+from warp_mca.model.model import Model
 
 
 def broken(fault: str) -> Mesh:

@@ -46,17 +46,17 @@ def dampen(before: wp.vec3d, free: wp.vec3d, own: wp.vec3d, share: wp.mat33d):
 
 
 @cache
-def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = False) -> Any:
+def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = False, rated: bool = False) -> Any:
     """Kernel: advance the nodes that dashpots act on; arguments as in `node.integrate_kernel`.
 
     impulse_out [N s] is what each node has given to what lies beyond the boundary up to t(n), absorbed_out [J] the
     energy that it gave in the frame of the body. As the force at t(n) acts for half a step on either side of
     it, the arrays with `after` hold the same half a step later. With `springs`, stretch_out [m] is u(n) less the way of
-    the body.
+    the body. `rated` as in `gather_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision)
+    gather = gather_function(precision, rated)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_absorbing(

@@ -124,17 +124,19 @@ def move(
 
 
 @cache
-def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False, skips: bool = False) -> Any:
+def bound_kernel(
+    precision: str, contact: bool, each: bool = False, partial: bool = False, skips: bool = False, rated: bool = False
+) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
-    rigid bodies, which `rigid_body.advance_kernel` advances.
+    rigid bodies, which `rigid_body.advance_kernel` advances. `rated` as in `gather_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision)
+    gather = gather_function(precision, rated)
 
     @wp.func
     def total_force(

@@ -16,15 +16,13 @@ wp.set_module_options({"enable_backward": False})
 BOUND = 8  # `kernels.nodes.constraint` or `absorbing` advances it
 TOUCHABLE = 16  # it belongs to a surface of a contact
 
+LEVEL_BIT = 27  # first bit of a level beside the number of a node or a slot, see `rated_node`
 KEEPERS = 32  # threads that keep the greatest normal force of each scene
 
 
 @cache
-def gather_function(precision: str) -> Any:
-    """The function that sums the forces of elements on a node, in the slots that `first_slots` and `more_slots` list.
-
-    Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`.
-    """
+def force_function(precision: str, rated: bool) -> Any:
+    """The function that reads the force in a slot; `rated`: 2^k times it, with k in the bits from LEVEL_BIT on."""
     vec3 = scalars(precision).vec3
 
     @wp.func
@@ -33,7 +31,27 @@ def gather_function(precision: str) -> Any:
         return wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2]))
 
     @wp.func
+    def impulse_at(entry: int, force: wp.array(dtype=vec3)):
+        f = force_at(entry & wp.static((1 << LEVEL_BIT) - 1), force)
+        return wp.float64(1 << (entry >> wp.static(LEVEL_BIT))) * f
+
+    return impulse_at if rated else force_at
+
+
+@cache
+def gather_function(precision: str, rated: bool = False) -> Any:
+    """The function that sums the forces of elements on a node, in the slots that `first_slots` and `more_slots` list.
+
+    Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`. `rated`:
+    slots come with levels, and a node may have none.
+    """
+    vec3, force_at = scalars(precision).vec3, force_function(precision, rated)
+
+    @wp.func
     def gather(pair: wp.vec2i, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
+        if wp.static(rated):
+            if pair[0] < 0:
+                return wp.vec3d()
         total = force_at(pair[0], force)
         second = force_at(wp.max(pair[1], 0), force)
         if pair[1] >= 0:

@@ -24,10 +24,10 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def load_function(precision: str, contact: bool) -> Any:
+def load_function(precision: str, contact: bool, rated: bool) -> Any:
     """The function that lets the forces on its nodes act on a body."""
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision)
+    gather = gather_function(precision, rated)
 
     @wp.func
     def load(
@@ -106,15 +106,16 @@ def count_riders(
 
 
 @cache
-def advance_kernel(precision: str, contact: bool) -> Any:
+def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
     """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes a group's bodies in turn.
 
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
     Q - I after the step, the other outputs from force_out on are as in `find_motion`, `rigid_rows` and `rigid_pins`.
+    `rated` as in `gather_function`.
     """
     vec3 = scalars(precision).vec3
-    load = load_function(precision, contact)
+    load = load_function(precision, contact, rated)
 
     # fmt: off
     @wp.kernel(enable_backward=False, module="unique")

@@ -37,15 +37,15 @@ class Tied:
 
 
 @cache
-def masters_kernel(precision: str, contact: bool, each: bool = False) -> Any:
+def masters_kernel(precision: str, contact: bool, each: bool = False, rated: bool = False) -> Any:
     """Kernel: central difference of the nodes that carry slaves; arguments as of `node.integrate_kernel`.
 
     M_k a_k = f_k + sum_s N_sk f_s, where M_k holds the slaves' share of mass. Slaves are summed in a fixed order.
-    Contact forces on slaves are read here and reset by `follow`.
+    Contact forces on slaves are read here and reset by `follow`. `rated` as in `gather_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision)
+    gather = gather_function(precision, rated)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_masters(

@@ -51,6 +51,12 @@ def _run(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
     parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
     parser.add_argument(
+        "--multi-rate",
+        type=_groups,
+        metavar="auto|N",
+        help="let N groups of elements take steps of their own; auto: as many as suit the device (default: one step)",
+    )
+    parser.add_argument(
         "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
     )
     parser.add_argument(
@@ -110,6 +116,10 @@ def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("'': name a folder, or . for this one")
     return Path(text)
+
+
+def _groups(text: str) -> int | str:
+    return int(text) if text.isdigit() else text
 
 
 def _add_element(parser: argparse.ArgumentParser) -> None:

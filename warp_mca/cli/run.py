@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> None:
             device=args.device,
             precision=args.precision,
             threads=args.threads,
+            multi_rate=args.multi_rate,
             duration=args.duration,
             out=out,
             force=args.force,
@@ -89,6 +90,8 @@ def _sweep(args: argparse.Namespace) -> None:
     from warp_mca.runs.batch import hold_scenes, save_scenes
     from warp_mca.runs.sweep import batches, parse_sweep, print_sweep
 
+    if args.multi_rate is not None:
+        raise bad_value("--multi-rate", args.multi_rate, "scenes of a sweep take the same steps; leave it out")
     settings = parse_sweep(args.sweeps, parameters_given(args))
     requests = [read_request(args, more) for more in settings]
     out = args.out or Path(f"{requests[0].label}-sweep")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
-from warp_mca.elements.stage import BLOCK_DIM, ElementStage
+from warp_mca.elements.stage import BLOCK_DIM, ElementStage, levels_of
 from warp_mca.elements.state import ElementState
 from warp_mca.kernels.elements import patch
 from warp_mca.model.patches import PATCH, SLOTS, Array, grid_points, make_patches
@@ -45,7 +46,8 @@ class PatchStage(ElementStage):
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
-        host = make_patches(block.conn, block.ends, SLOTS[precision], X if mixed else None)
+        ends = (*block.ends, *block.level_ends)
+        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
@@ -57,10 +59,21 @@ class PatchStage(ElementStage):
         self.point = wp.array(point, dtype=patch.POINT[precision])
         self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
+        # patches up to each level, and the levels of their slots
+        self.level_patches = [int(np.searchsorted(host.start[:-1], end)) for end in block.level_ends]
+        self.slot_level = levels_of([int(host.slot_start[count]) for count in self.level_patches])
         self.scheduled = block.plastic and points > 1
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
+        self.first_patches = [self._first_patches(count) for count in self.level_patches]
+
+    def _first_patches(self, count: int) -> Any:
+        """The first patches, which are those up to a level."""
+        found = patch.Patches()
+        found.head, found.turn = self.patches.head[:count], self.patches.turn[:count]
+        found.corner, found.places = self.patches.corner, self.patches.places
+        return found
 
     def new_state(self) -> ElementState:
         """As for elements one by one, but lanes read the points of one element together."""
@@ -82,20 +95,26 @@ class PatchStage(ElementStage):
         self.blocks = min(len(self.patches.head), max(self.most // 2, self.most - room))
 
     def schedule(self) -> None:
-        """Patches in which elements yield come first, because they take longer."""
-        if self.scheduled:
+        """Patches of a level in which elements yield come before its others, because they take longer."""
+        if not self.scheduled:
+            return
+        ends = sorted({0, *self.level_patches, len(self.patches.head)})
+        for part in (slice(a, b) for a, b in pairwise(ends)):
+            flowing, head, turn = self.flowing[part], self.patches.head[part], self.patches.turn[part]
             for kernel, inputs, output in (
-                (patch.count_flowing, [self.flowing], self.flowing_of_run),
-                (patch.schedule, [self.flowing, self.flowing_of_run, self.patches.head], self.patches.turn),
+                (patch.count_flowing, [flowing], self.flowing_of_run),
+                (patch.schedule, [flowing, self.flowing_of_run, head], turn),
             ):
                 wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
-    def launch(self, work: Workspace, state: State, split: Split = whole) -> None:
+    def launch(self, work: Workspace, state: State, split: Split = whole, level: int | None = None) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
         own = state.elements[self.index]
-        inputs = [work.X, self.point, self.patches, work.law, state.u, self.slot, self.blocks]
+        patches = self.patches if level is None else self.first_patches[level]
+        blocks = min(self.blocks, len(patches.head))
+        inputs = [work.X, self.point, patches, work.law, state.u, self.slot, blocks]
         outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
-        wp.launch(self.force_kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 
 def hexahedral_stage(

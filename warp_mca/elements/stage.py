@@ -26,6 +26,12 @@ Index = NDArray[np.int32]
 BLOCK_DIM = PATCH  # threads of a block, for all kernels of elements
 
 
+def levels_of(ends: Sequence[int]) -> Index:
+    """Level of each of some entries, of which those of level k end at ends[k], int32."""
+    counts = np.diff(np.array([0, *ends], dtype=np.int64))
+    return np.repeat(np.arange(len(ends), dtype=np.int32), counts)
+
+
 class ElementStage:
     """Device side of one block of elements.
 
@@ -38,6 +44,7 @@ class ElementStage:
         vectors: that follow the plastic strains in the history, and turn with the element.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
+        slot_level: level of `Model.rates` of each slot, shape (slot_count,), int32; empty with one rate.
         rounds: patches that a block of threads computes in turn.
     """
 
@@ -59,6 +66,7 @@ class ElementStage:
         self.material = wp.array(block.material, dtype=wp.int32)
         self.count = block.conn.shape[1]
         self.slot_node: Index = block.conn.ravel()
+        self.slot_level: Index = np.tile(levels_of(block.level_ends), self.corners)
         self.slot = 0
         self.points, self.rows = points, rows or points * HISTORY_SIZE
         self.vectors: int = getattr(kernels, "VECTORS", 0)
@@ -112,8 +120,15 @@ class ElementStage:
     def schedule(self) -> None:
         """Launched now and then, between steps: choose in which order the next ones compute elements."""
 
-    def launch(self, work: Workspace, state: State, split: Split = whole) -> None:
-        """Forces of each element on its nodes [N], into the slots of this block; plastic flow."""
+    def active(self, level: int) -> int:
+        """Elements up to this level."""
+        return self.block.level_ends[level] if self.block.level_ends else self.count
+
+    def launch(self, work: Workspace, state: State, split: Split = whole, level: int | None = None) -> None:
+        """Forces of each element on its nodes [N], into the slots of this block; plastic flow.
+
+        Of elements up to a `level` of `Model.rates`; of all if None.
+        """
         own = state.elements[self.index]
 
         def launch(part: slice) -> None:
@@ -122,7 +137,7 @@ class ElementStage:
             outputs = [*self._history(own, part), own.extreme[:, part], work.force]
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
-        split(self.count, launch, ELEMENTS)
+        split(self.count if level is None else self.active(level), launch, ELEMENTS)
 
     def energies(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].
@@ -168,10 +183,17 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
         stage.slot = first
         first += len(stage.slot_node)
     node = np.concatenate([np.zeros(0, np.int32), *(stage.slot_node for stage in stages)])
-    slot, count = np.argsort(node, kind="stable").astype(np.int32), np.bincount(node, minlength=node_count)
+    first_slots, more_slots = list_slots(np.arange(len(node), dtype=np.int32), node, node_count)
+    first_slots[first_slots[:, 0] < 0, 0] = first  # of nodes without elements: a slot without force
+    return first_slots, more_slots
+
+
+def list_slots(entry: Index, node: Index, node_count: int) -> tuple[Index, Index]:
+    """As `gather_lists`, of some slots: entries that stand for them, and the node of each; -1 where a node has none."""
+    slot, count = entry[np.argsort(node, kind="stable")], np.bincount(node, minlength=node_count)
     begin = np.cumsum(count) - count
     first_slots = np.full((node_count, 2), -1, dtype=np.int32)
-    first_slots[:, 0] = np.append(slot, first)[np.where(count > 0, begin, first)]
+    first_slots[count > 0, 0] = slot[begin[count > 0]]
     first_slots[count == 2, 1] = slot[begin[count == 2] + 1]
     many = np.flatnonzero(count > 2)
     others = count[many] - 1

@@ -21,6 +21,7 @@ class Tet4:
     name = "tet4"
     cell = "tetrahedron"
     patches = False
+    one_rate = True  # the pressure is averaged over neighbours
 
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """A quarter of the mass at each corner."""

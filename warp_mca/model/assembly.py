@@ -8,16 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import bad_value
-from warp_mca.elements import ELEMENTS, Element, default_element
-from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.cells import Cells, body_cells, body_materials, element_masses, sum_to_nodes
 from warp_mca.model.patches import PATCH, compact_order
 from warp_mca.model.stable_step import StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.surfaces import Faces, make_faces
-from warp_mca.model.tied_nodes import within_bodies
-from warp_mca.scene import Body, Point, Scene, Surface
+from warp_mca.scene import Point, Scene, Surface
 from warp_mca.scene.materials import Material
 
 Array = NDArray[np.float64]
@@ -39,6 +36,7 @@ class Block:
         material: row of `Model.law`, shape (element_count,), int32.
         first: index of the first element in the model.
         ends: where the elements of each scene of a batch end in the block; empty for one scene.
+        level_ends: where the elements of each level of `Model.rates` end in the block; empty with one rate.
     """
 
     element: str
@@ -48,6 +46,7 @@ class Block:
     material: Index
     first: int
     ends: tuple[int, ...] = ()
+    level_ends: tuple[int, ...] = ()
 
     @property
     def plastic(self) -> bool:
@@ -58,101 +57,6 @@ class Block:
     def kind(self) -> tuple[bool, str, str, bool]:
         """Key of the block: (not plastic, law, element, finite). Blocks of a model are sorted by it."""
         return not self.plastic, self.law, self.element, self.finite
-
-
-def body_materials(body: Body, mesh: Mesh) -> list[tuple[Material, Index]]:
-    """Materials of a body with the cells that each fills; together they fill the body.
-
-    Raises:
-        RequestError: a named cell set is unknown, or cells are left without material or have two.
-    """
-    if isinstance(body.material, Material):
-        return [(body.material, np.arange(mesh.cell_count, dtype=np.int32))]
-    owner = np.full(mesh.cell_count, -1, dtype=np.int32)
-    listed = list(body.material.items())
-    for k, (name, _) in enumerate(listed):
-        if name == "*":
-            continue
-        if name not in mesh.cell_sets:
-            known = ", ".join(sorted(mesh.cell_sets)) or "none"
-            raise bad_value(f"Body {body.name}.material", name, f"the mesh's cell sets are {known}; or use '*'")
-        others = owner[mesh.cell_sets[name]]
-        if (others >= 0).any():
-            remedy = f"some of its cells are in {listed[others.max()][0]} too; give each cell one material"
-            raise bad_value(f"Body {body.name}.material", name, remedy)
-        owner[mesh.cell_sets[name]] = k
-    if "*" in body.material:
-        owner[owner < 0] = [name for name, _ in listed].index("*")
-    if (owner < 0).any():
-        raise bad_value(f"Body {body.name}.material", [n for n, _ in listed], "some cells have none; add a '*' entry")
-    return [(m, np.flatnonzero(owner == k).astype(np.int32)) for k, (_, m) in enumerate(listed)]
-
-
-@dataclass(frozen=True)
-class Cells:
-    """Cells of one formulation and strain measure.
-
-    Attributes:
-        element: the formulation.
-        finite: whether strains may be large.
-        conn: nodes of each cell, shape (cell_count, corners), int32.
-        index: of each in the concatenated meshes, shape (cell_count,), int32.
-    """
-
-    element: Element
-    finite: bool
-    conn: Index
-    index: Index
-
-
-def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
-    """The cells of a body by formulation, in the mesh's own numbering.
-
-    Raises:
-        RequestError: the mesh holds cells that should have been cut to those of the body's element.
-    """
-    finite, own = body.kinematics == "finite", ELEMENTS[body.element]
-    found, first = [], 0
-    for name, conn in mesh.cells.items():
-        if len(conn):
-            if name in CELL_TYPES[own.cell].cut_from:
-                remedy = f"its mesh holds {CELL_TYPES[name].field}; pass meshes through warp_mca.mesh"
-                raise bad_value(f"Body {body.name}.element", body.element, remedy)
-            index = np.arange(first, first + len(conn), dtype=np.int32)
-            found.append(Cells(own if name == own.cell else default_element(name), finite, conn, index))
-            first += len(conn)
-    return found
-
-
-def _masses(cells: Cells, points: Array, rho: Array) -> Array:
-    """Lumped masses of cells [kg], shape (cell_count, corners); `rho` [kg/m^3] is that of every element."""
-    mass = np.empty(cells.conn.shape)
-    for part in chunks(len(mass), CHUNK):
-        mass[part] = cells.element.lumped_masses(points[cells.conn[part]], rho[cells.index[part]])
-    return mass
-
-
-def _sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
-    """Sum of what each element gives its corners, shape (node_count,), float64."""
-    return np.bincount(conn.ravel(), value.ravel(), minlength=node_count).astype(np.float64)
-
-
-def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
-    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum.
-
-    Slaves of ties within a body have none: their masters carry it.
-    """
-    masses = {}
-    for body in scene.bodies:
-        mesh = meshes[body.name]
-        rho = np.empty(mesh.cell_count)
-        for material, cells in body_materials(body, mesh):
-            rho[cells] = material.rho
-        total = np.zeros(len(mesh.points))
-        for part in body_cells(body, mesh):
-            total += _sum_to_nodes(part.conn, _masses(part, mesh.points, rho), len(total))
-        masses[body.name] = total
-    return within_bodies(scene, meshes, masses)
 
 
 class Assembly:
@@ -197,10 +101,10 @@ class Assembly:
         self.mass = np.zeros(nodes)
         self.element_mass = []
         for part in self.cells:
-            mass = _masses(part, self.X, rho)
+            mass = element_masses(part, self.X, rho)
             self.volume[part.index] = mass.sum(axis=1) / rho[part.index]
             self.element_mass.append(mass)
-            self.mass += _sum_to_nodes(part.conn, mass, nodes)
+            self.mass += sum_to_nodes(part.conn, mass, nodes)
 
     def _merged_cells(self) -> list[Cells]:
         found: dict[tuple[str, bool], list[Cells]] = {}
@@ -255,9 +159,9 @@ class Assembly:
 
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
-        added = self._relieved(added)
+        added = self.relieved(added)
         steps = []
-        for part, mass in self._computed():
+        for part, mass in self.computed():
             moduli = self.K[part.index], self.G[part.index]
             contact = at_elements(part.conn, added)
             steps.append(stable_step(part.element, self.X, part.conn, *moduli, mass, contact, part.index))
@@ -265,19 +169,19 @@ class Assembly:
 
     def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
         """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
-        added = self._relieved(added)
+        added = self.relieved(added)
         steps = np.full(self.element_count, np.inf)  # of elements of rigid bodies
-        for part, mass in self._computed():
+        for part, mass in self.computed():
             moduli = self.K[part.index], self.G[part.index]
             contact = at_elements(part.conn, added)
             steps[part.index] = element_steps(part.element, self.X, part.conn, *moduli, mass, contact, coarse=coarse)
         return steps
 
-    def _relieved(self, added: Array) -> Array:
+    def relieved(self, added: Array) -> Array:
         """Eigenvalues that springs add at nodes, with masses less by `relief`."""
         return added if self.relief is None else added * self.relief
 
-    def _computed(self) -> Iterator[tuple[Cells, Array]]:
+    def computed(self) -> Iterator[tuple[Cells, Array]]:
         """Cells that are computed, with their lumped masses as `element_mass` has them, less by `relief`."""
         for part, own in zip(self.cells, self.element_mass, strict=True):
             mass = own if self.relief is None else own / self.relief[part.conn]

@@ -2,44 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import bad_value
-from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.absorbing import AbsorbingNodes, absorbing_nodes
-from warp_mca.model.assembly import GROUND, Assembly, Block, body_cells, body_materials, nodal_masses
-from warp_mca.model.auto_penalty import ChosenPenalty, settled
-from warp_mca.model.constraints import JointPairs, check_bindings, constraints, free_nodes, join_bodies, nodes_of
-from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.absorbing import AbsorbingNodes
+from warp_mca.model.assembly import Block
+from warp_mca.model.auto_penalty import ChosenPenalty
+from warp_mca.model.constraints import JointPairs
 from warp_mca.model.couplings import Coupling
-from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
+from warp_mca.model.joint_loads import HingeLoad, MovableBase
 from warp_mca.model.layout import Layout
-from warp_mca.model.mass_scaling import MassScaling, check_masses, scale_masses
-from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
+from warp_mca.model.mass_scaling import MassScaling
+from warp_mca.model.rates import Rates
+from warp_mca.model.rigid_bodies import RigidBody
 from warp_mca.model.rigid_rows import RigidPin, RigidRow
-from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.stable_step import StableStep
-from warp_mca.model.surfaces import ContactPass, Faces, contact_eigenvalues, contact_passes
-from warp_mca.model.tied_nodes import TiedNodes, check_ties, on_faces, tied_nodes
-from warp_mca.scene import Contact, RigidPlane, Scene
-
-if TYPE_CHECKING:
-    from warp_mca.rigid.chain import Chain
+from warp_mca.model.surfaces import ContactPass
+from warp_mca.model.tied_nodes import TiedNodes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
-
-__all__ = ["GROUND", "Block", "Model", "body_cells", "body_materials", "build_model", "nodal_masses"]
-
-CLOSED = 1e-6  # share of a surface's area below which its normals cancel
-PARALLEL = 1e-6  # sine of the angle between directions that count as one
-NEAR_Z = 0.342  # sine of the angle from the z axis, below which tangents are not taken along n x z
-_SAMPLES = np.array([0.125, 0.375, 0.625, 0.875])  # along both edges of a face, where its distance is taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +69,7 @@ class Model:
         rigid_bodies, rigid_rows, rigid_pins: rigid bodies, those of each scene in turn, and what binds them.
         rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
             in a batch.
+        rates: groups of elements that take steps of their own, or None where all take the same.
     """
 
     X: Array
@@ -123,6 +109,7 @@ class Model:
     rigid_rows: tuple[RigidRow, ...] = ()
     rigid_pins: tuple[RigidPin, ...] = ()
     rigid_blocks: tuple[Block, ...] = ()
+    rates: Rates | None = None
 
     def owner(self, element: int) -> tuple[str, int]:
         """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""
@@ -135,185 +122,11 @@ class Model:
         return len(self.X)
 
     @property
+    def common_steps(self) -> int:
+        """Steps that contacts and joints take in a step of the solver."""
+        return self.rates.common_steps if self.rates else 1
+
+    @property
     def element_count(self) -> int:
         """Number of elements that are computed."""
         return sum(block.conn.shape[1] for block in self.blocks)
-
-
-def _contacts(
-    parts: Assembly, velocity: Array
-) -> tuple[tuple[ContactPass, ...], Array, Array, tuple[ChosenPenalty | None, ...]]:
-    """Passes, the axes along which each contact's force is reported, what the springs add at each node, and penalties
-    that were chosen."""
-    passes: list[ContactPass] = []
-    penalties: list[ChosenPenalty | None] = []
-    axes = np.zeros((len(parts.scene.contacts), 2, 3))
-    added = np.zeros(len(parts.X))
-    for index, contact in enumerate(parts.scene.contacts):
-        slave = parts.faces(contact.slave)
-        master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
-        check_spacing(contact, parts.X, velocity, slave, master)
-        contact, chosen = settled(parts, contact, slave, master, velocity)
-        penalties.append(chosen)
-        for item in contact_passes(contact, index, slave, master):
-            sides = (slave, master) if item.sign > 0.0 else (master, slave)
-            assert sides[0] is not None
-            nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
-            np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
-            passes.append(item)
-        axes[index] = _axes(parts.X, contact, slave, master)
-    return tuple(passes), axes, added, tuple(penalties)
-
-
-def _axes(X: Array, contact: Contact, slave: Faces, master: Faces | None) -> tuple[Array, Array]:
-    """Normal and tangent of a contact, as `Model.contact_axes`.
-
-    Raises:
-        RequestError: the tangent asked for is along the normal.
-    """
-    if contact.normal is not None:
-        normal = along = np.array(contact.normal, dtype=float)
-    elif master is None:
-        assert isinstance(contact.master, RigidPlane)
-        normal = along = np.array(contact.master.normal, dtype=float)
-    else:
-        normal, along = _surface_normals(X, slave, master)
-    size = np.linalg.norm(normal)
-    unit = normal / size if size > 0.0 else normal
-    if contact.tangent is None:
-        return unit, _tangent(along)
-    try:
-        return unit, perpendicular(np.array(contact.tangent, dtype=float), along)
-    except ValueError as error:
-        remedy = f"the contact's normal is along it; give a direction across {tuple(along.tolist())}"
-        raise bad_value("Contact.tangent", contact.tangent, remedy) from error
-
-
-def perpendicular(direction: Array, normal: Array) -> Array:
-    """Unit vector along the part of a direction that is perpendicular to the normal.
-
-    Raises:
-        ValueError: there is none.
-    """
-    n, d = normal / np.linalg.norm(normal), direction / np.linalg.norm(direction)
-    across = d - (d @ n) * n
-    size = np.linalg.norm(across)
-    if size < PARALLEL:
-        raise ValueError(direction)
-    return across / size
-
-
-def _tangent(normal: Array) -> Array:
-    """Unit vector along n x z; within 20 degrees of the z axis, where that turns with any tilt of n, nearest to +x."""
-    tangent = np.cross(normal / np.linalg.norm(normal), [0.0, 0.0, 1.0])
-    size = np.linalg.norm(tangent)
-    return tangent / size if size > NEAR_Z else perpendicular(np.array([1.0, 0.0, 0.0]), normal)
-
-
-def _mean_normal(faces: Faces) -> Array | None:
-    """Normals of a surface's faces, added up by their area [m^2], or None where it is closed: then they cancel."""
-    normal = faces.normal.sum(axis=0)
-    return None if np.linalg.norm(normal) < CLOSED * faces.area.sum() else normal
-
-
-def _surface_normals(X: Array, slave: Faces, master: Faces) -> tuple[Array, Array]:
-    """Normal of a master, of any length, and the direction across which tangential force is reported.
-
-    A closed master has no one normal, which is 0 then, but where it is touched it faces the slave: the direction is
-    that of the slave's mean normal turned round or, where the slave is closed too, of the master's own faces where the
-    bodies are nearest to each other.
-    """
-    normal = _mean_normal(master)
-    if normal is not None:
-        return normal, normal
-    other = _mean_normal(slave)
-    return np.zeros(3), _nearest_normal(X, slave, master) if other is None else -other
-
-
-def _nearest_normal(X: Array, slave: Faces, master: Faces) -> Array:
-    """Normals of the master's faces nearest to the slave, added up by area [m^2]; y where they surround it."""
-    from scipy.spatial import KDTree
-
-    a, b = (part.ravel() for part in np.meshgrid(_SAMPLES, _SAMPLES))
-    weight = np.stack([(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b])
-    samples = KDTree(np.einsum("kp,fkc->fpc", weight, X[master.node]).reshape(-1, 3))
-    nodes = X[slave.nodes]
-    distance, _ = samples.query(nodes)
-    reach = distance.min() + 0.25 * np.sqrt(np.median(master.area))
-    near = np.concatenate(samples.query_ball_point(nodes[distance <= reach], reach)).astype(np.int32)
-    touched = np.unique(near // len(a))
-    mean = master.normal[touched].sum(axis=0)
-    return mean if np.linalg.norm(mean) > CLOSED * master.area[touched].sum() else np.array([0.0, 1.0, 0.0])
-
-
-@np.errstate(over="ignore", invalid="ignore")  # `stable_step` raises for values that are not finite
-def build_model(
-    scene: Scene,
-    meshes: Mapping[str, Mesh],
-    X: Mapping[str, Array],
-    V: Mapping[str, Array],
-    watched: Sequence[tuple[str, int]] = (),
-    *,
-    chain: Chain | None = None,
-    start: float = 0.0,
-) -> Model:
-    """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
-
-    `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh. What
-    acts in the joints of a `chain` and moves its base goes on, from `start` on [s], counted from the release.
-
-    Raises:
-        RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
-    """
-    ties = tied_nodes(scene, meshes, X)
-    parts = Assembly(scene, meshes, on_faces(ties, scene, X))
-    others = [parts.node_start[body] + node for body, node in watched]
-    pairs, joints, couplings = join_bodies(parts)
-    bases = movable_bases(parts, joints, couplings, chain, start)
-    check_loads(scene, chain, bases)
-    for base in bases:
-        pairs["joint_tied"][base.start : base.end] = 0.0
-    blocks, order = parts.blocks()
-    rigid_blocks, rigid_order = parts.blocks(rigid=True, first=len(order))
-    velocity = np.concatenate([V[body.name] for body in scene.bodies])
-    held = constraints(parts, velocity)
-    check_bindings(held, pairs)
-    passes, axes, added, penalties = _contacts(parts, velocity)
-    absorbing = absorbing_nodes(parts, velocity, held, pairs)
-    added[absorbing.node] += absorbing.eigenvalues(parts.mass)
-    parts.relief = ties.relief(parts.mass)
-    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
-    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
-    plain = stable_with_rigid(parts, rigid.bodies, added, velocity) if rigid.bodies else parts.stable(added)
-    stable, scaling = scale_masses(parts, added, plain)
-    check_masses(parts, scaling)
-    return Model(
-        X=parts.X,
-        V=velocity,
-        mass=ties.carried(parts.mass),
-        blocks=blocks,
-        law=parts.law(),
-        **held,
-        **pairs,
-        joints=joints,
-        couplings=flexible(couplings, pairs, rigid.bodies),
-        hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
-        bases=bases,
-        absorbing=absorbing,
-        ties=ties,
-        passes=passes,
-        contact_axes=axes,
-        penalties=penalties,
-        gravity=np.array([scene.gravity], dtype=np.float64),
-        points=np.array([parts.nearest(scene.tip), parts.nearest(scene.target), *others], dtype=np.int32),
-        node_start=parts.node_start,
-        element_start=parts.element_start,
-        element_of=np.concatenate([order, rigid_order]),
-        stable=stable,
-        scaling=scaling,
-        batch=None,
-        rigid_bodies=rigid.bodies,
-        rigid_rows=rigid.rows,
-        rigid_pins=rigid.pins,
-        rigid_blocks=rigid_blocks,
-    )

@@ -128,7 +128,14 @@ def element_steps(
     own = np.empty(len(conn))
     for part in chunks(len(conn), CHUNK):
         own[part] = formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse)
-    # the greater of both parts, and of what stands for a spring that opens and closes
+    return step_of(own, contact)
+
+
+def step_of(own: Array, contact: Array) -> Array:
+    """Stable step [s] by an element's own eigenvalue and that of its contact springs [1/s^2].
+
+    The greater of both together, and of what stands for a spring that opens and closes.
+    """
     return 2.0 / np.sqrt(np.maximum(own + contact, switching(contact, contact / (own + contact))))
 
 

@@ -60,7 +60,8 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
         RequestError: the bodies cannot be put together, e.g. a joint's nodes do not coincide; or it is no scene.
     """
     from warp_mca.geometry.quality import edge_lengths, scaled_jacobian
-    from warp_mca.model.model import build_model, nodal_masses
+    from warp_mca.model.build import build_model
+    from warp_mca.model.cells import nodal_masses
     from warp_mca.rigid.handoff import hand_off
     from warp_mca.runs.advice import mesh_warnings
     from warp_mca.runs.arguments import check_scene

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.model import nodal_masses
+from warp_mca.model.cells import nodal_masses
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.runs.arguments import Progress

@@ -18,17 +18,19 @@ MAX_ROWS = 10_000_000  # of a history: some 5 GB
 MAX_STEPS = 10_000_000_000  # of a run: more than a week of the smallest model
 
 
-def divide(scene: Scene, model: Model, duration: float) -> Steps:
+def divide(scene: Scene, model: Model, duration: float, substeps: int = 0) -> Steps:
     """Choose the time step so that whole steps fill each output interval, and how often to search for contact.
+
+    A step is so many substeps, each of which is stable; those of the model's rates if 0.
 
     Raises:
         RequestError: motion in one step would be lost in the rounding of positions, or the history would have too many
             rows, or the run too many steps.
     """
-    return divide_alike([(scene, model)], duration)
+    return divide_alike([(scene, model)], duration, substeps)
 
 
-def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps:
+def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float, substeps: int = 0) -> Steps:
     """The steps of scenes that share them, as `divide` chooses them: the smallest of their steps, the most searches.
 
     Raises:
@@ -42,7 +44,9 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float) -> Steps
     interval = duration / intervals
     limits = [_limits(scene, model, interval, intervals) for scene, model in parts]
     stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
-    per_search = math.ceil(interval / searches / stable)
+    rates = parts[0][1].rates
+    substeps = substeps or (rates.substeps if rates else 1)
+    per_search = math.ceil(interval / searches / (stable * substeps))
     return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
 
 

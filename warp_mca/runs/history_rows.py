@@ -66,7 +66,7 @@ def _forces(ledger: Ledger, springs: Array) -> tuple[Array, Array, Array]:
 
     `springs` are the columns of each row and contact pass, shape (row_count, pass_count, PASS_COLUMNS).
     """
-    model, share = ledger.model, ledger.steps.dt / ledger.steps.interval
+    model, share = ledger.model, ledger.contact_dt / ledger.steps.interval
     F_n, F_t, stick = np.zeros(len(springs)), np.zeros(len(springs)), np.zeros(len(springs))
     for k, item in enumerate(model.passes):
         force = share * item.sign * springs[:, k, IMPULSE]
@@ -81,7 +81,7 @@ def _forces(ledger: Ledger, springs: Array) -> tuple[Array, Array, Array]:
 def contact_histories(ledger: Ledger, names: Sequence[str]) -> tuple[ContactHistory, ...]:
     """Each contact by itself, with these `names`."""
     passes, springs = ledger.model.passes, ledger.springs(ledger.table())
-    share = ledger.steps.dt / ledger.steps.interval
+    share = ledger.contact_dt / ledger.steps.interval
     found: list[ContactHistory] = []
     for index, name in enumerate(names):
         own = [k for k, item in enumerate(passes) if item.contact == index]
@@ -107,7 +107,7 @@ def _closing_speed(ledger: Ledger, first: int, passes: Sequence[int] | slice = s
     rows = ledger.table(max(first - 1, 0))
     springs = ledger.springs(rows)[:, passes].sum(axis=1)
     gain, rise = np.diff(springs[:, NORMAL_ENERGY]), np.diff(springs[:, PRESSURE])
-    impulse = ledger.steps.dt * (springs[1:, NORMAL_IMPULSE] - 0.5 * rise)
+    impulse = ledger.contact_dt * (springs[1:, NORMAL_IMPULSE] - 0.5 * rise)
     speed: Array = np.full(len(rows), np.nan)
     np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
     return speed[min(first, 1) :]

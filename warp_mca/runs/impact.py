@@ -142,8 +142,9 @@ class Impact:
 
         A record is followed by a step, which is taken back.
         """
-        v = self.state.v.numpy()
-        return self.state.u.numpy() - self.steps.dt * v, 0.5 * (self.solver.work.v_before.numpy() + v)
+        u, after, dt = self.solver.nodes.at_record(self.state)
+        v = after.numpy()
+        return u.numpy() - dt * v, 0.5 * (self.solver.work.v_before.numpy() + v)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Hand records to each scene that no guard has stopped.

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
-from warp_mca.model.assembly import body_materials
-from warp_mca.model.model import build_model
+from warp_mca.model.build import build_model
+from warp_mca.model.cells import body_materials
 from warp_mca.model.precision import check_range
 from warp_mca.results.paths import Found, locate
 from warp_mca.rigid.placement import link_placements
@@ -23,6 +23,7 @@ from warp_mca.runs.motion import Motion
 from warp_mca.runs.parts import ImpactPart
 from warp_mca.runs.plastic_history import give_history
 from warp_mca.runs.prepare import Prepared
+from warp_mca.runs.rate_groups import grouping
 from warp_mca.runs.residual import Relaxation, Shape
 from warp_mca.runs.return_to_rigid import return_to_rigid
 from warp_mca.solve.solver import Solver
@@ -62,7 +63,7 @@ class ImpactDriver:
         settled: list[Shape] = []
         span = min(setup.span, setup.t_end - motion.t)
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
-        impact = Impact([ready], span, **vars(setup.settings), shape=shape)
+        impact = Impact([ready], span, **setup.settings.solver, shape=shape)
         setup.clock.lap("compile")
         self._advance(impact)
         setup.clock.lap("fe")
@@ -104,8 +105,12 @@ class ImpactDriver:
                 deformed, V[name] = motion.placements[name].place(motion.points(name, points))
                 u[name] = deformed - X[name]
         watched = [(link.body, node) for link in setup.chain.links for node in setup.link_ends(link.body)]
-        model = build_model(setup.scene, setup.meshes, X, V, watched, chain=setup.chain, start=motion.t)
-        check_range(model, setup.settings.precision)
+        settings, span = setup.settings, min(setup.span, setup.t_end - motion.t)
+        groups = grouping(setup.scene, span, settings.device, settings.multi_rate)
+        model = build_model(
+            setup.scene, setup.meshes, X, V, watched, chain=setup.chain, start=motion.t, grouping=groups
+        )
+        check_range(model, settings.precision)
         probes = locate(setup.scene, model, setup.meshes, self._places)
         warnings = tuple(mesh_warnings(setup.scene, setup.meshes, model)) if self.count == 1 else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)

@@ -69,7 +69,12 @@ class Ledger:
         if not len(kept.peaks):
             kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = _spin(model)
-        self.rounding = _rounding(model, steps.dt)
+        self.rounding = _rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
+
+    @property
+    def contact_dt(self) -> float:
+        """Time step of contacts [s]."""
+        return self.steps.dt / self.model.common_steps
 
     @property
     def absorbs(self) -> bool:

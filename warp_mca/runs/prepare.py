@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.model import Model, build_model, nodal_masses
+from warp_mca.model.build import Grouping, build_model
+from warp_mca.model.cells import nodal_masses
+from warp_mca.model.model import Model
 from warp_mca.results.paths import Found, Probes, locate
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.runs.advice import mesh_warnings
@@ -60,10 +62,11 @@ def prepare(
     tell: Progress,
     found: Found | None = None,
     made: dict[object, Mesh] | None = None,
+    grouping: Grouping | None = None,
 ) -> Prepared:
     """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model.
 
-    `found` as in `locate`, `made` as in `mesh`.
+    `found` as in `locate`, `made` as in `mesh`, `grouping` as in `build_model`.
 
     Raises:
         RequestError: the scene cannot be built as written.
@@ -75,7 +78,7 @@ def prepare(
     start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})
     clock.lap("rigid")
     X, V = start.positions, start.velocities
-    model = build_model(scene, meshes, X, V, chain=start.chain, start=start.t_contact or 0.0)
+    model = build_model(scene, meshes, X, V, chain=start.chain, start=start.t_contact or 0.0, grouping=grouping)
     probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
     return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model)))

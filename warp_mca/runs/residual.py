@@ -8,7 +8,7 @@ the run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -59,7 +59,7 @@ class Relaxation:
 
     def __init__(self, model: Model, settings: Settings) -> None:
         """Allocate a solver in float64 on the device of the `settings`."""
-        self.model = model
+        self.model = model = replace(model, rates=None)
         dt = model.stable.dt  # of any length: no step is taken
         self.solver = Solver(model, device=settings.device, precision="float64", dt=dt, threads=settings.threads)
         self.solver.compile()

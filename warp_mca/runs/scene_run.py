@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.model.model import body_materials
+from warp_mca.model.cells import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
@@ -17,6 +17,7 @@ from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
+from warp_mca.runs.rate_groups import rate_figures
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
 from warp_mca.solve.state_figures import (
     joint_impulses,
@@ -109,6 +110,8 @@ class SceneRun:
         }
         if scene.rigid_names:
             more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
+        if model.rates:
+            more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= mass_report(scene, model)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+from warp_mca.runs.rate_groups import MultiRate, check_multi_rate
 
 
 @dataclass(frozen=True)
@@ -13,20 +16,27 @@ class Settings:
         device: "cpu" or a CUDA device.
         precision: "mixed" or "float64".
         threads: of a run on the CPU.
+        multi_rate: groups of elements with steps of their own, see `runs.rate_groups`; None for one rate.
     """
 
     device: str
     precision: str
     threads: int
+    multi_rate: MultiRate = None
+
+    @property
+    def solver(self) -> dict[str, Any]:
+        """Arguments that an `Impact` takes."""
+        return {"device": self.device, "precision": self.precision, "threads": self.threads}
 
 
-def settings_of(device: str, precision: str, threads: int | None) -> Settings:
+def settings_of(device: str, precision: str, threads: int | None, multi_rate: object = None) -> Settings:
     """Settings as the user gave them; all cores if `threads` is None.
 
     Raises:
-        RequestError: there is no such device, or no such number of threads.
+        RequestError: there is no such device, or no such number of threads or rates.
     """
     from warp_mca.solve.device import check_device
     from warp_mca.solve.threads import thread_count
 
-    return Settings(check_device(device), precision, thread_count(threads))
+    return Settings(check_device(device), precision, thread_count(threads), check_multi_rate(multi_rate))

@@ -25,6 +25,7 @@ from warp_mca.runs.arguments import (
 )
 from warp_mca.runs.meshing import mesh
 from warp_mca.runs.prepare import Clock, Prepared, prepare
+from warp_mca.runs.rate_groups import grouping
 from warp_mca.runs.settings import Settings, settings_of
 from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
@@ -42,6 +43,7 @@ def run(
     device: str = "cpu",
     precision: str = "mixed",
     threads: int | None = None,
+    multi_rate: int | str | None = None,
     duration: float | None = None,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
@@ -60,6 +62,8 @@ def run(
         device: "cpu" or a CUDA device as "cuda:0".
         precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
         threads: of a run on the CPU, all cores that this process may use if None; results do not depend on it.
+        multi_rate: number of groups of elements that take steps of their own, 2, 4, 8, ... times that of the smallest;
+            "auto" chooses it for the device, None lets all elements take the same step.
         duration: of the impact phase [s]; the scene's own if None.
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
@@ -84,7 +88,7 @@ def run(
     tell = teller(progress)
     span = span_of(scene, duration)
     check_recorders(recorders)
-    settings = settings_of(device, precision, threads)
+    settings = settings_of(device, precision, threads, multi_rate)
     check_files(recorders, None if out is None else check_output(out, force=force))
 
     def result() -> Result:
@@ -153,12 +157,12 @@ def simulate(
     from warp_mca.runs.impact import Impact
 
     clock = Clock()
-    ready = _prepare(scenes, meshes, settings.precision, clock, tell)
+    ready = _prepare(scenes, meshes, span, settings, clock, tell)
     warn(sentence for item in ready for sentence in item.warnings)
     tell("compile", 0.0)
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
-    impact = Impact(ready, span, **vars(settings), skins=surfaces, needs=needs)
+    impact = Impact(ready, span, **settings.solver, skins=surfaces, needs=needs)
     clock.lap("compile")
     said: list[str] = []
     steps, first = impact.steps, ready[0]
@@ -202,7 +206,8 @@ def _advance(impact: Impact, tell: Progress) -> None:
 def _prepare(
     scenes: Sequence[Scene],
     meshes: Sequence[Mapping[str, Mesh]] | None,
-    precision: str,
+    span: float,
+    settings: Settings,
     clock: Clock,
     tell: Progress,
 ) -> list[Prepared]:
@@ -213,8 +218,9 @@ def _prepare(
     for k, scene in enumerate(scenes):
         try:
             own = None if meshes is None else meshes[k]
-            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made))
-            check_range(ready[-1].model, precision)
+            groups = grouping(scene, span, settings.device, settings.multi_rate)
+            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made, groups))
+            check_range(ready[-1].model, settings.precision)
         except RequestError as error:
             if len(scenes) == 1:
                 raise

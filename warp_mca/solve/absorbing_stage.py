@@ -13,7 +13,7 @@ from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
 from warp_mca.kernels.records.absorbing import sum_absorbed
 from warp_mca.kernels.records.columns import absorbing_column
 from warp_mca.model.layout import Layout
-from warp_mca.solve.stage import BESIDE, Stage, Step
+from warp_mca.solve.stage import Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -48,13 +48,13 @@ class AbsorbingStage:
         count: nodes of absorbing boundaries.
     """
 
-    def __init__(self, model: Model, layout: Layout, nodes: NodeStage, precision: str, dt: float) -> None:
+    def __init__(self, model: Model, layout: Layout, nodes: NodeStage, precision: str) -> None:
         """Allocate on the current device."""
-        own, self.nodes, self.layout, self.dt = model.absorbing, nodes, layout, dt
+        own, self.nodes, self.layout = model.absorbing, nodes, layout
         self.count, self.model = len(own.node), model
         if not self.count:
             return
-        decay = 0.5 * dt * own.damping / model.mass[own.node, None, None]
+        decay = 0.5 * nodes.dt * own.damping / model.mass[own.node, None, None]
         self.dashpots = Dashpots()
         self.dashpots.node = wp.array(own.node, dtype=wp.int32)
         self.dashpots.damping = wp.array(own.damping, dtype=wp.mat33d)
@@ -62,7 +62,7 @@ class AbsorbingStage:
         self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
         self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
         self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
-        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each)
+        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each, nodes.rated)
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
         self.column = absorbing_column(len(model.passes) // layout.count)
@@ -85,19 +85,15 @@ class AbsorbingStage:
         """Those of a record."""
         return [sum_absorbed] if self.count else []
 
-    def stages(self) -> list[Stage]:
-        """Those of a step, beside that of the free nodes."""
-        return [Stage("absorbing boundaries", self._advance, BESIDE)] if self.count else []
-
     def record_stages(self, records: RecordStage) -> list[Stage]:
         """Those of a record, after all nodes have moved."""
         return [Stage("absorbed energy", lambda s: self._sum(s, records), only_records=True)] if self.count else []
 
-    def _advance(self, step: Step) -> None:
-        """The nodes that dashpots act on."""
+    def advance(self, step: Step, level: int | None = None) -> None:
+        """The nodes that dashpots act on, with forces of elements up to a level, or of all."""
         work, state, own = self.nodes.work, step.state, step.state.absorbing
-        inputs = [self.dashpots, work.inverse_mass, work.first_slots, work.more_slots, self.nodes.constraints.role]
-        inputs += [work.force, self.nodes.scene, self.nodes.gravity, self.dt]
+        inputs = [self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
+        inputs += [work.force, self.nodes.scene, self.nodes.gravity, self.nodes.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
         wp.launch(self.kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

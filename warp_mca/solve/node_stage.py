@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM
-from warp_mca.kernels.nodes import constraint, node, slide
+from warp_mca.kernels.nodes import constraint, node, rated_node, slide
 from warp_mca.solve.contact_stage import per_scene
 from warp_mca.solve.threads import NODES, Split, whole
 from warp_mca.solve.weight import nodal_gravity
@@ -29,17 +29,23 @@ class NodeStage:
     """Advances all nodes by a step of central differences.
 
     Attributes:
-        each: whether gravity differs between the scenes of a batch; then `gravity` and `scene` are arrays.
+        dt: time step of bound nodes [s].
+        base: time step of the fastest nodes [s].
+        each: whether gravity differs between nodes; then `gravity` and `scene` are arrays.
         touched: whether there is contact.
+        rated: whether elements take steps of their own.
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
     """
+
+    rated = False
 
     def __init__(
         self, model: Model, work: Workspace, constraints: ConstraintStage, precision: str, dt: float, rounds: int
     ) -> None:
         """Choose the kernels; `rounds` of elements that wait for nothing but the nodes."""
         self.work, self.constraints, self.dt, self.node_count = work, constraints, dt, model.node_count
-        self.each = each = bool((model.gravity != model.gravity[0]).any())
+        self.base = dt
+        each = bool((model.gravity != model.gravity[0]).any())
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
         self.scene = per_scene(layout_nodes) if each and layout_nodes is not None else 0
@@ -47,35 +53,49 @@ class NodeStage:
             each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
-        early = rounds >= EARLY_ROUNDS
-        self.integrate_kernel = node.integrate_kernel(precision, self.touched, fixed, constraints.bound, each, early)
+        self.each, early = each, rounds >= EARLY_ROUNDS
+        self._choose(precision, (self.touched, fixed, early))
+
+    def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
+        """The kernels of a `kind`: contact, fixed, early as `node.integrate_kernel` has them."""
+        (contact, fixed, early), own, each = kind, self.constraints, self.each
+        make = rated_node.integrate_kernel if self.rated else node.integrate_kernel
+        self.integrate_kernel = make(precision, contact, fixed, own.bound, each, early)
         self.bound_kernel = (
-            constraint.bound_kernel(precision, self.touched, each, constraints.partial, constraints.skips)
-            if constraints.count
-            else None
+            constraint.bound_kernel(precision, contact, each, own.partial, own.skips, self.rated) if own.count else None
         )
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
         return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
 
-    def advance(self, step: Step) -> None:
-        """Free nodes; where the step records, `work.v_before` takes the velocities before it."""
-        before = self.work.v_before if step.records else None
-        self.integrate(step.state, self.dt, self.dt, self.constraints.role, step.split, before)
+    def advance(self, step: Step, level: int | None = None) -> None:
+        """Free nodes, those up to a `level` of `Model.rates` or all.
 
-    def advance_bound(self, step: Step) -> None:
-        """Nodes in joints and driven ones."""
+        Where the step records, `work.v_before` takes the velocities before it.
+        """
+        before = self.work.v_before if step.records else None
+        self.integrate(step.state, self.base, self.base, self.constraints.role, step.split, before, level)
+
+    def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
+        """`first_slots` and `more_slots` of elements up to a level, or of all."""
+        return self.work.first_slots, self.work.more_slots
+
+    def begin_record(self, state: State) -> None:
+        """Called at a record, before nodes move."""
+
+    def end_record(self, state: State) -> None:
+        """Called at a record, when nodes have moved."""
+
+    def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
+        """After the step that recorded: displacements [m], velocities before these [m/s], and the time [s] by which the
+        displacements have moved on with them since the record."""
+        return state.u, state.v, self.dt
+
+    def advance_bound(self, step: Step, level: int | None = None) -> None:
+        """Nodes in joints and driven ones, with forces of elements up to a level, or of all."""
         work, state, own = self.work, step.state, step.state.constraints
-        inputs = [
-            work.mass,
-            work.inverse_mass,
-            work.first_slots,
-            work.more_slots,
-            self.constraints.role,
-            work.force,
-            self.scene,
-        ]
+        inputs = [work.mass, work.inverse_mass, *self.slots(level), self.constraints.role, work.force, self.scene]
         inputs += [self.gravity, self.constraints.bonds, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
@@ -96,6 +116,7 @@ class NodeStage:
         role: wp.array,
         split: Split = whole,
         before: wp.array | None = None,
+        level: int | None = None,
     ) -> None:
         """v += kick a, u += drift v of nodes whose `role` leaves them free; `before` takes the old velocities."""
         work, squares = self.work, state.speed_square

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.solve.constraint_stage import ConstraintStage
     from warp_mca.solve.contact_stage import ContactStage
+    from warp_mca.solve.node_stage import NodeStage
     from warp_mca.solve.stage import Step
     from warp_mca.solve.workspace import Workspace
 
@@ -60,9 +61,11 @@ class RecordStage:
         """Energies and extremes of the elements."""
         self.sum_runs(self.sum_elements_kernel, self.most_elements, [self.work.energy, self.element_ranges])
 
-    def sum_motion(self, step: Step, constraints: ConstraintStage, dt: float) -> None:
+    def sum_motion(self, step: Step, constraints: ConstraintStage, nodes: NodeStage) -> None:
         """Kinetic energy, works, and velocities of recorded points."""
         work, state = self.work, step.state
-        inputs = [work.mass, work.heavy_mass, work.gravity, state.u, work.v_before, state.v, dt, self.node_first]
+        nodes.end_record(state)
+        u, v, dt = nodes.at_record(state)
+        inputs = [work.mass, work.heavy_mass, work.gravity, u, work.v_before, v, dt, self.node_first]
         inputs += [state.constraints.work, constraints.driven_first, work.point_node]
         self.sum_runs(ledger.record_motion, self.most_nodes, inputs, work.point_velocity)

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from warp_mca.model.rigid_bodies import RigidBody
     from warp_mca.model.rigid_rows import RigidPin, RigidRow
     from warp_mca.solve.constraint_stage import ConstraintStage
+    from warp_mca.solve.node_stage import NodeStage
     from warp_mca.solve.stage import Step
     from warp_mca.solve.state import State
-    from warp_mca.solve.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -67,18 +67,18 @@ def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[lis
 class RigidStage:
     """What `kernels.nodes.rigid_body` reads and writes; of no use for a model without rigid bodies."""
 
-    def __init__(self, model: Model, work: Workspace, constraints: ConstraintStage, precision: str, dt: float) -> None:
-        """Allocate on the current device."""
-        self.model, self.work, self.dt = model, work, dt
+    def __init__(self, model: Model, nodes: NodeStage, precision: str) -> None:
+        """Allocate on the current device; `nodes` advances all other nodes."""
+        self.model, self.nodes, self.work, self.dt = model, nodes, nodes.work, nodes.dt
         self.count = len(model.rigid_bodies)
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
-        self.kernel = rigid_body.advance_kernel(precision, len(work.contact_force) > 0)
+        self.kernel = rigid_body.advance_kernel(precision, nodes.touched, nodes.rated)
         self.own = own = model.rigid_bodies
         self._make_bodies(model, own)
         self._make_rows(own, model.rigid_rows)
-        self._make_pins(model.rigid_pins, constraints)
+        self._make_pins(model.rigid_pins, nodes.constraints)
         self._make_outputs()
         nodes = [body.nodes for body in own]
         arms = [model.X[body.nodes] - body.centre for body in own]
@@ -180,15 +180,18 @@ class RigidStage:
         self._advance(state, -0.5 * self.dt, -self.dt, False)
         self._follow(state, whole, None)
 
-    def advance(self, step: Step) -> None:
-        """All rigid bodies and their nodes; where the step records, `work.v_before` takes the velocities before it."""
-        self._advance(step.state, self.dt, self.dt, True)
+    def advance(self, step: Step, level: int | None = None) -> None:
+        """All rigid bodies and their nodes, with forces of elements up to a level, or of all.
+
+        Where the step records, `work.v_before` takes the velocities before it.
+        """
+        self._advance(step.state, self.dt, self.dt, True, level)
         self._follow(step.state, step.split, self.work.v_before if step.records else None)
 
-    def _advance(self, state: State, kick: float, span: float, moves: bool) -> None:
+    def _advance(self, state: State, kick: float, span: float, moves: bool, level: int | None = None) -> None:
         work, own = self.work, state.rigid
         inputs = [self.bodies, self.rows, self.clusters, work.X, work.mass]
-        inputs += [work.first_slots, work.more_slots, work.force, kick, span, moves]
+        inputs += [*self.nodes.slots(level), work.force, kick, span, moves]
         outputs = [work.contact_force, state.u, state.v, state.speed_square]
         outputs += [own.centre, own.rotation, own.momentum, own.spin, own.orientation, state.constraints.impulse]
         threads = (self.groups, self.lanes)

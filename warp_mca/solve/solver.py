@@ -30,13 +30,14 @@ from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
-from warp_mca.solve.node_stage import NodeStage
+from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
 from warp_mca.solve.rigid_stage import RigidStage
-from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step, Streams
+from warp_mca.solve.stage import Step, Streams
 from warp_mca.solve.state import State
+from warp_mca.solve.step_groups import step_groups
 from warp_mca.solve.threads import ELEMENTS as RANGE
 from warp_mca.solve.threads import Split, whole
 from warp_mca.solve.tie_stage import TieStage
@@ -52,7 +53,7 @@ class Solver:
     Attributes:
         model: that it advances.
         layout: of the model's scenes.
-        dt: time step [s].
+        dt: time step [s]; with `Model.rates` that of their substeps together.
         threads: that compute; one on a GPU, and for a model that is too small to gain from more.
         work: the model on the device, and what a step computes and forgets.
         elements, contacts: stages of the model's blocks and contact passes.
@@ -97,14 +98,16 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
-        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
-        self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, self.dt)
-        self.rigid = RigidStage(model, self.work, self.constraints, self.precision, self.dt)
-        self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
-        self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision, self.dt)
-        self.ties = TieStage(model, self.nodes, self.precision, self.dt)
+        dt = self.dt / model.common_steps
+        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, dt)
+        self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, dt)
+        self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, self._early)
+        self.rigid = RigidStage(model, self.nodes, self.precision)
+        self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
+        self.ties = TieStage(model, self.nodes, self.precision)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
-        self.groups = self._groups()
+        self.groups = step_groups(self)
+        self.subgroups = [step_groups(self, level) for level in range(model.rates.top if model.rates else 0)]
         self._streams = Streams(wp.get_device().is_cuda)
 
     @property
@@ -113,56 +116,6 @@ class Solver:
         if self.contacts or self.constraints.bound:
             return 0
         return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
-
-    def _groups(self) -> list[Group]:
-        """The stages of a step, in their order.
-
-        Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want
-        it, and patches want another division than contact.
-        """
-        work = self.work
-        forces = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split)) for e in self.elements]
-        forces += [
-            Stage("contact", lambda s, c=c: c.launch(work, s.state, self.dt, s.split), BESIDE) for c in self.contacts
-        ]
-        forces.append(Stage("next record", self.records.next_row, BESIDE, only_records=True))
-        energies = [Stage("paths, frames: stress", self._before_step, only_records=True)]
-        energies += [
-            Stage("element energies", lambda s, e=e: e.energies(work, s.state, s.split), only_records=True)
-            for e in self.elements
-        ]
-        sums = [
-            Stage("spring sums", lambda s, c=c: self.records.sum_springs(s, c), SUMS, only_records=True)
-            for c in self.contacts
-        ]
-        sums.append(Stage("element sums", self.records.sum_elements, SUMS, only_records=True))
-        advance = [Stage("joints, driven nodes", self.nodes.advance_bound, BESIDE)] if self.constraints.count else []
-        advance += [Stage("sliders on rails", self.nodes.slide, BESIDE)] if len(self.constraints.rails) else []
-        advance += [Stage("couplings", self.couplings.couple, BESIDE)] if self.couplings.count else []
-        advance += [Stage("bases", self.loads.move_bases, BESIDE)] if self.model.bases else []
-        advance += self.absorbing.stages()
-        advance += [Stage("rigid bodies", self.rigid.advance, BESIDE)] if self.rigid.count else []
-        advance += [Stage("masters of ties", self.ties.advance, BESIDE)] if self.ties.count else []
-        advance.append(Stage("free nodes", self.nodes.advance))
-        motion = [
-            Stage("motion sums", lambda s: self.records.sum_motion(s, self.constraints, self.dt), only_records=True),
-            Stage("frames: velocity", self._after_step, only_records=True),
-        ]
-        if self.loads.kernels():
-            motion.append(Stage("joint and base sums", self.loads.sums, only_records=True))
-        motion += self.absorbing.record_stages(self.records)
-        torques = [Stage("joint torques", lambda s: self.loads.torques(s.state, self.dt, self.dt))]
-        after = [Stage("slaves of ties", self.ties.follow)] if self.ties.count else []
-        after += torques if self.model.hinge_loads else []
-        return [forces, energies, sums, advance, after, motion]
-
-    def _before_step(self, step: Step) -> None:
-        if self.output and step.is_row:
-            self.output.before_step(step.state, step.needs)
-
-    def _after_step(self, step: Step) -> None:
-        if self.output and step.is_row:
-            self.output.after_step(step.state, step.needs)
 
     def new_state(self) -> State:
         """State at the start of the phase: the model's velocities, no displacement, no stress."""
@@ -233,17 +186,20 @@ class Solver:
         """
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
-            self.nodes.integrate(state, -0.5 * self.dt, 0.0, self.constraints.at_rest)
+            self.nodes.integrate(state, -0.5 * self.nodes.base, 0.0, self.constraints.at_rest)
             if self.rigid.count:
                 self.rigid.start(state)
             if self.model.hinge_loads:
-                self.loads.torques(state, -0.5 * self.dt, 0.0)
+                self.loads.torques(state, -0.5 * self.nodes.dt, 0.0)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
 
     def _step(self, step: Step) -> None:
         self._streams.run(self.groups, step)
+        for j in range(1, 1 << len(self.subgroups)):
+            level = (j & -j).bit_length() - 1
+            self._streams.run(self.subgroups[level], Step(step.state, step.split))
 
     def _schedule(self) -> None:
         for stage in self.elements:

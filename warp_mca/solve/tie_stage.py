@@ -23,13 +23,13 @@ class TieStage:
         count: slaves.
     """
 
-    def __init__(self, model: Model, nodes: NodeStage, precision: str, dt: float) -> None:
+    def __init__(self, model: Model, nodes: NodeStage, precision: str) -> None:
         """Allocate on the current device; `nodes` advances all others."""
-        self.nodes, self.dt, self.count = nodes, dt, len(model.ties)
+        self.nodes, self.count = nodes, len(model.ties)
         if not self.count:
             return
-        ties, each = model.ties, not isinstance(nodes.scene, int)
-        self.masters_kernel = tied.masters_kernel(precision, nodes.touched, each)
+        ties = model.ties
+        self.masters_kernel = tied.masters_kernel(precision, nodes.touched, nodes.each, nodes.rated)
         self.follow_kernel = tied.follow_kernel(nodes.touched)
         entry, corner = np.nonzero(ties.weight)
         master = ties.master[entry, corner]
@@ -49,11 +49,11 @@ class TieStage:
         """Those of a step."""
         return [self.masters_kernel, self.follow_kernel] if self.count else []
 
-    def advance(self, step: Step) -> None:
-        """Masters, with the forces on their slaves."""
+    def advance(self, step: Step, level: int | None = None) -> None:
+        """Masters, with the forces on their slaves of elements up to a level, or of all."""
         nodes, work, state = self.nodes, self.nodes.work, step.state
-        inputs = [work.inverse_mass, work.first_slots, work.more_slots, nodes.constraints.role, work.force]
-        inputs += [nodes.scene, nodes.gravity, self.tied, self.dt]
+        inputs = [work.inverse_mass, *nodes.slots(level), nodes.constraints.role, work.force]
+        inputs += [nodes.scene, nodes.gravity, self.tied, nodes.dt]
         before = work.v_before if step.records else None
         outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
         wp.launch(self.masters_kernel, len(self.tied.master), inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

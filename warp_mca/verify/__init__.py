@@ -24,6 +24,7 @@ FILES = (
     "bending",
     "impact",
     "taylor",
+    "rates",
     "friction",
     "rolling",
     "rigid",

@@ -27,7 +27,8 @@ class Imposed:
     """
 
     def __init__(self, setup: Setup, geometry: Mesh, kinematics: Kinematics = "corotational"):
-        from warp_mca.model.model import build_model, nodal_masses
+        from warp_mca.model.build import build_model
+        from warp_mca.model.cells import nodal_masses
         from warp_mca.rigid.handoff import hand_off
         from warp_mca.solve.output import NodalStress
         from warp_mca.solve.solver import Solver

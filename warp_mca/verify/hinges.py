@@ -202,7 +202,7 @@ def pinned_double_pendulum(setup: Setup) -> list[Row]:
 
 def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
     """Tip, hinge A and kinetic energy at the end of a swing, for links of rising stiffness."""
-    from warp_mca.model.model import nodal_masses
+    from warp_mca.model.cells import nodal_masses
     from warp_mca.runs.simulation import mesh
 
     moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))

@@ -277,6 +277,12 @@ MUTATIONS: dict[str, Mutation] = {
         "(rho * c_p, rho * c_s)",
         "(rho * c_p, rho * c_p)",
     ),
+    "slow_impulse_lost": Mutation(
+        "an element with a step of its own gives its nodes the impulse of one of their steps only",
+        "kernels/nodes/node.py",
+        "wp.float64(1 << (entry >> wp.static(LEVEL_BIT))) * f",
+        "f",
+    ),
     "gravity_reversed": Mutation(
         "gravity acts against its direction",
         "kernels/nodes/node.py",

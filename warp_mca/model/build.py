@@ -1,0 +1,145 @@
+"""Owns the way from a scene and its meshes to a `Model`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.absorbing import absorbing_nodes
+from warp_mca.model.assembly import Assembly
+from warp_mca.model.auto_penalty import ChosenPenalty, settled
+from warp_mca.model.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
+from warp_mca.model.contact_axes import contact_axes
+from warp_mca.model.contact_checks import check_spacing
+from warp_mca.model.joint_loads import hinge_loads, movable_bases
+from warp_mca.model.mass_scaling import check_masses, scale_masses
+from warp_mca.model.model import Model
+from warp_mca.model.own_steps import OwnSteps
+from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
+from warp_mca.model.surfaces import ContactPass, contact_eigenvalues, contact_passes
+from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes
+from warp_mca.scene import RigidPlane, Scene
+
+if TYPE_CHECKING:
+    from warp_mca.rigid.chain import Chain
+
+Array = NDArray[np.float64]
+Grouping = Callable[[Model, OwnSteps], Model]
+
+
+def _contacts(
+    parts: Assembly, velocity: Array
+) -> tuple[tuple[ContactPass, ...], Array, Array, tuple[ChosenPenalty | None, ...]]:
+    """Passes, the axes along which each contact's force is reported, what the springs add at each node, and penalties
+    that were chosen."""
+    passes: list[ContactPass] = []
+    penalties: list[ChosenPenalty | None] = []
+    axes = np.zeros((len(parts.scene.contacts), 2, 3))
+    added = np.zeros(len(parts.X))
+    for index, contact in enumerate(parts.scene.contacts):
+        slave = parts.faces(contact.slave)
+        master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
+        check_spacing(contact, parts.X, velocity, slave, master)
+        contact, chosen = settled(parts, contact, slave, master, velocity)
+        penalties.append(chosen)
+        for item in contact_passes(contact, index, slave, master):
+            sides = (slave, master) if item.sign > 0.0 else (master, slave)
+            assert sides[0] is not None
+            nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
+            np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
+            passes.append(item)
+        axes[index] = contact_axes(parts.X, contact, slave, master)
+    return tuple(passes), axes, added, tuple(penalties)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # `stable_step` raises for values that are not finite
+def build_model(
+    scene: Scene,
+    meshes: Mapping[str, Mesh],
+    X: Mapping[str, Array],
+    V: Mapping[str, Array],
+    watched: Sequence[tuple[str, int]] = (),
+    *,
+    chain: Chain | None = None,
+    start: float = 0.0,
+    grouping: Grouping | None = None,
+) -> Model:
+    """Assemble a scene whose bodies stand at X [m] and move with V [m/s], by body, shape (node_count, 3), float64.
+
+    `watched` are nodes whose velocity is recorded beside that of tip and target, by body and index in its mesh. What
+    acts in the joints of a `chain` and moves its base goes on, from `start` on [s], counted from the release.
+    `grouping` sorts the elements by steps of their own.
+
+    Raises:
+        RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
+    """
+    ties = tied_nodes(scene, meshes, X)
+    parts = Assembly(scene, meshes, on_faces(ties, scene, X))
+    velocity = np.concatenate([V[body.name] for body in scene.bodies])
+    pairs, joints, couplings = join_bodies(parts)
+    bases = movable_bases(parts, joints, couplings, chain, start)
+    check_loads(scene, chain, bases)
+    for base in bases:
+        pairs["joint_tied"][base.start : base.end] = 0.0
+    bodies = _bodies(parts, watched)
+    held = constraints(parts, velocity)
+    check_bindings(held, pairs)
+    passes, axes, added, penalties = _contacts(parts, velocity)
+    absorbing = absorbing_nodes(parts, velocity, held, pairs)
+    added[absorbing.node] += absorbing.eigenvalues(parts.mass)
+    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
+    parts.relief = ties.relief(parts.mass)
+    model = Model(
+        V=velocity,
+        **bodies,
+        **_steps(parts, rigid.bodies, added, velocity),
+        mass=ties.carried(parts.mass),
+        **held,
+        **pairs,
+        joints=joints,
+        couplings=flexible(couplings, pairs, rigid.bodies),
+        hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
+        bases=bases,
+        absorbing=absorbing,
+        ties=ties,
+        passes=passes,
+        contact_axes=axes,
+        penalties=penalties,
+        rigid_bodies=rigid.bodies,
+        rigid_rows=rigid.rows,
+        rigid_pins=rigid.pins,
+    )
+    return grouping(model, OwnSteps(parts, added)) if grouping else model
+
+
+def _bodies(parts: Assembly, watched: Sequence[tuple[str, int]]) -> dict[str, Any]:
+    """What a model says of its bodies, by the name of the attribute."""
+    blocks, order = parts.blocks()
+    rigid_blocks, rigid_order = parts.blocks(rigid=True, first=len(order))
+    others = [parts.node_start[body] + node for body, node in watched]
+    points = [parts.nearest(parts.scene.tip), parts.nearest(parts.scene.target), *others]
+    return {
+        "X": parts.X,
+        "blocks": blocks,
+        "law": parts.law(),
+        "gravity": np.array([parts.scene.gravity], dtype=np.float64),
+        "points": np.array(points, dtype=np.int32),
+        "node_start": parts.node_start,
+        "element_start": parts.element_start,
+        "element_of": np.concatenate([order, rigid_order]),
+        "rigid_blocks": rigid_blocks,
+    }
+
+
+def _steps(parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array) -> dict[str, Any]:
+    """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
+    plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
+    stable, scaling = scale_masses(parts, added, plain)
+    check_masses(parts, scaling)
+    return {"stable": stable, "scaling": scaling}

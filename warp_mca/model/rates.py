@@ -1,0 +1,149 @@
+"""Owns groups of elements that take steps of their own: level k takes a step of 2^k times that of level 0.
+
+Lew, Marsden, Ortiz and West, Int. J. Numer. Meth. Engng 60 (2004) 153: asynchronous variational integrators. An element
+of level k gives its nodes the impulse 2^k dt f once in 2^k substeps; a node of level k, that of its fastest element,
+moves on its way once in 2^k substeps. Elements around a node of a lower level take that level too: without this ring
+the impulses of slow elements resonate with the vibration of fast ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.elements import ELEMENTS
+from warp_mca.model.patches import PATCH, compact_order
+
+if TYPE_CHECKING:
+    from warp_mca.model.assembly import Block
+    from warp_mca.model.model import Model
+
+Index = NDArray[np.int32]
+Levels = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rates:
+    """Levels of a model's nodes and elements; a step of the solver is 2^top substeps.
+
+    Attributes:
+        top: highest level.
+        common: level of all contacts, joints, driven nodes, bases and torques, and of the nodes that they touch.
+        node_level: of each node, shape (node_count,), uint8.
+        elements: number of elements on each level, `top` + 1 of them.
+    """
+
+    top: int
+    common: int
+    node_level: NDArray[np.uint8]
+    elements: tuple[int, ...]
+
+    @property
+    def substeps(self) -> int:
+        """Steps of level 0 in a step of the solver."""
+        return 1 << self.top
+
+    @property
+    def common_steps(self) -> int:
+        """Steps of contacts and joints in a step of the solver."""
+        return 1 << (self.top - self.common)
+
+    @property
+    def work(self) -> int:
+        """Elements computed in a step of the solver."""
+        return sum(count << (self.top - level) for level, count in enumerate(self.elements))
+
+
+def follow(model: Model, level: Levels) -> tuple[Levels, Rates]:
+    """Levels of the elements once they follow their fastest nodes, and the rates that come of them.
+
+    Args:
+        model: of one scene.
+        level: that each element could have by itself, in the model's order, shape (element_count,).
+    """
+    tied = _tied_nodes(model)
+    level = _uniform(model, level)
+    node = _least(model, level)
+    node[tied] = node[tied].min(initial=127)
+    level = level.copy()
+    for block in model.blocks:
+        part = _part(block)
+        level[part] = np.minimum(level[part], node[block.conn].min(axis=0))
+    level = _uniform(model, level)
+    node, touched = _least(model, level), _touched_nodes(model)
+    top = int(level.max())
+    common = int(node[touched].min(initial=top))
+    node[touched] = common
+    counts = np.bincount(level, minlength=top + 1)
+    return level, Rates(
+        top=top, common=common, node_level=node.astype(np.uint8), elements=tuple(int(count) for count in counts)
+    )
+
+
+def grouped(model: Model, level: Levels, rates: Rates) -> Model:
+    """The model with the elements of each block sorted by level, and these rates; arguments as `follow` returns."""
+    blocks, order = [], []
+    for block in model.blocks:
+        own = level[_part(block)]
+        found: list[NDArray[np.intp]] = []
+        for k in range(rates.top + 1):
+            mine = np.flatnonzero(own == k)
+            if len(mine) and ELEMENTS[block.element].patches:
+                mine = mine[compact_order(model.X, np.ascontiguousarray(block.conn[:, mine].T), PATCH)]
+            found.append(mine)
+        place = np.concatenate(found)
+        ends = tuple(np.cumsum([len(part) for part in found]).tolist())
+        conn = np.ascontiguousarray(block.conn[:, place])
+        blocks.append(replace(block, conn=conn, material=block.material[place], level_ends=ends))
+        order.append(model.element_of[_part(block)][place])
+    rest = model.element_of[model.element_count :]  # of rigid bodies
+    return replace(model, blocks=tuple(blocks), element_of=np.concatenate([*order, rest]), rates=rates)
+
+
+def _part(block: Block) -> slice:
+    """Where a block's elements lie in the model."""
+    return slice(block.first, block.first + block.conn.shape[1])
+
+
+def _uniform(model: Model, level: Levels) -> Levels:
+    """Levels with one for all elements of a formulation whose forces depend on neighbouring elements."""
+    found = level.copy()
+    for block in model.blocks:
+        if getattr(ELEMENTS[block.element], "one_rate", False):
+            found[_part(block)] = found[_part(block)].min()
+    return found
+
+
+def _least(model: Model, level: Levels) -> Levels:
+    """Least level of the elements around each node, shape (node_count,)."""
+    node = np.full(model.node_count, 127, dtype=np.int64)
+    for block in model.blocks:
+        for corner in block.conn:
+            np.minimum.at(node, corner, level[_part(block)])
+    return node
+
+
+def _joined(parts: Sequence[Index]) -> Index:
+    return np.unique(np.concatenate([np.zeros(0, np.int32), *parts])).astype(np.int32)
+
+
+def _tied_nodes(model: Model) -> Index:
+    """Nodes that joints bind to each other, rails and bases included: they move as one."""
+    free = np.ones(len(model.joint_first), dtype=bool)
+    for item in model.couplings:  # they have a motion in common, and each its own
+        free[item.start : item.end] = False
+    second = model.joint_second[free]
+    return _joined([model.joint_first[free], second[second >= 0]])
+
+
+def _touched_nodes(model: Model) -> Index:
+    """Nodes that something else than elements and gravity acts on."""
+    hinges = [side for load in model.hinge_loads for side in (load.inner, load.outer)]
+    contacts = [nodes for item in model.passes for nodes in (item.slave, item.master)]
+    joints = [model.joint_first, model.joint_second[model.joint_second >= 0], model.prescribed_node]
+    others = [model.absorbing.node, model.ties.slave, model.ties.carriers]
+    return _joined([*joints, *others, *(body.nodes for body in model.rigid_bodies), *hinges, *contacts])

@@ -1,0 +1,143 @@
+"""Owns the nodal stages where elements take steps of their own, see `warp_mca.model.rates`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+
+from warp_mca.base.errors import bad_value
+from warp_mca.elements.stage import BLOCK_DIM, list_slots
+from warp_mca.kernels.nodes import node
+from warp_mca.solve.node_stage import NodeStage
+from warp_mca.solve.threads import NODES, Split, whole
+
+if TYPE_CHECKING:
+    from warp_mca.elements.stage import ElementStage
+    from warp_mca.model.model import Model
+    from warp_mca.model.rates import Rates
+    from warp_mca.solve.constraint_stage import ConstraintStage
+    from warp_mca.solve.state import State
+    from warp_mca.solve.workspace import Workspace
+
+
+@dataclass(frozen=True)
+class _Active:
+    """What a substep advances: `rated_node.integrate_kernel` says what the arrays hold."""
+
+    item: wp.array
+    first_slots: wp.array
+    more_slots: wp.array
+
+
+class RatedNodeStage(NodeStage):
+    """Advances the nodes up to a level by substeps of central differences.
+
+    Attributes:
+        u_record, v_record: displacements at the latest record [m] and velocities half a step after it [m/s], shape
+            (node_count,), vec3d.
+    """
+
+    rated = True
+
+    def __init__(
+        self,
+        model: Model,
+        work: Workspace,
+        constraints: ConstraintStage,
+        elements: Sequence[ElementStage],
+        precision: str,
+        dt: float,
+        rounds: int,
+    ) -> None:
+        """As `NodeStage`, with `dt` the step of contacts and joints [s].
+
+        Raises:
+            RequestError: the model is too large for the numbers of its nodes and slots.
+        """
+        super().__init__(model, work, constraints, precision, dt, rounds)
+        assert model.rates is not None
+        self.rates: Rates = model.rates
+        self.base = dt / (1 << self.rates.common)
+        self.active = self._lists(elements)
+        self.u_record = wp.zeros(model.node_count, dtype=wp.vec3d)
+        self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
+
+    def _lists(self, elements: Sequence[ElementStage]) -> list[_Active]:
+        """Nodes and slots of each level."""
+        node_level = self.rates.node_level.astype(np.int32)
+        node_of = np.concatenate([np.zeros(0, np.int32), *(stage.slot_node for stage in elements)])
+        level = np.concatenate([np.zeros(0, np.int32), *(stage.slot_level for stage in elements)])
+        if max(len(node_of), len(node_level)) >= 1 << node.LEVEL_BIT:
+            remedy = f"steps of their own reach up to {(1 << node.LEVEL_BIT) - 1:,}; leave multi_rate out"
+            raise bad_value("number of forces on nodes", len(node_of), remedy)
+        entry = np.arange(len(node_of), dtype=np.int32)
+        entry += (level - node_level[node_of]) << node.LEVEL_BIT
+        found = []
+        for k in range(self.rates.top + 1):
+            nodes = np.flatnonzero(node_level <= k).astype(np.int32)
+            slots = level <= k
+            first, more = list_slots(entry[slots], node_of[slots], self.node_count)
+            item = wp.array(nodes + (node_level[nodes] << node.LEVEL_BIT), dtype=wp.int32)
+            found.append(_Active(item, wp.array(first, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)))
+        return found
+
+    def integrate(
+        self,
+        state: State,
+        kick: float,
+        drift: float,
+        role: wp.array,
+        split: Split = whole,
+        before: wp.array | None = None,
+        level: int | None = None,
+    ) -> None:
+        """As `NodeStage.integrate`, for the nodes up to a level, all if None; kick and drift are those of level 0."""
+        work, squares = self.work, state.speed_square
+        level = self.rates.top if level is None else level
+        active, pressed = self.active[level], self.touched and level >= self.rates.common
+
+        def launch(part: slice) -> None:
+            item, keepers = active.item[part], node.KEEPERS if pressed and part.start == 0 else 0
+            inputs = [item, work.inverse_mass, active.first_slots, active.more_slots, role, work.force]
+            inputs += [self.scene, self.gravity, kick, drift]
+            outputs = [work.contact_force, state.u, state.v, before, squares, state.normal_force if keepers else None]
+            threads = part.stop - part.start + keepers
+            wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+        split(len(active.item), launch, NODES)
+
+    def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
+        """As `NodeStage.slots`."""
+        active = self.active[self.rates.top if level is None else level]
+        return active.first_slots, active.more_slots
+
+    def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
+        """As `NodeStage.at_record`: what was kept of the record itself."""
+        return self.u_record, self.v_record, 0.0
+
+    def begin_record(self, state: State) -> None:
+        """As `NodeStage.begin_record`: keep the displacements."""
+        wp.copy(self.u_record, state.u)
+
+    def end_record(self, state: State) -> None:
+        """As `NodeStage.end_record`: keep the velocities, before the next substep changes them."""
+        wp.copy(self.v_record, state.v)
+
+
+def node_stage(
+    model: Model,
+    work: Workspace,
+    constraints: ConstraintStage,
+    elements: Sequence[ElementStage],
+    precision: str,
+    dt: float,
+    rounds: int,
+) -> NodeStage:
+    """The nodal stage of a model; arguments as `RatedNodeStage` has them."""
+    if model.rates:
+        return RatedNodeStage(model, work, constraints, elements, precision, dt, rounds)
+    return NodeStage(model, work, constraints, precision, dt, rounds)

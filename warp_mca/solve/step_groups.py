@@ -1,0 +1,113 @@
+"""Owns the stages of a time step and their order, as docs/architecture.md lists them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step
+
+if TYPE_CHECKING:
+    from warp_mca.solve.solver import Solver
+
+
+def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
+    """The stages of a step in their order, or those of a substep that computes elements up to a level."""
+    rates = solver.model.rates
+    common = level is None or rates is None or level >= rates.common
+    return [
+        _forces(solver, level, common),
+        _energies(solver),
+        _sums(solver),
+        _advance(solver, level, common),
+        _follow(solver, common),
+        _motion(solver),
+    ]
+
+
+def _forces(solver: Solver, level: int | None, common: bool) -> Group:
+    """Forces on nodes.
+
+    Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want it,
+    and patches want another division than contact.
+    """
+    work, nodes = solver.work, solver.nodes
+    active = [e for e in solver.elements if level is None or e.active(level)]
+    found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
+    found += [
+        Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
+        for c in (solver.contacts if common else [])
+    ]
+    return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
+
+
+def _energies(solver: Solver) -> Group:
+    """Stresses and energies at t(n), before nodes move."""
+
+    def before(step: Step) -> None:
+        solver.nodes.begin_record(step.state)
+        if solver.output and step.is_row:
+            solver.output.before_step(step.state, step.needs)
+
+    energies = [
+        Stage("element energies", lambda s, e=e: e.energies(solver.work, s.state, s.split), only_records=True)
+        for e in solver.elements
+    ]
+    return [Stage("paths, frames: stress", before, only_records=True), *energies]
+
+
+def _sums(solver: Solver) -> Group:
+    """Sums over springs and elements."""
+    records = solver.records
+    springs = [
+        Stage("spring sums", lambda s, c=c: records.sum_springs(s, c), SUMS, only_records=True) for c in solver.contacts
+    ]
+    return [*springs, Stage("element sums", records.sum_elements, SUMS, only_records=True)]
+
+
+def _advance(solver: Solver, level: int | None, common: bool) -> Group:
+    """Stages that move nodes, those up to a level or all; with `common` also those that other things act on."""
+    nodes, found = solver.nodes, []
+    if common and solver.constraints.count:
+        found.append(Stage("joints, driven nodes", lambda s: nodes.advance_bound(s, level), BESIDE))
+    if common and len(solver.constraints.rails):
+        found.append(Stage("sliders on rails", nodes.slide, BESIDE))
+    if common and solver.couplings.count:
+        found.append(Stage("couplings", solver.couplings.couple, BESIDE))
+    if common and solver.model.bases:
+        found.append(Stage("bases", solver.loads.move_bases, BESIDE))
+    if common and solver.absorbing.count:
+        found.append(Stage("absorbing boundaries", lambda s: solver.absorbing.advance(s, level), BESIDE))
+    if common and solver.rigid.count:
+        found.append(Stage("rigid bodies", lambda s: solver.rigid.advance(s, level), BESIDE))
+    if common and solver.ties.count:
+        found.append(Stage("masters of ties", lambda s: solver.ties.advance(s, level), BESIDE))
+    return [*found, Stage("free nodes", lambda s: nodes.advance(s, level))]
+
+
+def _follow(solver: Solver, common: bool) -> Group:
+    """Stages that follow when nodes have moved."""
+    dt = solver.nodes.dt
+    found = [Stage("slaves of ties", solver.ties.follow)] if common and solver.ties.count else []
+    if common and solver.model.hinge_loads:
+        found.append(Stage("joint torques", lambda s: solver.loads.torques(s.state, dt, dt)))
+    return found
+
+
+def _motion(solver: Solver) -> Group:
+    """Sums over nodes and velocities at t(n), from those half a step before and after it."""
+
+    def after(step: Step) -> None:
+        if solver.output and step.is_row:
+            solver.output.after_step(step.state, step.needs)
+
+    motion = [
+        Stage(
+            "motion sums",
+            lambda s: solver.records.sum_motion(s, solver.constraints, solver.nodes),
+            only_records=True,
+        ),
+        Stage("frames: velocity", after, only_records=True),
+    ]
+    if solver.loads.kernels():
+        motion.append(Stage("joint and base sums", solver.loads.sums, only_records=True))
+    return [*motion, *solver.absorbing.record_stages(solver.records)]
