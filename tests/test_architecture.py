@@ -20,6 +20,7 @@ from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.coupling_stage import CouplingState
 from warp_mca.solve.load_stage import LoadState
+from warp_mca.solve.rigid_stage import RigidState
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
 
@@ -92,7 +93,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node."""
+    """A scene with each kind of thing that acts: a contact, a hinge, a rail, a driven node, a rigid body."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -100,8 +101,8 @@ def everything() -> mca.Scene:
     return mca.Scene(
         name="everything",
         bodies=tuple(
-            mca.Body(name=name, geometry=box, material=STEEL, position=(0.0, 0.0, z))
-            for name, box, z in (("rail", rail, 0.0), ("cart", cart, 0.0), ("driven", cart, 0.1))
+            mca.Body(name=name, geometry=box, material=STEEL, position=(0.0, 0.0, z), rigid=name == "rigid")
+            for name, box, z in (("rail", rail, 0.0), ("cart", cart, 0.0), ("driven", cart, 0.1), ("rigid", cart, 0.2))
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
@@ -135,6 +136,7 @@ STATE_PARTS = {
     "constraints/": ConstraintState,
     "couplings/": CouplingState,
     "loads/": LoadState,
+    "rigid/": RigidState,
 }
 
 
