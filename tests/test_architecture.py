@@ -21,6 +21,7 @@ from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.coupling_stage import CouplingState
 from warp_mca.solve.load_stage import LoadState
+from warp_mca.solve.rigid_stage import RigidState
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
 
@@ -93,7 +94,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, side that absorbs, tie."""
+    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, absorbing side, tie, rigid body."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -101,8 +102,21 @@ def everything() -> mca.Scene:
     return mca.Scene(
         name="everything",
         bodies=tuple(
-            mca.Body(name=name, geometry=rail if name == "rail" else cart, material=STEEL, position=(0.0, 0.0, z))
-            for name, z in (("rail", 0.0), ("cart", 0.0), ("driven", 0.1), ("carrier", 0.21), ("tied", 0.2))
+            mca.Body(
+                name=name,
+                geometry=rail if name == "rail" else cart,
+                material=STEEL,
+                position=(0.0, 0.0, z),
+                rigid=name == "rigid",
+            )
+            for name, z in (
+                ("rail", 0.0),
+                ("cart", 0.0),
+                ("driven", 0.1),
+                ("carrier", 0.21),
+                ("tied", 0.2),
+                ("rigid", 0.3),
+            )
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
@@ -139,6 +153,7 @@ STATE_PARTS = {
     "couplings/": CouplingState,
     "loads/": LoadState,
     "absorbing/": AbsorbingState,
+    "rigid/": RigidState,
 }
 
 

@@ -12,7 +12,7 @@ import warp as wp
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.coupling import turned
-from warp_mca.kernels.nodes.joint_torque import block_sum, wait_for_block
+from warp_mca.kernels.nodes.joint_torque import wait_for_block
 from warp_mca.kernels.nodes.node import gather_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster, spin_of
@@ -21,6 +21,8 @@ from warp_mca.kernels.nodes.symmetric import factorise
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
+
+Wrench = wp.types.vector(length=6, dtype=wp.float64)  # force and moment
 
 
 @cache
@@ -45,18 +47,21 @@ def load_function(precision: str, contact: bool, rated: bool) -> Any:
         work_out: wp.array(dtype=wp.vec3d),
     ):
         q = rotation[b]
-        F = wp.vec3d()
-        T = wp.vec3d()
+        total = Wrench()
         for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
             i = bodies.node[e]
             f = gather(first_slots[i], more_slots, force)
             if wp.static(contact):
                 f += take_contact(i, contact_force_out)
             work_out[e] = f
-            F += f
-            T += wp.cross(wp.quat_rotate(q, bodies.arm[e]), f)
-        sum_F = wp.vec3d(block_sum(F[0]), block_sum(F[1]), block_sum(F[2]))
-        sum_T = wp.vec3d(block_sum(T[0]), block_sum(T[1]), block_sum(T[2]))
+            moment = wp.cross(wp.quat_rotate(q, bodies.arm[e]), f)
+            for c in range(3):
+                total[c] += f[c]
+                total[3 + c] += moment[c]
+        found = wp.tile_sum(wp.tile(total, preserve_type=True))
+        total = found[0]
+        sum_F = wp.vec3d(total[0], total[1], total[2])
+        sum_T = wp.vec3d(total[3], total[4], total[5])
         if lane == 0:
             momentum_out[b] = momentum_out[b] + kick * (sum_F + bodies.mass[b] * bodies.gravity[b])
             spin_out[b] = spin_out[b] + kick * sum_T

@@ -11,7 +11,6 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.rotation import mean_pose
-from warp_mca.elements.stage import BLOCK_DIM
 from warp_mca.kernels.nodes import rigid_body
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies
@@ -203,7 +202,7 @@ class RigidStage:
         def launch(part: slice) -> None:
             inputs = [self.node[part], self.body[part], self.arm[part], state.rigid.centre, velocity, rate, turned]
             outputs = [state.u, state.v, before, state.speed_square]
-            wp.launch(rigid_body.follow, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+            wp.launch(rigid_body.follow, part.stop - part.start, inputs=inputs, outputs=outputs)
 
         split(len(self.node), launch, NODES)
 

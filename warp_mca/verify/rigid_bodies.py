@@ -217,7 +217,7 @@ def rigid_double_pendulum(setup: Setup) -> list[Row]:
 )
 def rigid_ball(setup: Setup) -> list[Row]:
     """The sphere and the block of `hertz_block`; elastic spheres have 10 and 40 times the block's Young's modulus."""
-    section = 4 if setup.level == "quick" else 8
+    section = 4 if setup.level == "quick" else 6
     parameters = {"target": "block", "section": section, "pole_size": 1.2e-3 / section, "pole_layers": section + 1}
 
     def figures(**more: object) -> tuple[float, float]:
