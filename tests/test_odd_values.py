@@ -47,6 +47,7 @@ SOUND: dict[type, Any] = {
     mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
     mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
     mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
+    mca.Absorbing: mca.Absorbing(body="low", nodes="ymin", centre=(0.0, 0.0, 0.0)),
     mca.Tip: TIP,
     mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),
     mca.ImpactPhase: mca.ImpactPhase(duration=1e-7, output_interval=1e-7),
@@ -156,6 +157,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Contact: "contacts",
                 mca.Fixed: "fixed",
                 mca.Prescribed: "prescribed",
+                mca.Absorbing: "absorbing",
             }[type(item)]
             change = {name: item if name == "tip" else (item,)}
     return dataclasses.replace(whole, **change)
