@@ -37,14 +37,15 @@ def record(kernel, scenes: int, inputs: list, *more: wp.array) -> np.ndarray:
 def test_motion(counts: tuple[int, ...]):
     rng = np.random.default_rng(0)
     first, driven = offsets(*counts), offsets(*(k // 3 for k in counts))
-    mass = rng.uniform(1.0, 2.0, first[-1])
+    mass, heavy = rng.uniform(1.0, 2.0, (2, first[-1]))
     u, before, v = rng.normal(size=(3, first[-1], 3))
     gravity = rng.normal(size=(len(counts), 3))
     gravity[-1] = 0.0
     work = rng.normal(size=(driven[-1], 3))
     points = np.array([0, first[-1] - 1])
-    kinds = [wp.float64, wp.vec3d, wp.vec3d, wp.vec3d, wp.vec3d]
-    arrays = [wp.array(x, dtype=k, device="cpu") for x, k in zip((mass, gravity, u, before, v), kinds, strict=True)]
+    kinds = [wp.float64, wp.float64, wp.vec3d, wp.vec3d, wp.vec3d, wp.vec3d]
+    values = (mass, heavy, gravity, u, before, v)
+    arrays = [wp.array(x, dtype=k, device="cpu") for x, k in zip(values, kinds, strict=True)]
     starts = [wp.array(x, dtype=wp.int32, device="cpu") for x in (first, driven, points)]
     found = wp.zeros((2, 2), dtype=wp.vec3d, device="cpu")
     inputs = [*arrays, 0.1, starts[0], wp.array(work, dtype=wp.vec3d, device="cpu"), starts[1], starts[2]]
@@ -52,7 +53,7 @@ def test_motion(counts: tuple[int, ...]):
     for k in range(len(counts)):
         part = slice(first[k], first[k + 1])
         kinetic = 0.5 * np.einsum("i,ij,ij", mass[part], before[part], v[part])
-        fall = mass[part] @ (u[part] - 0.1 * v[part]) @ gravity[k]
+        fall = heavy[part] @ (u[part] - 0.1 * v[part]) @ gravity[k]
         assert sums[k, KINETIC] == pytest.approx(kinetic, rel=1e-12, abs=1e-12)
         assert sums[k, GRAVITY_WORK] == pytest.approx(fall, rel=1e-12, abs=1e-12)
         assert sums[k, DRIVE_WORK] == pytest.approx(work[driven[k] : driven[k + 1]].sum(), rel=1e-12, abs=1e-12)

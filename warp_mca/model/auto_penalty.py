@@ -136,7 +136,7 @@ def _nearest(X: Array, contact: Contact, slave: Faces, master: Faces | None) -> 
         return _Side(slave, int(np.flatnonzero(near)[(slave.middle[near] @ normal).argmin()])), None, normal
     from scipy.spatial import KDTree
 
-    distance, face = KDTree(master.middle).query(slave.middle)
+    distance, face = (np.asarray(found) for found in KDTree(master.middle).query(slave.middle))
     k = int(np.argmin(distance))
     normal = master.normal[face[k]] / np.linalg.norm(master.normal[face[k]])
     return _Side(slave, k), _Side(master, int(face[k])), normal

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 PEAK_ERROR = 6.0
 LIMIT = 0.1  # estimated error of the first force peak above which mass scaling is refused
 CLOSE = 1e-3  # relative excess of an eigenvalue that is close enough: half of it in the step
+LONGEST = 100.0  # times the stable step that may be asked for
 ROUNDS = 200  # of adding mass at most
 
 
@@ -48,7 +49,7 @@ def scale_masses(parts: Assembly, contact: Array, plain: StableStep) -> tuple[St
     lambda_e is exact or an upper bound. `plain` is the step without.
 
     Raises:
-        RequestError: the scene has rigid bodies or ties.
+        RequestError: the scene has rigid bodies or ties, or the wanted step is out of reach.
     """
     asked = parts.scene.impact.mass_scaling
     if asked is None:
@@ -60,12 +61,13 @@ def scale_masses(parts: Assembly, contact: Array, plain: StableStep) -> tuple[St
         remedy = "masters of ties carry the mass of their slaves; leave mass_scaling out, or the ties"
         raise bad_value("ImpactPhase.mass_scaling", asked, remedy)
     wanted = float(asked.rstrip("s")) if isinstance(asked, str) else asked * plain.dt
-    before, count, stable = parts.mass.copy(), 0, replace(plain, dt=max(wanted, plain.dt))
-    slow = [_Slow(parts, k, contact, (2.0 / stable.dt) ** 2) for k in range(len(parts.cells))]
-    if any(len(part.mine) for part in slow):
-        excess = _add(parts, slow, contact, before)
-        stable = _stable(plain, slow, stable.dt / math.sqrt(max(excess, 1.0)))
-        count = sum(int((part.factor > 1.0).sum()) for part in slow)
+    if not wanted <= LONGEST * plain.dt:
+        remedy = f"that is more than {LONGEST:g} times the stable step of {plain.dt:.3g} s; ask for less"
+        raise bad_value("ImpactPhase.mass_scaling", asked, remedy)
+    before = parts.mass.copy()
+    slow = [_Slow(parts, k, contact, (2.0 / wanted) ** 2) for k in range(len(parts.cells))] if wanted > plain.dt else []
+    stable = _stable(plain, slow, wanted, _add(parts, slow, contact, before)) if slow else plain
+    count = sum(int((part.factor > 1.0).sum()) for part in slow)
     return stable, MassScaling(added=parts.mass - before, elements=count, plain_dt=plain.dt)
 
 
@@ -137,8 +139,11 @@ def _add(parts: Assembly, slow: Sequence[_Slow], contact: Array, before: Array) 
     return max(part.measure(contact * (before / parts.mass)) for part in slow)
 
 
-def _stable(plain: StableStep, slow: Sequence[_Slow], dt: float) -> StableStep:
-    """The step reached, and the element that sets it now."""
+def _stable(plain: StableStep, slow: Sequence[_Slow], wanted: float, excess: float) -> StableStep:
+    """The step reached, where some eigenvalues exceed those of the wanted one [s], and the element that sets it now."""
+    dt = wanted / math.sqrt(max(excess, 1.0))
+    if not any(len(part.mine) for part in slow):  # `plain` may be a bound that is lower than any element's step
+        return replace(plain, dt=dt)
     part = max(slow, key=lambda part: part.excess.max(initial=0.0))
     worst = int(part.excess.argmax())
     return StableStep(
