@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.model.build import build_model
+from warp_mca.model.build import Grouping, build_model
 from warp_mca.model.cells import nodal_masses
 from warp_mca.results.paths import locate
 from warp_mca.rigid.handback import HandBack, carriage_motion, hand_back
@@ -46,11 +46,13 @@ def bars(count: int = 2, gravity: float = 9.8, elements: int = 10, **rigid: Any)
     )
 
 
-def ready(scene: mca.Scene, start: float = START) -> Prepared:
+def ready(scene: mca.Scene, start: float = START, grouping: Grouping | None = None) -> Prepared:
     """A scene whose impact phase begins after so much of its rigid phase [s]."""
     meshes = mca.mesh(scene)
     begin = hand_off(scene, meshes, nodal_masses(scene, meshes), t_end=start)
-    model = build_model(scene, meshes, begin.positions, begin.velocities, chain=begin.chain, start=start)
+    model = build_model(
+        scene, meshes, begin.positions, begin.velocities, chain=begin.chain, start=start, grouping=grouping
+    )
     return Prepared(scene, meshes, begin, model, locate(scene, model, meshes))
 
 

@@ -7,14 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import warp as wp
+from chains import BASE, LENGTH, START, TORQUE, bars, motion_at_end
+from chains import ready as chain_ready
 from impacts import SHORT_RANGES, begun, figures, finished, momentum, prepared, result_of
 from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.cli.main import main
+from warp_mca.elements.patch_stage import PatchStage
+from warp_mca.kernels.elements import hex8, hex8_patch
 from warp_mca.model.rates import Rates
 from warp_mca.runs.division import divide
-from warp_mca.runs.rate_groups import COSTS, StepCost
+from warp_mca.runs.impact import Impact
+from warp_mca.runs.rate_groups import COSTS, StepCost, grouping
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
 METAL = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)
@@ -187,6 +193,54 @@ def test_a_stored_state_goes_on_to_the_same_bits_for_any_number_of_threads(
     assert [name for name in known if known[name].tobytes() != found[name].tobytes()] == []
     with pytest.raises(mca.RequestError, match="another model, precision or time step"):
         begun(hinged(), multi_rate=2).load(tmp_path / "state")
+
+
+@pytest.mark.parametrize("precision", ["mixed", "float64"])
+def test_patches_keep_to_one_level_in_whatever_order(precision: str, monkeypatch: pytest.MonkeyPatch):
+    bar = graded((0.04, 0.3, 0.04), (8, 40, 8), 8.0)
+    body = mca.Body(name="bar", geometry=bar, material=METAL)
+    scene = mca.Scene(name="bar", bodies=(body,), impact=mca.ImpactPhase(duration=1e-5))
+    model = prepared(scene, multi_rate=2).model
+    (block,) = model.blocks
+    monkeypatch.setattr(wp.get_device("cpu"), "sm_count", 2)
+    stage = PatchStage(block, model.X, precision, hex8, hex8_patch, points=8)
+    first, last = stage.level_patches
+    heads = stage.patches.head.numpy()
+    assert 0 < first < last == len(heads) and block.level_ends[0] in heads[:, 0]
+    level = (np.arange(last) >= first).astype(int)
+    assert (stage.slot_level == np.repeat(level, heads[:, 2] >> 16 & 0xFFFF)).all()
+    stage.flowing.assign(np.arange(last) % 3 == 0)
+    stage.schedule()
+    turn = stage.patches.turn.numpy()[:, 3]
+    assert (level[turn] == level).all() and (np.diff(turn) < 0).any() and sorted(turn) == list(range(last))
+    assert (stage.first_patches[0].turn.numpy()[:, 3] == turn[:first]).all()
+
+
+def test_hinge_torques_and_a_moving_base_act_on_their_own_level():
+    """A chain whose outer bar is graded, with a driven joint on a moving base: motion and work as with one rate."""
+    outer = mca.Box(size=(LENGTH, 0.02, 0.02), divisions=(24, 2, 2), origin=(0.0, -0.01, -0.01)).build()
+    sizes = np.geomspace(1.0, 16.0, 24)
+    places = LENGTH * np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
+    layer = np.rint(outer.points[:, 0] * 24 / LENGTH).astype(int)
+    outer = replace(outer, points=np.column_stack([places[layer], outer.points[:, 1:]]))
+    scene = bars(torques=(TORQUE,), base_motion=BASE)
+    scene = replace(scene, bodies=(scene.bodies[0], replace(scene.bodies[1], geometry=outer)))
+    span, found = 2e-4, []
+    for groups in (None, 3):
+        impact = Impact(
+            [chain_ready(scene, grouping=grouping(scene, span, "cpu", groups))],
+            span,
+            device="cpu",
+            precision="float64",
+            threads=1,
+        )
+        impact.advance()
+        found.append((motion_at_end(impact, START + span), result_of(impact).summary))
+    (one, plain), (many, rated) = found
+    assert len(rated["rate_groups"]) == 3
+    assert many.theta_dot == pytest.approx(one.theta_dot, rel=1e-6)
+    assert rated["energy"]["external_work"] == pytest.approx(plain["energy"]["external_work"], rel=5e-3)
+    assert rated["energy_error"] < 1e-5
 
 
 def test_tetrahedra_keep_one_step():

@@ -208,6 +208,8 @@ class Ledger:
         found = "lower time_step_scale"
         if self.kept.touched:
             found += " or a contact's penalty"
+        if self.model.rates:
+            found += ", take fewer groups in multi_rate"
         if self.precision == "mixed" and self.spin * self.steps.time(self.kept.records) > TURNED:
             found += ", choose --precision float64 for bodies that turn so far"
         return found
