@@ -249,7 +249,7 @@ def build_model(
     check_bindings(held, pairs)
     check_ties(ties, held, nodes_of(pairs), velocity)
     passes, axes, added = _contacts(parts, velocity)
-    stable = parts.stable(added, ties.relief(parts.mass))
+    stable = parts.stable(ties.shared(added, parts.mass), ties.relief(parts.mass))
     return Model(
         X=parts.X,
         V=velocity,
