@@ -12,6 +12,7 @@ from typing import Annotated
 import warp_mca as mca
 from warp_mca import Param
 from warp_mca.scenes._arm import arm
+from warp_mca.scenes._tied import with_coarse_rods, with_nested_plate
 
 PRESETS: dict[str, dict[str, object]] = {
     "quick": {},
@@ -147,6 +148,15 @@ def build(
             choices=("none", "ends", "all"),
         ),
     ] = "none",
+    plate_mesh: Annotated[
+        str, Param("graded; nested: tied boxes, each of coarser cells around the last", choices=("graded", "nested"))
+    ] = "graded",
+    fine_length: Annotated[
+        float | None,
+        Param("length of AB's end with its fine section, tied to a coarse rod; None: all of both rods", unit="m"),
+    ] = None,
+    rod_section: Annotated[int, Param("section of the coarse rods, with fine_length; even", low=2)] = 4,
+    rod_ring: Annotated[int, Param("ring of the coarse rods, with fine_length", low=1)] = 2,
 ) -> mca.Scene:
     """The scene of Table 1, Fig. 1 of the paper, with any of its values changed."""
     theta = (math.radians(theta_OA), math.radians(theta_AB))
@@ -166,7 +176,7 @@ def build(
         layers=plate_layers,
         extension=plate_extension,
     )
-    return arm(
+    scene = arm(
         "two_link",
         ("OA", "AB"),
         theta=theta,
@@ -196,6 +206,8 @@ def build(
         absorbs=plate_absorbs,
         rigid_bodies=rigid_bodies,
     )
+    scene = with_nested_plate(scene) if plate_mesh == "nested" else scene
+    return scene if fine_length is None else with_coarse_rods(scene, fine_length, rod_section, rod_ring)
 
 
 def check(result: mca.Result) -> list[str]:

@@ -11,6 +11,7 @@ from impacts import SHORT_RANGES, Displaced, begun, figures, finished, momentum,
 
 import warp_mca as mca
 from warp_mca.geometry.face_projection import project, shape
+from warp_mca.model.model import nodal_masses
 from warp_mca.solve.solver import Solver
 
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
@@ -108,13 +109,22 @@ def test_the_stable_step_is_below_that_of_the_tied_elements(lift):
     assert isinstance(box, mca.Box)
     wide = dataclasses.replace(box, size=(SIDE, lift * SIDE, SIDE), origin=(-SIDE, -0.5 * lift * SIDE, -0.5 * SIDE))
     bodies = (dataclasses.replace(scene.bodies[0], geometry=wide), scene.bodies[1])
-    model = prepared(dataclasses.replace(scene, bodies=bodies)).model
+    ready = prepared(dataclasses.replace(scene, bodies=bodies))
+    model = ready.model
     assert (model.ties.weight.min() < 0.0) == (lift > 1.0)
     T, free = reduced(model)
     root = np.sqrt(np.repeat(model.mass[free], 3))
     K = T.T @ stiffness(model) @ T / np.outer(root, root)
     exact = 2.0 / np.sqrt(np.linalg.eigvalsh(0.5 * (K + K.T)).max())
     assert 0.7 * exact < model.stable.dt <= exact
+    mass = np.concatenate([*nodal_masses(ready.scene, ready.meshes).values()])  # of each body without the tie
+    spring = np.zeros(len(mass))
+    spring[model.ties.slave] = 1e6  # [N/m]
+    pressed = K + T.T @ np.diag(np.repeat(spring, 3)) @ T / np.outer(root, root)
+    greatest = np.linalg.eigvalsh(0.5 * (pressed + pressed.T)).max()
+    added = model.ties.shared(spring / mass, mass).max()
+    assert added < 0.6 * (spring / mass).max()
+    assert greatest <= (2.0 / model.stable.dt) ** 2 + added
 
 
 def test_a_constant_stress_passes_a_tie_of_nested_faces():

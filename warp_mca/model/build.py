@@ -94,7 +94,7 @@ def build_model(
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
-    parts.relief = ties.relief(parts.mass)
+    added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     model = Model(
         V=velocity,
         **bodies,

@@ -93,6 +93,23 @@ class TiedNodes:
         found[self.slave] = np.where(self.weight != 0.0, found[self.master], 1.0).max(axis=1)
         return found
 
+    def shared(self, added: Array, mass: Array) -> Array:
+        """What contact springs add to the eigenvalue at each node [1/s^2], those on slaves given to the masters.
+
+        A spring k on a slave is k (sum_k N_k v_k)^2 <= S k sum_k |N_k| v_k^2, against the masters' mass, which is
+        larger than the slave's own. Slaves have the greatest value of their masters, whose mass they are a part of.
+        """
+        if not len(self):
+            return added
+        size, stiffness, found = np.abs(self.weight), added * mass, added.copy()
+        total = stiffness.copy()
+        for k in range(4):
+            np.add.at(total, self.master[:, k], size[:, k] * size.sum(axis=1) * stiffness[self.slave])
+        carriers = self.carriers
+        found[carriers] = total[carriers] / self.carried(mass)[carriers]
+        found[self.slave] = np.where(self.weight != 0.0, found[self.master], 0.0).max(axis=1)
+        return found
+
     def moved(self, start: int) -> TiedNodes:
         """The same with nodes that are counted from `start` on."""
         return TiedNodes(
