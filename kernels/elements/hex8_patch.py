@@ -46,9 +46,10 @@ wp.set_module_options({"enable_backward": False})
 def element_function(precision: str, law_name: str) -> Any:
     """The function that computes the element of a thread as if it were elastic, and lists it where it yields."""
     t = scalars(precision)
-    R, mat33, mat83 = t.real, t.mat33, t.mat83
+    R, mat83, reads_again = t.real, t.mat83, precision == "mixed"
     plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
-    element_rotation, local_displacement = frame_functions(precision)
+    _, element_rotation, local_displacement, rounded_rotation = frame_functions(precision)
+    _, load_displacements, _ = load_functions(precision)
     element_forces = small_strain_function(precision, "")
     _, keep_forces, _ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
@@ -58,7 +59,10 @@ def element_function(precision: str, law_name: str) -> Any:
     def elastic_element(
         Xl: mat83,
         ul: mat83,
-        W: mat33,
+        W: wp.mat33d,
+        pool: wp.array(dtype=wp.vec3d),
+        corners: wp.vec4ui,
+        first: int,
         e: int,
         m: int,
         lane: int,
@@ -70,8 +74,12 @@ def element_function(precision: str, law_name: str) -> Any:
     ):
         """Whether the element begins to yield; its forces do not hold then."""
         G = R(scale) * law[m, 1]
-        local = local_displacement(Xl, ul, W)
-        f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
+        if wp.static(reads_again):
+            local = local_displacement(Xl, load_displacements(pool, corners, first), W)
+        else:
+            local = local_displacement(Xl, ul, W)
+        frame = rounded_rotation(W)
+        f, largest = element_forces(Xl, local, frame, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
         yields = bool(False)
@@ -85,6 +93,9 @@ def element_function(precision: str, law_name: str) -> Any:
     def compute_element(
         Xl: mat83,
         ul: mat83,
+        pool: wp.array(dtype=wp.vec3d),
+        corners: wp.vec4ui,
+        first: int,
         e: int,
         m: int,
         lane: int,
@@ -101,7 +112,9 @@ def element_function(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             flows = yielded_out[e] != 0
         if not flows:
-            flows = elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
+            flows = elastic_element(
+                Xl, ul, W, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
+            )
         if wp.static(plastic):
             if flows:
                 list_element(W, lane, listed_out, force_out)
@@ -125,6 +138,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)
+    rounded_corners, _, _, _ = frame_functions(precision)
     clear_nowhere, _, sum_patch = sum_functions(precision)
     compute_element, (_, flow_listed) = element_function(precision, law_name), flow_functions(precision, law_name)
 
@@ -169,7 +183,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
             Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
-            ul = load_displacements(pool, corners, first)
+            ul = rounded_corners(load_displacements(pool, corners, first))
             next_head = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
@@ -177,7 +191,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
             if wp.static(early):
                 copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                compute_element(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces)
+                compute_element(
+                    Xl, ul, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces
+                )
             wait_for_copies()
             barrier()
             if wp.static(plastic):

@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.rotation import nearest_rotation
-from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.scalars import scalars, width_functions
 
 wp.set_module_options({"enable_backward": False})
 
@@ -141,21 +141,31 @@ def lines_of_point(g: int):
 
 
 @cache
-def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
+def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any, Any]:
     """Functions that take an element to its rotated frame.
 
-    (Its rotation as W = Q - I and the ratio of volumes J at its centre; local displacements.)
+    (Its rotation as W = Q - I, in float64, and the ratio of volumes J at its centre; local displacements; W rounded.)
+
+    In a body that has turned, displacements are large and their local rest small: they cancel in float64.
     """
     t = scalars(precision)
-    R, mat33, mat83 = t.real, t.mat33, t.mat83
+    R, mat33, mat83, vec3d, mat83d = t.real, t.mat33, t.mat83, wp.vec3d, scalars("float64").mat83
+    rounded, widened = width_functions(precision)
     edges, _ = line_functions(precision)
     polar_rotation = nearest_rotation(precision, finite)
-    add_transposed = fused(precision).add_transposed
+    add_transposed = fused("float64").add_transposed
 
     @wp.func
     def edge_sum(x: mat83, direction: int):
         e = edges(x, direction)
         return (e[0] + e[1]) + (e[2] + e[3])
+
+    @wp.func
+    def rounded_corners(wide: mat83d):
+        u = mat83()
+        for a in range(1, 8):
+            u[a] = rounded(wide[a])
+        return u
 
     @wp.func
     def element_rotation(X: mat83, u: mat83):
@@ -171,13 +181,20 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
         return polar_rotation(F), wp.determinant(F)
 
     @wp.func
-    def local_displacement(X: mat83, u: mat83, W: mat33):
+    def local_displacement(X: mat83, u: mat83d, W: wp.mat33d):
         local = mat83()
         for a in range(1, 8):  # the first node is the origin of both
-            local[a] = add_transposed(u[a], W, X[a] + u[a])  # Q^T (X + u) - X, without the digits that would cancel
+            local[a] = rounded(add_transposed(u[a], W, widened(X[a]) + u[a]))  # Q^T (X + u) - X
         return local
 
-    return element_rotation, local_displacement
+    @wp.func
+    def rounded_rotation(W: wp.mat33d):
+        a = rounded(vec3d(W[0, 0], W[0, 1], W[0, 2]))
+        b = rounded(vec3d(W[1, 0], W[1, 1], W[1, 2]))
+        c = rounded(vec3d(W[2, 0], W[2, 1], W[2, 2]))
+        return mat33(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+
+    return rounded_corners, element_rotation, local_displacement, rounded_rotation
 
 
 @cache
@@ -261,16 +278,16 @@ def load_function(precision: str) -> Any:
 @cache
 def framed_function(precision: str, finite: bool = False) -> Any:
     """The function (X, u, conn, e) -> (corners, local displacements, frame W, ratio of volumes J at the centre)."""
-    load_element = load_function(precision)
-    element_rotation, local_displacement = frame_functions(precision, finite)
+    load_element, load_wide = load_function(precision), load_function("float64")
+    rounded_corners, element_rotation, local_displacement, rounded_rotation = frame_functions(precision, finite)
 
     @wp.func
     def load_in_frame(
         X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int
     ):
         Xl = load_element(X, conn, e)
-        ul = load_element(u, conn, e)
-        W, J = element_rotation(Xl, ul)
-        return Xl, local_displacement(Xl, ul, W), W, J
+        ul = load_wide(u, conn, e)
+        W, J = element_rotation(Xl, rounded_corners(ul))
+        return Xl, local_displacement(Xl, ul, W), rounded_rotation(W), J
 
     return load_in_frame
