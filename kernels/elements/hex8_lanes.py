@@ -13,7 +13,8 @@ from warp_mca.kernels.elements.hex8_small import stress_functions
 from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
 from warp_mca.kernels.elements.patch import POINT, Patches, exponent_of, from_start
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
-from warp_mca.kernels.hardware.scalars import THIRD, scalars, width_functions
+from warp_mca.kernels.elements.rotation import local_function
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import keep_functions
@@ -153,22 +154,17 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
     A list has its length first, shape (PATCH + 1,).
     """
     t = scalars(precision)
-    R, vec3, mat33, mixed = t.real, t.vec3, t.mat33, precision == "mixed"
-    rounded, widened = width_functions(precision)
+    R, mat33, mixed = t.real, t.mat33, precision == "mixed"
+    local_of = local_function(precision)
     point = POINT[precision]
     _, _, load_corners = load_functions(precision)
-    add_product, add_transposed = fused(precision).add_product, fused("float64").add_transposed
+    add_product = fused(precision).add_product
     to_point_lines, to_corners, lane_sum, lane_max = lane_functions(precision)
     shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
     keep_strain, _, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
-
-    @wp.func
-    def local_of(x: vec3, d: wp.vec3d, W: wp.mat33d):
-        """Displacement of a corner in the frame, as `hexahedron.frame_functions` has it."""
-        return rounded(add_transposed(d, W, widened(x) + d))
 
     @wp.func
     def flow(

@@ -25,7 +25,7 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
 from warp_mca.kernels.hardware.early_launch import begins_early
-from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.scalars import scalars, width_functions
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,
     HEADS,
@@ -48,7 +48,8 @@ def element_function(precision: str, law_name: str) -> Any:
     t = scalars(precision)
     R, mat83, reads_again = t.real, t.mat83, precision == "mixed"
     plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
-    _, element_rotation, local_displacement, rounded_rotation = frame_functions(precision)
+    _, element_rotation, local_displacement = frame_functions(precision)
+    _, _, rounded_matrix = width_functions(precision)
     _, load_displacements, _ = load_functions(precision)
     element_forces = small_strain_function(precision, "")
     _, keep_forces, _ = sum_functions(precision)
@@ -78,7 +79,7 @@ def element_function(precision: str, law_name: str) -> Any:
             local = local_displacement(Xl, load_displacements(pool, corners, first), W)
         else:
             local = local_displacement(Xl, ul, W)
-        frame = rounded_rotation(W)
+        frame = rounded_matrix(W)
         f, largest = element_forces(Xl, local, frame, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
@@ -138,7 +139,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)
-    rounded_corners, _, _, _ = frame_functions(precision)
+    rounded_corners, _, _ = frame_functions(precision)
     clear_nowhere, _, sum_patch = sum_functions(precision)
     compute_element, (_, flow_listed) = element_function(precision, law_name), flow_functions(precision, law_name)
 

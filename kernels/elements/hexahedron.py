@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
-from warp_mca.kernels.elements.rotation import nearest_rotation
+from warp_mca.kernels.elements.rotation import local_function, nearest_rotation
 from warp_mca.kernels.hardware.scalars import scalars, width_functions
 
 wp.set_module_options({"enable_backward": False})
@@ -141,19 +141,18 @@ def lines_of_point(g: int):
 
 
 @cache
-def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any, Any]:
+def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any]:
     """Functions that take an element to its rotated frame.
 
-    (Its rotation as W = Q - I, in float64, and the ratio of volumes J at its centre; local displacements; W rounded.)
-
-    In a body that has turned, displacements are large and their local rest small: they cancel in float64.
+    (Displacements relative to the first node, rounded; its rotation as W = Q - I, and the ratio of volumes J at its
+    centre; local displacements.)
     """
     t = scalars(precision)
-    R, mat33, mat83, vec3d, mat83d = t.real, t.mat33, t.mat83, wp.vec3d, scalars("float64").mat83
-    rounded, widened = width_functions(precision)
+    R, mat83, mat83d = t.real, t.mat83, scalars("float64").mat83
+    rounded, _, _ = width_functions(precision)
     edges, _ = line_functions(precision)
     polar_rotation = nearest_rotation(precision, finite)
-    add_transposed = fused("float64").add_transposed
+    local_of = local_function(precision)
 
     @wp.func
     def edge_sum(x: mat83, direction: int):
@@ -184,17 +183,10 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any
     def local_displacement(X: mat83, u: mat83d, W: wp.mat33d):
         local = mat83()
         for a in range(1, 8):  # the first node is the origin of both
-            local[a] = rounded(add_transposed(u[a], W, widened(X[a]) + u[a]))  # Q^T (X + u) - X
+            local[a] = local_of(X[a], u[a], W)
         return local
 
-    @wp.func
-    def rounded_rotation(W: wp.mat33d):
-        a = rounded(vec3d(W[0, 0], W[0, 1], W[0, 2]))
-        b = rounded(vec3d(W[1, 0], W[1, 1], W[1, 2]))
-        c = rounded(vec3d(W[2, 0], W[2, 1], W[2, 2]))
-        return mat33(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
-
-    return rounded_corners, element_rotation, local_displacement, rounded_rotation
+    return rounded_corners, element_rotation, local_displacement
 
 
 @cache
@@ -279,7 +271,8 @@ def load_function(precision: str) -> Any:
 def framed_function(precision: str, finite: bool = False) -> Any:
     """The function (X, u, conn, e) -> (corners, local displacements, frame W, ratio of volumes J at the centre)."""
     load_element, load_wide = load_function(precision), load_function("float64")
-    rounded_corners, element_rotation, local_displacement, rounded_rotation = frame_functions(precision, finite)
+    rounded_corners, element_rotation, local_displacement = frame_functions(precision, finite)
+    _, _, rounded_matrix = width_functions(precision)
 
     @wp.func
     def load_in_frame(
@@ -288,6 +281,6 @@ def framed_function(precision: str, finite: bool = False) -> Any:
         Xl = load_element(X, conn, e)
         ul = load_wide(u, conn, e)
         W, J = element_rotation(Xl, rounded_corners(ul))
-        return Xl, local_displacement(Xl, ul, W), rounded_rotation(W), J
+        return Xl, local_displacement(Xl, ul, W), rounded_matrix(W), J
 
     return load_in_frame

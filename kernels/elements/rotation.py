@@ -24,7 +24,7 @@ def nearest_rotation(precision: str, finite: bool = False) -> Any:
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     add_matrices = fused(precision).add_matrices
     D, vec3d, mat33d = wp.float64, wp.vec3d, wp.mat33d
-    _, widened = width_functions(precision)
+    _, widened, _ = width_functions(precision)
     iterations = 7 if finite else 2 if precision == "mixed" else 3
     last = 0.5**iterations
 
@@ -78,3 +78,20 @@ def nearest_rotation(precision: str, finite: bool = False) -> Any:
         return last_step(W)
 
     return polar_rotation
+
+
+@cache
+def local_function(precision: str) -> Any:
+    """The function (x, d, W) -> Q^T (x + d) - x: an edge's displacement d in the frame of a rotation Q = I + W.
+
+    Where a body has turned, d is as large as x and what remains small: they cancel in float64, in both precisions.
+    """
+    vec3 = scalars(precision).vec3
+    rounded, widened, _ = width_functions(precision)
+    add_transposed = fused("float64").add_transposed
+
+    @wp.func
+    def local_of(x: vec3, d: wp.vec3d, W: wp.mat33d):
+        return rounded(add_transposed(d, W, widened(x) + d))
+
+    return local_of
