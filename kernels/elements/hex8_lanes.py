@@ -14,7 +14,7 @@ from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
 from warp_mca.kernels.elements.patch import POINT, Patches, exponent_of, from_start
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
 from warp_mca.kernels.elements.rotation import local_function
-from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.hardware.scalars import THIRD, scalars, width_functions
 from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import keep_functions
@@ -155,7 +155,7 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
     """
     t = scalars(precision)
     R, mat33, mixed = t.real, t.mat33, precision == "mixed"
-    local_of = local_function(precision)
+    local_of, (_, widened) = local_function(precision), width_functions(precision)
     point = POINT[precision]
     _, _, load_corners = load_functions(precision)
     add_product = fused(precision).add_product
@@ -198,7 +198,9 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
         eta = wp.where(q > 1, R(1.0), R(-1.0))
         gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
-        lx0, lx1, ly0, ly1, lz = to_point_lines(local_of(x0, d0, wide), local_of(x1, d1, wide), xi, eta)
+        lx0, lx1, ly0, ly1, lz = to_point_lines(
+            local_of(widened(x0), d0, wide), local_of(widened(x1), d1, wide), xi, eta
+        )
         b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
         b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
         pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)

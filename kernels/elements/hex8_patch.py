@@ -25,7 +25,7 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
 from warp_mca.kernels.hardware.early_launch import begins_early
-from warp_mca.kernels.hardware.scalars import scalars, width_functions
+from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,
     HEADS,
@@ -46,10 +46,9 @@ wp.set_module_options({"enable_backward": False})
 def element_function(precision: str, law_name: str) -> Any:
     """The function that computes the element of a thread as if it were elastic, and lists it where it yields."""
     t = scalars(precision)
-    R, mat83, reads_again = t.real, t.mat83, precision == "mixed"
+    R, mat33, mat83, reads_again = t.real, t.mat33, t.mat83, precision == "mixed"
     plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
     _, element_rotation, local_displacement = frame_functions(precision)
-    _, _, rounded_matrix = width_functions(precision)
     _, load_displacements, _ = load_functions(precision)
     element_forces = small_strain_function(precision, "")
     _, keep_forces, _ = sum_functions(precision)
@@ -60,7 +59,8 @@ def element_function(precision: str, law_name: str) -> Any:
     def elastic_element(
         Xl: mat83,
         ul: mat83,
-        W: wp.mat33d,
+        W: mat33,
+        wide: wp.mat33d,
         pool: wp.array(dtype=wp.vec3d),
         corners: wp.vec4ui,
         first: int,
@@ -76,11 +76,10 @@ def element_function(precision: str, law_name: str) -> Any:
         """Whether the element begins to yield; its forces do not hold then."""
         G = R(scale) * law[m, 1]
         if wp.static(reads_again):
-            local = local_displacement(Xl, load_displacements(pool, corners, first), W)
+            local = local_displacement(Xl, load_displacements(pool, corners, first), wide)
         else:
-            local = local_displacement(Xl, ul, W)
-        frame = rounded_matrix(W)
-        f, largest = element_forces(Xl, local, frame, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
+            local = local_displacement(Xl, ul, wide)
+        f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
         yields = bool(False)
@@ -107,18 +106,18 @@ def element_function(precision: str, law_name: str) -> Any:
         listed_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=R),
     ):
-        W, J = element_rotation(Xl, ul)
+        W, wide, J = element_rotation(Xl, ul)
         keep_volume(e, R(1.0) - J, extreme_out)
         flows = bool(False)
         if wp.static(plastic):
             flows = yielded_out[e] != 0
         if not flows:
             flows = elastic_element(
-                Xl, ul, W, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
+                Xl, ul, W, wide, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
             )
         if wp.static(plastic):
             if flows:
-                list_element(W, lane, listed_out, force_out)
+                list_element(wide, lane, listed_out, force_out)
 
     return compute_element
 

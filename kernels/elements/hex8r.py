@@ -18,7 +18,7 @@ from warp_mca.kernels.elements.hourglass import VECTORS as HOURGLASS_VECTORS
 from warp_mca.kernels.elements.kinematics import kinematics
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, frame_functions, pattern_functions, pattern_sum_function
 from warp_mca.kernels.elements.point_records import history_functions, stress_function
-from warp_mca.kernels.hardware.scalars import scalars, width_functions
+from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 
@@ -123,7 +123,6 @@ def strain_function(precision: str, finite: bool) -> Any:
     load_element, load_wide = load_function(precision), load_function("float64")
     to_patterns, to_wide = pattern_sum_function(R), pattern_sum_function(wp.float64)
     rounded_patterns, mean_rotation, strain_in_frame = frame_functions(precision, finite)
-    _, _, rounded_matrix = width_functions(precision)
 
     @wp.func
     def strain_of_element(
@@ -131,9 +130,9 @@ def strain_function(precision: str, finite: bool) -> Any:
     ):
         x = to_patterns(load_element(X, conn, e))
         du = to_wide(load_wide(u, conn, e))
-        b, volume, W, J = mean_rotation(x, rounded_patterns(du))
-        H, q = strain_in_frame(x, du, b, volume, W)
-        return x, b, R(VOLUME_SCALE) * volume, rounded_matrix(W), H, J, q
+        b, volume, W, wide, S, J = mean_rotation(x, rounded_patterns(du))
+        H, q = strain_in_frame(x, du, b, volume, W, wide, S)
+        return x, b, R(VOLUME_SCALE) * volume, W, H, J, q
 
     return strain_of_element
 

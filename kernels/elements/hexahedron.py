@@ -144,14 +144,14 @@ def lines_of_point(g: int):
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any]:
     """Functions that take an element to its rotated frame.
 
-    (Displacements relative to the first node, rounded; its rotation as W = Q - I, and the ratio of volumes J at its
-    centre; local displacements.)
+    (Displacements relative to the first node, rounded; its rotation as W = Q - I, the same in float64, and the
+    ratio of volumes J at its centre; local displacements.)
     """
     t = scalars(precision)
     R, mat83, mat83d = t.real, t.mat83, scalars("float64").mat83
-    rounded, _, _ = width_functions(precision)
+    rounded, widened = width_functions(precision)
     edges, _ = line_functions(precision)
-    polar_rotation = nearest_rotation(precision, finite)
+    polar_rotation = nearest_rotation(precision, finite, exact=True)
     local_of = local_function(precision)
 
     @wp.func
@@ -177,13 +177,14 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any
         inverse = R(1.0) / wp.dot(c0, a0)
         grad = wp.outer(edge_sum(u, 0), a0) + wp.outer(edge_sum(u, 1), a1) + wp.outer(edge_sum(u, 2), a2)
         F = wp.identity(n=3, dtype=R) + inverse * grad
-        return polar_rotation(F), wp.determinant(F)
+        W, wide, _S = polar_rotation(F)
+        return W, wide, wp.determinant(F)
 
     @wp.func
     def local_displacement(X: mat83, u: mat83d, W: wp.mat33d):
         local = mat83()
         for a in range(1, 8):  # the first node is the origin of both
-            local[a] = local_of(X[a], u[a], W)
+            local[a] = local_of(widened(X[a]), u[a], W)
         return local
 
     return rounded_corners, element_rotation, local_displacement
@@ -272,7 +273,6 @@ def framed_function(precision: str, finite: bool = False) -> Any:
     """The function (X, u, conn, e) -> (corners, local displacements, frame W, ratio of volumes J at the centre)."""
     load_element, load_wide = load_function(precision), load_function("float64")
     rounded_corners, element_rotation, local_displacement = frame_functions(precision, finite)
-    _, _, rounded_matrix = width_functions(precision)
 
     @wp.func
     def load_in_frame(
@@ -280,7 +280,7 @@ def framed_function(precision: str, finite: bool = False) -> Any:
     ):
         Xl = load_element(X, conn, e)
         ul = load_wide(u, conn, e)
-        W, J = element_rotation(Xl, rounded_corners(ul))
-        return Xl, local_displacement(Xl, ul, W), rounded_matrix(W), J
+        W, wide, J = element_rotation(Xl, rounded_corners(ul))
+        return Xl, local_displacement(Xl, ul, wide), W, J
 
     return load_in_frame

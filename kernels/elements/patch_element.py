@@ -46,7 +46,7 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
     t = scalars(precision)
     R, vec3, mat83, mat83d, slots = t.real, t.vec3, t.mat83, scalars("float64").mat83, SLOTS[precision]
     point, mixed = POINT[precision], precision == "mixed"
-    rounded, _, _ = width_functions(precision)
+    rounded, _ = width_functions(precision)
 
     @wp.func
     def point_difference(

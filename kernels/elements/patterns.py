@@ -134,9 +134,9 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any]:
     """Functions that take an element to the frame of its mean deformation gradient.
 
-    (Patterns of displacements, rounded; mean gradients times volume, the volume, rotation W = Q - I, ratio of volumes
-    J; the mean displacement gradient H in the frame, and what it leaves of the sums over the patterns of hourglass
-    modes, one row for each.)
+    (Patterns of displacements, rounded; mean gradients times volume, the volume, what `rotation.nearest_rotation` gives,
+    ratio of volumes J; the mean displacement gradient H in the frame, and what it leaves of the sums over the patterns
+    of hourglass modes, one row for each.)
     What is left is eight times the amplitudes of docs/theory.md; forces are conjugate to these.
     """
     t = scalars(precision)
@@ -145,7 +145,7 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any
     mean_gradients, mean_gradient_of = mean_functions(precision)
     add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
     add_matrices = fused(precision).add_matrices
-    rounded, _, _ = width_functions(precision)
+    rounded, widened = width_functions(precision)
 
     @wp.func
     def rounded_patterns(wide: mat73d):
@@ -158,21 +158,22 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any
     def mean_rotation(x: mat73, du: mat73):
         b, volume = mean_gradients(x)
         F = wp.identity(n=3, dtype=R) + mean_gradient_of(du, b, volume)
-        return b, volume, polar_rotation(F), wp.determinant(F)
+        W, wide, S = polar_rotation(F)
+        return b, volume, W, wide, S, wp.determinant(F)
 
     @wp.func
-    def strain_of_local(x: mat73, du: mat73d, b: mat63, volume: R, W: wp.mat33d):
+    def strain_of_local(x: mat73, du: mat73d, b: mat63, volume: R, W: mat33, wide: wp.mat33d, S: mat33):
         local = mat73()
         for p in range(7):
-            local[p] = local_of(x[p], du[p], W)
+            local[p] = local_of(widened(x[p]), du[p], wide)
         H = mean_gradient_of(local, b, volume)
         q = mat43()
         for m in range(4):
             q[m] = add_product(local[3 + m], H, -x[3 + m])
-        return H, q
+        return H - S, q  # which q does not feel
 
     @wp.func
-    def turned_strain(x: mat73, du: mat73, b: mat63, volume: R, W: mat33):
+    def turned_strain(x: mat73, du: mat73, b: mat63, volume: R, W: mat33, wide: mat33, S: mat33):
         """The same in fewer operations, whose digits cancel."""
         H = mean_gradient_of(du, b, volume)
         q = mat43()

@@ -28,7 +28,7 @@ def gradient_function(precision: str, finite: bool) -> Any:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     polar_rotation, local_of = nearest_rotation(precision, finite), local_function(precision)
-    rounded, _, rounded_matrix = width_functions(precision)
+    rounded, _ = width_functions(precision)
     add_matrices, mixed = fused(precision).add_matrices, precision == "mixed"
 
     @wp.func
@@ -40,9 +40,12 @@ def gradient_function(precision: str, finite: bool) -> Any:
         X: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), u: wp.array(dtype=wp.vec3d), e: int
     ):
         n = conn[0, e]
-        d0 = rounded(X[conn[1, e]] - X[n])
-        d1 = rounded(X[conn[2, e]] - X[n])
-        d2 = rounded(X[conn[3, e]] - X[n])
+        x0 = X[conn[1, e]] - X[n]
+        x1 = X[conn[2, e]] - X[n]
+        x2 = X[conn[3, e]] - X[n]
+        d0 = rounded(x0)
+        d1 = rounded(x1)
+        d2 = rounded(x2)
         l0 = u[conn[1, e]] - u[n]
         l1 = u[conn[2, e]] - u[n]
         l2 = u[conn[3, e]] - u[n]
@@ -54,10 +57,11 @@ def gradient_function(precision: str, finite: bool) -> Any:
         H = gradient(rounded(l0), rounded(l1), rounded(l2), c0, c1, c2, inverse)
         F = wp.identity(n=3, dtype=R) + H
         J = wp.determinant(F)
-        Q = polar_rotation(F)
-        W = rounded_matrix(Q)
+        W, wide, S = polar_rotation(F)
         if wp.static(mixed):
-            H = gradient(local_of(d0, l0, Q), local_of(d1, l1, Q), local_of(d2, l2, Q), c0, c1, c2, inverse)
+            r0 = local_of(x0, l0, wide)
+            r1 = local_of(x1, l1, wide)
+            H = gradient(r0, r1, local_of(x2, l2, wide), c0, c1, c2, inverse) - S
         else:
             H = add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without the digits that would cancel
         rows = mat33(c0[0], c0[1], c0[2], c1[0], c1[1], c1[2], c2[0], c2[1], c2[2])

@@ -41,13 +41,13 @@ def scalars(precision: str) -> Scalars:
 
 
 @cache
-def width_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions: a vector of float64 in the scalars of `precision`; one of these in float64; a matrix as the first.
+def width_functions(precision: str) -> tuple[Any, Any]:
+    """Functions: a vector of float64 in the scalars of `precision`; one of these in float64.
 
     On a GPU, fast math would flush what is too small to zero as it rounds, in three instructions for each number.
     """
     t = scalars(precision)
-    vec3, mat33 = t.vec3, t.mat33
+    vec3 = t.vec3
     rounding = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
     on_gpu = f"#if defined(__CUDA_ARCH__)\n{rounding}\n#else\nreturn (float)value;\n#endif\n"
 
@@ -62,11 +62,4 @@ def width_functions(precision: str) -> tuple[Any, Any, Any]:
     def widened(a: vec3):
         return wp.vec3d(wp.float64(a[0]), wp.float64(a[1]), wp.float64(a[2]))
 
-    @wp.func
-    def rounded_matrix(A: wp.mat33d):
-        a = rounded(wp.vec3d(A[0, 0], A[0, 1], A[0, 2]))
-        b = rounded(wp.vec3d(A[1, 0], A[1, 1], A[1, 2]))
-        c = rounded(wp.vec3d(A[2, 0], A[2, 1], A[2, 2]))
-        return mat33(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
-
-    return rounded, widened, rounded_matrix
+    return rounded, widened
