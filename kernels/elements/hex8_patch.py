@@ -73,7 +73,10 @@ def element_function(precision: str, law_name: str) -> Any:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Whether the element begins to yield; its forces do not hold then."""
+        """Whether the element begins to yield; its forces do not hold then.
+
+        In mixed, displacements are read a second time: in float64 they would take registers from the rotation on.
+        """
         G = R(scale) * law[m, 1]
         if wp.static(reads_again):
             local = local_displacement(Xl, load_displacements(pool, corners, first), wide)
@@ -95,9 +98,8 @@ def element_function(precision: str, law_name: str) -> Any:
         ul: mat83,
         pool: wp.array(dtype=wp.vec3d),
         corners: wp.vec4ui,
+        head: wp.vec4i,
         first: int,
-        e: int,
-        m: int,
         lane: int,
         law: wp.array2d(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
@@ -106,6 +108,8 @@ def element_function(precision: str, law_name: str) -> Any:
         listed_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=R),
     ):
+        e = from_start(head[0] + lane)
+        m = material_of(corners[0], corners[1])
         W, wide, J = element_rotation(Xl, ul)
         keep_volume(e, R(1.0) - J, extreme_out)
         flows = bool(False)
@@ -179,8 +183,6 @@ def force_kernel(precision: str, law_name: str) -> Any:
         head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, kept_points, pool)
         k = int(0)
         while element_count(head) > 0:
-            e = from_start(head[0] + lane)
-            m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
             Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
             ul = rounded_corners(load_displacements(pool, corners, first))
@@ -192,7 +194,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
                 copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 compute_element(
-                    Xl, ul, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces
+                    Xl, ul, pool, corners, head, first, lane, law, yielded_out, history_out, extreme_out, listed, forces
                 )
             wait_for_copies()
             barrier()

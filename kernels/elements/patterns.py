@@ -134,7 +134,7 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any]:
     """Functions that take an element to the frame of its mean deformation gradient.
 
-    (Patterns of displacements, rounded; mean gradients times volume, the volume, what `rotation.nearest_rotation` gives,
+    (Patterns of displacements, rounded; mean gradients times volume, the volume, what `rotation.nearest_rotation` has,
     ratio of volumes J; the mean displacement gradient H in the frame, and what it leaves of the sums over the patterns
     of hourglass modes, one row for each.)
     What is left is eight times the amplitudes of docs/theory.md; forces are conjugate to these.
