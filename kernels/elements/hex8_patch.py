@@ -25,7 +25,7 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
 from warp_mca.kernels.hardware.early_launch import begins_early
-from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.scalars import scalars, width_functions
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,
     HEADS,
@@ -50,6 +50,7 @@ def element_function(precision: str, law_name: str) -> Any:
     plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
     _, element_rotation, local_displacement = frame_functions(precision)
     _, load_displacements, _ = load_functions(precision)
+    rounded, _ = width_functions(precision)
     element_forces = small_strain_function(precision, "")
     _, keep_forces, _ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
@@ -59,7 +60,6 @@ def element_function(precision: str, law_name: str) -> Any:
     def elastic_element(
         Xl: mat83,
         ul: mat83,
-        W: mat33,
         wide: wp.mat33d,
         pool: wp.array(dtype=wp.vec3d),
         corners: wp.vec4ui,
@@ -82,6 +82,9 @@ def element_function(precision: str, law_name: str) -> Any:
             local = local_displacement(Xl, load_displacements(pool, corners, first), wide)
         else:
             local = local_displacement(Xl, ul, wide)
+        W = mat33()  # from here on, so that it takes no registers before
+        for k in range(3):
+            W[k] = rounded(wide[k])
         f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
@@ -110,14 +113,14 @@ def element_function(precision: str, law_name: str) -> Any:
     ):
         e = from_start(head[0] + lane)
         m = material_of(corners[0], corners[1])
-        W, wide, J = element_rotation(Xl, ul)
+        _W, wide, J = element_rotation(Xl, ul)
         keep_volume(e, R(1.0) - J, extreme_out)
         flows = bool(False)
         if wp.static(plastic):
             flows = yielded_out[e] != 0
         if not flows:
             flows = elastic_element(
-                Xl, ul, W, wide, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
+                Xl, ul, wide, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
             )
         if wp.static(plastic):
             if flows:
