@@ -11,7 +11,7 @@ from impacts import SHORT_RANGES, Displaced, begun, figures, finished, momentum,
 
 import warp_mca as mca
 from warp_mca.geometry.face_projection import project, shape
-from warp_mca.model.model import nodal_masses
+from warp_mca.model.cells import nodal_masses
 from warp_mca.solve.solver import Solver
 
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
