@@ -44,7 +44,35 @@ class Knob:
 
 
 COARSE_LINK = {"axial_OA": 8}
-CHEAP = {**COARSE_LINK, "plate_absorbs": "ends"}
+CUT = {"plate_absorbs": "ends", "plate_length": 0.1, "plate_extension": 3}
+# Cells across and at the contact as in `quick`; along the rods as many as pins need.
+BY_HAND = {
+    "section": 6,
+    "ring": 3,
+    "axial_OA": 41,
+    "axial_AB": 38,
+    "focus_size": 0.45e-3,
+    "focus_layers": 5,
+    "plate_core_x": 10,
+    "plate_core_z": 6,
+    "plate_core_depth": 3,
+    "plate_layers": 8,
+    "plate_extension": 14,
+}
+FINEST = {
+    "section": 36,
+    "ring": 12,
+    "axial_OA": 110,
+    "axial_AB": 104,
+    "focus_size": 0.1e-3,
+    "focus_layers": 18,
+    "plate_core_x": 52,
+    "plate_core_z": 36,
+    "plate_core_depth": 15,
+    "plate_layers": 27,
+    "plate_extension": 52,
+}
+CHEAP = {**BY_HAND, **CUT, "fine_length": 0.027, "rod_section": 4, "rod_ring": 2}
 KNOBS = (
     Knob("none of them"),
     Knob("`--refine 0.7`", refine=0.7),
@@ -54,12 +82,16 @@ KNOBS = (
     Knob("`--multi-rate auto --mass-scaling 1.5`", mass_scaling=1.5, options={"multi_rate": "auto"}),
     Knob("far link coarser, `axial_OA=8`", COARSE_LINK),
     Knob("far link rigid, `rigid_bodies=OA`", {"rigid_bodies": "OA"}),
-    Knob("plate with absorbing ends, `plate_absorbs=ends`", {"plate_absorbs": "ends"}),
+    Knob("plate of 0.1 m with absorbing ends", CUT),
+    Knob("fine end of 27 mm tied to coarse rods", {"fine_length": 0.027, "rod_section": 6, "rod_ring": 3}),
     Knob("hinge, `joint_nodes=ends`", {"joint_nodes": "ends"}),
     Knob("hinge, `joint_nodes=axis`", {"joint_nodes": "axis"}),
     Knob("softer springs, `penalty=0.1`", {"penalty": 0.1}),
     Knob("springs chosen, `penalty=auto`", {"penalty": "auto"}),
-    Knob("far link coarser, absorbing ends, `--multi-rate auto`", CHEAP, options={"multi_rate": "auto"}),
+    Knob("mesh by hand", BY_HAND),
+    Knob("mesh by hand, `--multi-rate auto`", BY_HAND, options={"multi_rate": "auto"}),
+    Knob("mesh by hand, tied coarse rods, short plate", CHEAP),
+    Knob("mesh by hand, tied coarse rods, short plate, `--multi-rate auto`", CHEAP, options={"multi_rate": "auto"}),
 )
 
 
@@ -128,10 +160,11 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--only", nargs="+", default=[], help="parts of names of options; the first row is always run")
     parser.add_argument("-o", "--output", type=Path, help="JSON file that rows are added to")
+    parser.add_argument("--finest", action="store_true", help="compare with the finest mesh, of 978,000 elements")
     args = parser.parse_args()
     rows = []
-    for knob in KNOBS:
-        if knob is KNOBS[0] or not args.only or any(part in knob.name for part in args.only):
+    for knob in [Knob("none, finest mesh", FINEST), *KNOBS] if args.finest else KNOBS:
+        if not rows or not args.only or any(part in knob.name for part in args.only):
             rows.append(measure(knob, args.preset, args.device, args.duration, args.repeats))
             print(" | ".join(lines(rows)[-1]), flush=True)
             if args.output:
