@@ -139,7 +139,7 @@ def _laws(models: Sequence[Model]) -> NDArray[np.float64]:
     return np.concatenate([np.pad(model.law, ((0, 0), (0, width - model.law.shape[1]))) for model in models])
 
 
-def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
+def _tables(models: Sequence[Model]) -> dict[str, Any]:
     """Tables of driven axes, and the one of each axis."""
     entries = offsets([len(model.table_time) for model in models])
     tables = offsets([len(model.table_offset) - 1 for model in models])
