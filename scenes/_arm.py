@@ -112,7 +112,7 @@ def arm(
         v_plate: initial velocity of the plate along x [m/s].
         contact: parameters of the contact of tip and plate.
         joint_nodes, rigid_inertia: as `mca.Revolute` and `mca.RigidPhase` take them.
-        pin_radius: of hinges with "pin" [m]; None: half of the rods' radius.
+        pin_radius: of hinges with "pin" [m]; None: 0.75 of the rods' radius.
         impact: the impact phase.
         paths: lines along which stress is recorded.
         t_end: as in `mca.Scene`.
@@ -132,7 +132,7 @@ def arm(
     shapes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
     tied: dict[str, Any] = {"nodes": joint_nodes}
     if joint_nodes == "pin":
-        tied["pin_radius"] = 0.5 * radius if pin_radius is None else pin_radius
+        tied["pin_radius"] = 0.75 * radius if pin_radius is None else pin_radius
     hinges: list[dict[str, Any]] = [{"name": "O", "body": links[0], "at": (0.0, 0.0, 0.0)}]
     hinges += [
         {"name": outer[0], "body": link, "at": (length, 0.0, 0.0), "other": outer} for link, outer in pairwise(links)

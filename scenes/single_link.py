@@ -46,7 +46,7 @@ def build(
     pin_radius: Annotated[
         float | None,
         Param(
-            "reach of a pin around the axis, with joint_nodes=pin; None: half of radius",
+            "reach of a pin around the axis, with joint_nodes=pin; None: 0.75 radius",
             unit="m",
             low=0.0,
             exclusive=True,

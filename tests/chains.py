@@ -12,6 +12,7 @@ from warp_mca.model.model import build_model, nodal_masses
 from warp_mca.results.paths import locate
 from warp_mca.rigid.handback import HandBack, carriage_motion, hand_back
 from warp_mca.rigid.handoff import HandOff, hand_off
+from warp_mca.rigid.scene_chain import pin_radii
 from warp_mca.rigid.swing import Swing, swing_until
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.prepare import Prepared
@@ -76,7 +77,8 @@ def motion_at_end(found: Impact, end: float = START + SPAN) -> HandBack:
 
     positions, velocities = by_body(item.model.X + u), by_body(v)
     points = {name: mesh.points for name, mesh in item.meshes.items()}
-    carriage = carriage_motion(chain, end, points[names[0]], positions[names[0]], velocities[names[0]])
-    masses = nodal_masses(item.scene, item.meshes)
+    masses, base = nodal_masses(item.scene, item.meshes), names[0]
+    own = (points[base], masses[base], positions[base], velocities[base])
+    carriage = carriage_motion(chain, end, *own, pin_radii(item.scene)[0])
     near = chain.angles(item.start.theta)
     return hand_back(chain, points, masses, positions, velocities, near=near, t=end, carriage=carriage)

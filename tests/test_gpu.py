@@ -116,6 +116,21 @@ def test_hinges_and_driven_axes_beside_the_other_nodes_give_the_figures_of_the_c
     assert device.summary["energy"]["external_work"] == pytest.approx(work, rel=1e-7)
 
 
+def test_pins_give_the_motion_of_the_cpu_and_the_same_bits_twice():
+    from chains import impact
+    from test_pin import pinned
+
+    scene = pinned(theta_dot=(-3.0, 4.0))
+    host, device, again = (impact(scene, device=name) for name in ("cpu", "cuda:0", "cuda:0"))
+    for found in (host, device, again):
+        found.advance()
+    assert again.state.differences(device.state) == []
+    np.testing.assert_allclose(device.state.u.numpy(), host.state.u.numpy(), rtol=0.0, atol=1e-10)
+    place, turn = (getattr(host.state.couplings, name).numpy() for name in ("place", "orientation"))
+    np.testing.assert_allclose(device.state.couplings.place.numpy(), place, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(device.state.couplings.orientation.numpy(), turn, rtol=0.0, atol=1e-9)
+
+
 def test_elements_that_yield_are_listed_once_and_give_the_same_forces():
     scene = oblique()
     host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))

@@ -1,13 +1,23 @@
 """Hinges with pins: clusters of nodes around the axis keep one point and one axis, momentum, and energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from impacts import finished, momentum, result_of
+from chains import BASE, TORQUE, impact, motion_at_end, ready, rigid_end
+from chains import bars as bars_in_a_row
+from impacts import SHORT_RANGES, finished, momentum, prepared, result_of
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipj, ellipk
+from test_cycle import scene as cycling
 from test_joint import SOFT
+from test_joint_loads import ALL, SLIDE
 
 import warp_mca as mca
 from warp_mca.base.rotation import mean_pose
+from warp_mca.runs.cycle import begin_cycle, run_cycle
+from warp_mca.runs.parts import ImpactPart
+from warp_mca.runs.settings import Settings
 
 SIZE = (0.1, 0.02, 0.02)
 ORIGIN = (0.0, -0.01, -0.01)
@@ -72,3 +82,118 @@ def test_bars_on_a_pin_keep_momentum_angular_momentum_and_energy(other):
     end = model.node_start["b"]
     gained = momentum(impact, 0, end) - model.mass[:end] @ model.V[:end]
     assert result.summary["joint_impulse"]["A"] == pytest.approx(gained, abs=1e-14 * scale)
+
+
+def test_a_bar_on_a_ground_pin_is_a_pendulum():
+    """sin(phi / 2) = k sn(K(k) - t sqrt(m g d / I)) with k = sin(phi_0 / 2), from rest at the angle phi_0."""
+    gravity, angle = 2e3, 1.0
+    rotation = (0.0, 0.0, angle - 0.5 * np.pi)  # along -y, tilted to +x
+    scene = mca.Scene(
+        name="pendulum",
+        bodies=(bar("bar", (6, 4, 1), rotation=rotation),),
+        joints=(mca.Revolute(name="O", body="bar", at=(0.0, 0.0, 0.0), nodes="pin", pin_radius=0.008),),
+        gravity=(0.0, -gravity, 0.0),
+        impact=mca.ImpactPhase(duration=0.012, output_interval=1e-4),
+    )
+    impact = finished(scene, precision="float64")
+    result, mass = result_of(impact), impact.solver.model.mass
+    X, x = impact.solver.model.X, impact.solver.model.X + impact.state.u.numpy()
+    arm = mass @ X / mass.sum()
+    inertia = mass @ (X[:, :2] ** 2).sum(axis=1)
+    pace = np.sqrt(mass.sum() * gravity * np.linalg.norm(arm) / inertia)
+    t = result.summary["simulated_time"] + result.summary["dt"]
+    sine = np.sin(0.5 * angle) * ellipj(ellipk(np.sin(0.5 * angle) ** 2) - pace * t, np.sin(0.5 * angle) ** 2)[0]
+    middle = mass @ x / mass.sum()
+    assert np.arctan2(middle[0], -middle[1]) == pytest.approx(2.0 * np.arcsin(sine), abs=1e-3)
+    assert pace * t > 2.0  # it has swung to the other side
+    assert result.summary["energy_error"] < 1e-5
+    (place,) = impact.state.couplings.place.numpy()
+    assert place == pytest.approx(np.zeros(3), abs=1e-13)
+
+
+def pinned(**given):
+    """Bars in a row on pins, which go on from a rigid phase."""
+    scene = bars_in_a_row(**given)
+    return replace(scene, joints=tuple(replace(joint, nodes="pin", pin_radius=0.012) for joint in scene.joints))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{}, {"torques": (TORQUE,)}, {"joint_friction": (0.2, 0.1)}, {"base_motion": BASE}, {"slide": SLIDE}, ALL],
+    ids=["free", "torque", "friction", "base", "slide", "all"],
+)
+def test_pins_go_on_as_the_rigid_phase_would(given):
+    found = impact(pinned(theta_dot=(-3.0, 4.0), **given))
+    found.advance()
+    begin, ledger = found.ready[0].start, found.scene_runs[0].ledger
+    end, back = rigid_end(begin), motion_at_end(found)
+    near = 1e-4 * np.abs(end.theta_dot).max()
+    np.testing.assert_allclose(back.theta_dot, end.theta_dot, rtol=0.0, atol=near)
+    assert ledger.exchange_error < 1e-6
+
+
+def test_a_stored_state_with_pins_goes_on_to_the_same_bits(tmp_path):
+    whole, paused, fresh = (impact(pinned()) for _ in range(3))
+    whole.advance()
+    paused.advance(until=123)
+    paused.save(tmp_path / "state")
+    fresh.load(tmp_path / "state")
+    fresh.advance()
+    assert fresh.state.differences(whole.state) == []
+    assert np.abs(whole.state.couplings.orientation.numpy()[..., 2]).max() > 1e-3
+
+
+def test_threads_give_the_same_bits_with_pins(monkeypatch):
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)
+    one, two = (impact(pinned(elements=40), threads=threads) for threads in (1, 2))
+    assert two.solver.threads == 2
+    for found in (one, two):
+        found.advance(until=60)
+    assert two.state.differences(one.state) == []
+
+
+def test_scenes_side_by_side_give_what_each_gives_alone():
+    scenes = [pinned(theta_dot=rates) for rates in ((-3.0, 4.0), (1.0, 2.0))]
+    both, alone = impact(*scenes), [impact(scene) for scene in scenes]
+    for found in (both, *alone):
+        found.solver.step(found.state, 50)
+    v = np.concatenate([found.state.v.numpy() for found in alone])
+    np.testing.assert_allclose(both.state.v.numpy(), v, rtol=0.0, atol=1e-13)
+
+
+def test_permanent_shapes_keep_their_hinges_from_impact_to_impact():
+    """A three-link arm strikes twice: momenta pass from phase to phase, and no pin pulls before the second touch."""
+    scene = cycling("three_link", joint_nodes="pin", pin_radius=0.008, rigid_inertia="mesh")
+    setup = begin_cycle(scene, None, 1.5e-3, Settings("cpu", "float64", 1), lambda stage, done: None)
+    impacts = [part for part in run_cycle(setup) if isinstance(part, ImpactPart)]
+    assert len(impacts) == 2
+    for part in impacts:
+        assert part.back is not None
+        rigid, nodes = part.back.momenta
+        assert rigid == pytest.approx(nodes, abs=1e-14 * np.abs(nodes).max())
+        assert part.impact.scene_runs[0].ledger.exchange_error < 1e-4
+    assert impacts[1].jump == pytest.approx(0.0, abs=1e-14)
+
+
+def test_what_pins_cannot_do_is_refused():
+    scene = bars()
+    (pin,) = scene.joints
+    for change, words in (
+        ({"pin_radius": None}, r"pin_radius = None: give the radius of the pin"),
+        ({"pin_radius": -1.0}, r"pin_radius = -1.0: give a finite number above 0"),
+        ({"nodes": "axis"}, r'pin_radius = 0.008: it needs nodes="pin"; leave it out'),
+        ({"nodes": "ball"}, r"nodes = 'ball': choose axis, ends or pin"),
+    ):
+        with pytest.raises(mca.RequestError, match=words):
+            replace(pin, **change)
+    for change, words in (
+        ({"pin_radius": 0.001}, r"Revolute A.pin_radius = 0.001: 3 nodes of a lie within it, on one line"),
+        ({"other_at": (0.0, 0.001, 0.0)}, r"Revolute A.at = .*: it is 0.001 m from other_at"),
+    ):
+        with pytest.raises(mca.RequestError, match=words):
+            prepared(replace(scene, joints=(replace(pin, **change),)))
+    with pytest.raises(mca.RequestError, match=r"a node is tied twice"):
+        prepared(replace(scene, joints=(pin, replace(pin, name="B"))))
+    with pytest.raises(mca.RequestError, match=r"Slide.carriage_mass = 0.0: a pin needs a carriage with mass"):
+        ready(pinned(slide=replace(SLIDE, carriage_mass=0.0)))

@@ -21,7 +21,8 @@ class Bases:
     """The movable bases of a model.
 
     Attributes:
-        begin, end: pairs of each base in `Bonds.first`, shape (base_count,), int32.
+        begin, end: pairs of each base in `Bonds.first`, none for a hinge with a pin, shape (base_count,), int32.
+        coupling: that hangs on each base, -1 without, shape (base_count,), int32.
         direction: e of each slide [-], shape (base_count,), vec3d.
         mass: of each carriage [kg], shape (base_count,), float64.
         gravity: on it [m/s^2], shape (base_count,), vec3d.
@@ -31,6 +32,7 @@ class Bases:
 
     begin: wp.array(dtype=wp.int32)
     end: wp.array(dtype=wp.int32)
+    coupling: wp.array(dtype=wp.int32)
     direction: wp.array(dtype=wp.vec3d)
     mass: wp.array(dtype=wp.float64)
     gravity: wp.array(dtype=wp.vec3d)
@@ -53,6 +55,7 @@ def move_bases(
     bases: Bases,
     node: wp.array(dtype=wp.int32),
     mass: wp.array(dtype=wp.float64),
+    latest: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
     u_out: wp.array(dtype=wp.vec3d),
     v_out: wp.array(dtype=wp.vec3d),
@@ -66,6 +69,7 @@ def move_bases(
 ):
     """Advance each carriage, and the nodes `node` of its ground hinge, once `bound_kernel` has advanced them as free.
 
+    latest: impulse of each coupling on its first cluster in this step [N s], which its base gave; empty without.
     carriage_out: velocities of the carriages. work_out, work_after_out and clock_out are those of driven nodes, see
     `constraint.drive`, for the reaction across e; the work of the carriage's weight is in them. kinetic_out takes the
     kinetic energy of each carriage at t(n) [J], as `ledger.record_motion` has that of nodes.
@@ -82,9 +86,14 @@ def move_bases(
         i = node[pair]
         momentum += mass[i] * v_out[i]
         total += mass[i]
+    share = wp.float64(0.0)
+    if bases.coupling[k] >= 0:
+        momentum -= latest[bases.coupling[k]]
+    if total > wp.float64(0.0):
+        share = wp.dot(e, momentum) / total
     b = base_velocity(bases, k, t)
     across = b - wp.dot(e, b) * e
-    v = across + (wp.dot(e, momentum) / total) * e
+    v = across + share * e
     b = base_velocity(bases, k, t - dt)
     across_before = b - wp.dot(e, b) * e
     impulse = total * v - momentum

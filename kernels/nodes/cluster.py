@@ -18,6 +18,7 @@ in `kernels.nodes.slide`. What one linear solve leaves of order (dt w)^2 is made
 
 import warp as wp
 
+from warp_mca.kernels.nodes.base import Bases, base_velocity
 from warp_mca.kernels.nodes.coupling import Response, inertia_about, joint_impulses, sum_of, turned
 from warp_mca.kernels.records.extremes import keep_speed
 
@@ -37,7 +38,7 @@ class Clusters:
             (coupling_count,), vec3i; the second is empty for the ground.
         node: those of each cluster, shape (pair_count,), int32.
         weight: s_i of each of these [-], shape (pair_count,), float64.
-        place: of each joint at the start [m], shape (coupling_count,), vec3d.
+        base: that each joint hangs on, -1 without, shape (coupling_count,), int32; empty where none moves or slides.
         axis: of each hinge at the start, a unit vector [-], shape (coupling_count,), vec3d.
         arm: from the mean position of the first and the second cluster to the joint at the start [m], shape
             (coupling_count, 2), vec3d.
@@ -46,7 +47,7 @@ class Clusters:
     begin: wp.array(dtype=wp.vec3i)
     node: wp.array(dtype=wp.int32)
     weight: wp.array(dtype=wp.float64)
-    place: wp.array(dtype=wp.vec3d)
+    base: wp.array(dtype=wp.int32)
     axis: wp.array(dtype=wp.vec3d)
     arm: wp.array2d(dtype=wp.vec3d)
 
@@ -173,6 +174,18 @@ def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
 
 
 @wp.func
+def point_ahead(mean: Mean, q: wp.quatd, arm: wp.vec3d, dt: wp.float64) -> wp.vec3d:
+    """Where a cluster or the ground, turned by q, carries the joint after the step, from the place where it was [m]."""
+    return mean.centre + dt * mean.velocity + wp.quat_rotate(turned(q, dt * mean.spin), arm)
+
+
+@wp.func
+def axis_ahead(mean: Mean, q: wp.quatd, axis: wp.vec3d, dt: wp.float64) -> wp.vec3d:
+    """Direction of the hinge's axis after the step, as a cluster or the ground carries it."""
+    return wp.quat_rotate(turned(q, dt * mean.spin), axis)
+
+
+@wp.func
 def pull(
     begin: int,
     end: int,
@@ -200,11 +213,37 @@ def pull(
         keep_speed(i, v_out[i], speed_square_out)
 
 
+@wp.func
+def ground_motion(
+    j: int,
+    clusters: Clusters,
+    bases: Bases,
+    carriage: wp.array(dtype=wp.vec3d),
+    clock: wp.array(dtype=wp.int32),
+    dt: wp.float64,
+) -> Mean:
+    """Motion of the ground or the base that joint j hangs on, without the joint's impulse."""
+    found = Mean()
+    if clusters.base.shape[0] > 0:
+        k = clusters.base[j]
+        if k >= 0:
+            e = bases.direction[k]
+            b = base_velocity(bases, k, (wp.float64(clock[k]) + wp.float64(0.5)) * dt)
+            free = carriage[k] + dt * bases.gravity[k]
+            found.velocity = b + wp.dot(e, free - b) * e
+            if bases.mass[k] > wp.float64(0.0):
+                found.response.point = wp.outer(e, e) / bases.mass[k]
+    return found
+
+
 @wp.kernel(enable_backward=False)
 def couple(
     clusters: Clusters,
+    bases: Bases,
     X: wp.array(dtype=wp.vec3d),
     mass: wp.array(dtype=wp.float64),
+    carriage: wp.array(dtype=wp.vec3d),
+    clock: wp.array(dtype=wp.int32),
     dt: wp.float64,
     u_out: wp.array(dtype=wp.vec3d),
     v_out: wp.array(dtype=wp.vec3d),
@@ -212,11 +251,13 @@ def couple(
     impulse_out: wp.array(dtype=wp.vec3d),
     place_out: wp.array(dtype=wp.vec3d),
     orientation_out: wp.array2d(dtype=wp.quatd),
+    latest_out: wp.array(dtype=wp.vec3d),
 ):
     """Join the clusters of each coupling, once `constraint.bound_kernel` has advanced their nodes as free ones.
 
     A block of threads for each coupling. impulse_out [N s] sums J at the first node of the first cluster. place_out
-    follows the joint, orientation_out the mean rotation of both clusters.
+    follows the joint, where the ground or a base holds it exactly; orientation_out the mean rotation of both clusters.
+    latest_out takes J where some base moves or slides; `bases`, `carriage` and `clock` are as in `base.move_bases`.
     """
     j, lane = wp.tid()
     begin = clusters.begin[j]
@@ -224,22 +265,14 @@ def couple(
     q_a = orientation_out[j, 0]
     q_b = orientation_out[j, 1]
     total = cluster_sums(begin[0], begin[1], lane, place, clusters, X, mass, u_out, v_out, dt)
-    arm_a = wp.quat_rotate(q_a, clusters.arm[j, 0])
-    P = wp.vec3d(total[1], total[2], total[3]) / total[0] + arm_a
+    P = wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(q_a, clusters.arm[j, 0])
     a = mean_motion(total, P)
-    ahead = turned(q_a, dt * a.spin)
-    gap = a.centre + dt * a.velocity + wp.quat_rotate(ahead, clusters.arm[j, 0])
-    axis = wp.quat_rotate(ahead, clusters.axis[j])
-    b = Mean()
+    b = ground_motion(j, clusters, bases, carriage, clock, dt)
     if begin[2] > begin[1]:
         total = cluster_sums(begin[1], begin[2], lane, place, clusters, X, mass, u_out, v_out, dt)
         b = mean_motion(total, P)
-        ahead = turned(q_b, dt * b.spin)
-        gap -= b.centre + dt * b.velocity + wp.quat_rotate(ahead, clusters.arm[j, 1])
-        tilt = wp.cross(wp.quat_rotate(ahead, clusters.axis[j]), axis)
-    else:
-        gap -= clusters.place[j] - place
-        tilt = wp.cross(clusters.axis[j], axis)
+    gap = point_ahead(a, q_a, clusters.arm[j, 0], dt) - point_ahead(b, q_b, clusters.arm[j, 1], dt)
+    tilt = wp.cross(axis_ahead(b, q_b, clusters.axis[j], dt), axis_ahead(a, q_a, clusters.axis[j], dt))
     d = wp.quat_rotate(q_a, clusters.axis[j])
     held = wp.identity(3, dtype=wp.float64) - wp.outer(d, d)
     J, T = joint_impulses(sum_of(a.response, b.response), gap / dt, tilt / dt, held)
@@ -251,10 +284,15 @@ def couple(
         pull(begin[1], begin[2], lane, place, b, -J, outer, clusters, X, dt, u_out, v_out, speed_square_out)
     # fmt: on
     if lane == 0:
+        if latest_out.shape[0] > 0:
+            latest_out[j] = J
         spin = a.spin + wp.transpose(a.response.mixed) * J + a.response.turn * T
         v = a.velocity + wp.cross(a.spin, arm_P) + a.response.point * J + a.response.mixed * T
         orientation_out[j, 0] = turned(q_a, dt * spin)
         spin = b.spin - wp.transpose(b.response.mixed) * J - b.response.turn * T
         orientation_out[j, 1] = turned(q_b, dt * spin)
+        if begin[2] == begin[1]:
+            v = b.velocity - b.response.point * J
+            P = wp.vec3d()
         place_out[j] = place + P + dt * v
         impulse_out[begin[0]] = impulse_out[begin[0]] + J

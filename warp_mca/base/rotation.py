@@ -43,3 +43,18 @@ def mean_pose(points: Array, X: Array, weights: Array) -> tuple[Array, Array, Ar
     """
     a, b = weights @ points / weights.sum(), weights @ X / weights.sum()
     return a, b, best_rotation(points - a, X - b, weights)
+
+
+def point_velocity(x: Array, v: Array, weights: Array, point: Array) -> Array:
+    """Velocity of a point that moves with the mean motion of a cluster [m/s], shape (3,), float64.
+
+    Args:
+        x, v: positions [m] and velocities [m/s] of the nodes, shape (count, 3), float64.
+        weights: shape (count,), float64.
+        point: [m], shape (3,), float64.
+    """
+    centre = weights @ x / weights.sum()
+    r = x - centre
+    moment = (weights[:, None] * r).T @ r
+    spin = np.linalg.solve(np.trace(moment) * np.eye(3) - moment, weights @ np.cross(r, v))
+    return np.asarray(weights @ v / weights.sum() + np.cross(spin, point - centre), dtype=np.float64)

@@ -130,6 +130,11 @@ def _tables(models: Sequence[Model]) -> dict[str, NDArray]:
 def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, Any]:
     """Joints of all scenes, and what acts in them: first nodes and first pairs of each scene are given."""
     scenes = [(k, model, nodes[k], int(pairs[k])) for k, model in enumerate(models)]
+    couplings = offsets([len(model.couplings) for model in models])
+
+    def shifted(k: int, coupling: int) -> int:
+        return coupling if coupling < 0 else coupling + int(couplings[k])
+
     return {
         "joints": tuple(
             replace(joint, start=joint.start + first, end=joint.end + first)
@@ -147,7 +152,7 @@ def _joints(models: Sequence[Model], nodes: Index, pairs: Index) -> dict[str, An
             for load in model.hinge_loads
         ),
         "bases": tuple(
-            replace(base, start=base.start + first, end=base.end + first, scene=k)
+            replace(base, start=base.start + first, end=base.end + first, coupling=shifted(k, base.coupling), scene=k)
             for k, model, _, first in scenes
             for base in model.bases
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.constraints import JointPairs
+from warp_mca.model.couplings import Coupling
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain, Vec2
@@ -54,6 +56,7 @@ class MovableBase:
 
     Attributes:
         start, end: its nodes are those of the pairs [start, end) of `Model.joint_first`.
+        coupling: place in `Model.couplings` of its hinge with a pin, -1 without.
         direction: of the slide, a unit vector [-], shape (3,), float64; 0 where it does not slide.
         carriage_mass: [kg].
         times: of the base's motion, from the start of the phase [s], shape (count,), float64.
@@ -67,6 +70,7 @@ class MovableBase:
     carriage_mass: float
     times: Array
     velocities: Array
+    coupling: int = -1
     scene: int = 0
 
 
@@ -131,16 +135,20 @@ def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> I
 
 
 def movable_bases(
-    parts: Assembly, joints: tuple[JointPairs, ...], chain: Chain | None, start: float
+    parts: Assembly, joints: tuple[JointPairs, ...], couplings: Sequence[Coupling], chain: Chain | None, start: float
 ) -> tuple[MovableBase, ...]:
-    """The chain's base, if it moves or slides, for a phase that starts so long after the release [s]."""
+    """The chain's base, if it moves or slides, for a phase that starts so long after the release [s].
+
+    Raises:
+        RequestError: a carriage without mass carries a pin.
+    """
     table = None if chain is None or chain.loads is None else chain.loads.base_velocity
     if chain is None or (table is None and chain.slide is None):
         return ()
-    ((pairs, joint),) = [own for own in zip(joints, parts.scene.joints, strict=True) if own[1].other is None]
-    if getattr(joint, "pin_radius", None) is not None:
-        remedy = "a base that moves or slides holds nodes on the hinge's axis; choose axis or ends for this hinge"
-        raise bad_value(f"{joint.title}.nodes", "pin", remedy)
+    (pairs,) = [own for own, joint in zip(joints, parts.scene.joints, strict=True) if joint.other is None]
+    coupling = next((k for k, item in enumerate(couplings) if item.start == pairs.start), -1)
+    if coupling >= 0 and chain.slide is not None and chain.carriage_mass == 0.0:
+        raise bad_value("Slide.carriage_mass", 0.0, "a pin needs a carriage with mass; give one, or tie nodes=axis")
     times, velocities = _shifted(table, start, np.zeros((1, 2)))
     direction = np.zeros(3) if chain.slide is None else np.array([*chain.slide, 0.0])
     return (
@@ -151,5 +159,6 @@ def movable_bases(
             carriage_mass=chain.carriage_mass,
             times=times,
             velocities=velocities,
+            coupling=coupling,
         ),
     )

@@ -17,7 +17,7 @@ from warp_mca.model.contact_checks import check_spacing
 from warp_mca.model.couplings import Coupling
 from warp_mca.model.joint_loads import HingeLoad, MovableBase, hinge_loads, movable_bases
 from warp_mca.model.layout import Layout
-from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.model.rigid_rows import RigidPin, RigidRow
 from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.stable_step import StableStep
@@ -250,7 +250,8 @@ def build_model(
     parts = Assembly(scene, meshes, X)
     others = [parts.node_start[body] + node for body, node in watched]
     pairs, joints, couplings = join_bodies(parts)
-    bases = movable_bases(parts, joints, chain, start)
+    soft = flexible(couplings, pairs, own_nodes(parts))
+    bases = movable_bases(parts, joints, soft, chain, start)
     check_loads(scene, chain, bases)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
@@ -271,7 +272,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
-        couplings=flexible(couplings, pairs, rigid.bodies),
+        couplings=soft,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs), chain, start),
         bases=bases,
         passes=passes,

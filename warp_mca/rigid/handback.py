@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.rotation import mean_pose
+from warp_mca.base.rotation import mean_pose, point_velocity
 from warp_mca.rigid.body_motion import BodyMotion, body_motion
 from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, mesh_link, perpendicular
 from warp_mca.rigid.placement import Placement, link_placements
@@ -108,21 +108,37 @@ def hand_back(
     )
 
 
-def carriage_motion(chain: Chain, t: float, points: Array, positions: Array, velocities: Array) -> Vec2:
+def carriage_motion(
+    chain: Chain, t: float, points: Array, masses: Array, positions: Array, velocities: Array, pin: float = 0.0
+) -> Vec2:
     """Way [m] and velocity [m/s] of the carriage along its slide, from the nodes that it carries; 0 without a slide.
 
     Args:
         chain: with base and slide as at the release.
         t: time from release [s].
         points: of the first link in its body's frame, without deformation [m], shape (node_count, 3), float64.
+        masses: lumped masses of its nodes [kg], shape (node_count,), float64.
         positions, velocities: of its nodes in the world [m], [m/s], shape (node_count, 3), float64.
+        pin: radius of the pin on the carriage [m], 0 where nodes on the axis are tied.
     """
     if chain.slide is None:
         return (0.0, 0.0)
-    on_axis, placed, e = _on_axis(points, np.asarray(chain.links[0].hinge_in)), chain.moved_to(t), np.array(chain.slide)
-    way = positions[on_axis, :2].mean(axis=0) - np.asarray(placed.origin)
-    rate = velocities[on_axis, :2].mean(axis=0) - np.asarray(placed.origin_velocity)
+    hinge, placed, e = np.asarray(chain.links[0].hinge_in), chain.moved_to(t), np.array(chain.slide)
+    if pin > 0.0:
+        point, weights = _carried(points, positions, masses, hinge, pin)
+        velocity = point_velocity(positions, velocities, weights, point)
+    else:
+        on_axis = _on_axis(points, hinge)
+        point, velocity = positions[on_axis].mean(axis=0), velocities[on_axis].mean(axis=0)
+    way, rate = point[:2] - np.asarray(placed.origin), velocity[:2] - np.asarray(placed.origin_velocity)
     return (float(way @ e), float(rate @ e))
+
+
+def _carried(points: Array, positions: Array, masses: Array, hinge: Array, pin: float) -> tuple[Array, Array]:
+    """Where a pin's nodes carry a hinge along z [m], shape (3,), and their weights [kg], shape (node_count,)."""
+    weights = masses * pin_weights(points, (float(hinge[0]), float(hinge[1]), 0.0), (0.0, 0.0, 1.0), pin)
+    centre, moved, R = mean_pose(points, positions, weights)
+    return moved + R @ (np.append(hinge, centre[2]) - centre), weights
 
 
 def deformed_chain(
@@ -161,10 +177,7 @@ def _moved(reference: Array, points: Array, masses: Array, hinge: Array, pin: fl
     That of a pin is that of the axis which follows the mean motion of the nodes around it.
     """
     if pin > 0.0:
-        weights = masses * pin_weights(reference, (float(hinge[0]), float(hinge[1]), 0.0), (0.0, 0.0, 1.0), pin)
-        centre, moved, R = mean_pose(reference, points, weights)
-        arm = np.append(hinge, centre[2]) - centre
-        return np.asarray((moved + R @ arm)[:2] - hinge, dtype=np.float64)
+        return _carried(reference, points, masses, hinge, pin)[0][:2] - hinge
     on_axis = _on_axis(reference, hinge)
     return (points - reference)[on_axis, :2].mean(axis=0) if on_axis.any() else np.zeros(2)
 

@@ -82,14 +82,14 @@ def _fit(
         rest: positions in equilibrium [m].
     """
     points = {name: setup.meshes[name].points for name in now}
-    base = setup.chain.links[0].body
-    carriage = carriage_motion(setup.chain, t, points[base], now[base], velocities[base])
+    base, pins = setup.chain.links[0].body, pin_radii(setup.scene)
+    carriage = carriage_motion(setup.chain, t, points[base], setup.masses[base], now[base], velocities[base], pins[0])
     near = setup.chain.angles(before.theta)
     common = {"near": near, "held": setup.held, "t": t, "carriage": carriage}
     still = {name: np.zeros_like(x) for name, x in rest.items()}
     shapes = hand_back(setup.chain, points, setup.masses, rest, still, **common).displacements
     deformed = {name: points[name] + shapes[name] for name in points}
-    chain = deformed_chain(setup.chain, points, deformed, setup.masses, pin_radii(setup.scene))
+    chain = deformed_chain(setup.chain, points, deformed, setup.masses, pins)
     return shapes, hand_back(chain, deformed, setup.masses, now, velocities, **common)
 
 

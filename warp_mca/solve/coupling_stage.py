@@ -13,6 +13,7 @@ from warp_mca.kernels.nodes import cluster
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.solve.constraint_stage import ConstraintStage
+    from warp_mca.solve.load_stage import LoadStage
     from warp_mca.solve.stage import Step
     from warp_mca.solve.workspace import Workspace
 
@@ -40,10 +41,12 @@ class CouplingStage:
         count: number of couplings.
     """
 
-    def __init__(self, model: Model, work: Workspace, constraints: ConstraintStage, dt: float) -> None:
+    def __init__(
+        self, model: Model, work: Workspace, constraints: ConstraintStage, loads: LoadStage, dt: float
+    ) -> None:
         """Allocate on the current device."""
         self.items, self.count = model.couplings, len(model.couplings)
-        self.work, self.dt = work, dt
+        self.work, self.loads, self.dt = work, loads, dt
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
@@ -54,7 +57,10 @@ class CouplingStage:
         self.clusters.begin = wp.array([(item.start, item.middle, item.end) for item in self.items], dtype=wp.vec3i)
         self.clusters.node = constraints.bonds.first
         self.clusters.weight = wp.array(weight, dtype=wp.float64)
-        self.clusters.place = wp.array([item.place for item in self.items], dtype=wp.vec3d)
+        base = np.full(self.count, -1)
+        for k, item in enumerate(model.bases):
+            base[item.coupling] = k if item.coupling >= 0 else base[item.coupling]
+        self.clusters.base = wp.array(base if (base >= 0).any() else base[:0], dtype=wp.int32)
         self.clusters.axis = wp.array([item.axis for item in self.items], dtype=wp.vec3d)
         self.clusters.arm = wp.array(np.array([item.arm for item in self.items]), dtype=wp.vec3d)
 
@@ -74,6 +80,8 @@ class CouplingStage:
     def couple(self, step: Step) -> None:
         """Join the clusters, once all their nodes have moved as free ones."""
         state, own = step.state, step.state.couplings
-        inputs = [self.clusters, self.work.X, self.work.mass, self.dt]
+        inputs = [self.clusters, self.loads.device_bases, self.work.X, self.work.mass]
+        inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse, own.place, own.orientation]
+        outputs.append(self.loads.latest)
         wp.launch(cluster.couple, (self.count, self.lanes), inputs=inputs, outputs=outputs, block_dim=BLOCK)

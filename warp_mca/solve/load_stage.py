@@ -10,11 +10,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.rotation import point_velocity
 from warp_mca.kernels.nodes import base, joint_torque
 from warp_mca.kernels.records import loads
 from warp_mca.model.layout import offsets
 
 if TYPE_CHECKING:
+    from warp_mca.model.joint_loads import MovableBase
     from warp_mca.model.model import Model
     from warp_mca.solve.constraint_stage import ConstraintStage
     from warp_mca.solve.stage import Step
@@ -55,6 +57,15 @@ def _firsts(items: Sequence[Any], scenes: int) -> wp.array:
     return wp.array(np.searchsorted([item.scene for item in items], np.arange(scenes + 1)), dtype=wp.int32)
 
 
+def _hinge_velocity(model: Model, item: MovableBase) -> NDArray[np.float64]:
+    """Velocity of the hinge on a base at the start of the phase [m/s], shape (3,)."""
+    if item.coupling < 0:
+        return model.V[model.joint_first[item.start]]
+    own = model.couplings[item.coupling]
+    nodes = model.joint_first[own.start : own.middle]
+    return point_velocity(model.X[nodes], model.V[nodes], own.weight[: len(nodes)] * model.mass[nodes], own.place)
+
+
 def _joined(parts: Sequence[NDArray], dtype: Any) -> wp.array:
     return wp.array(np.concatenate([np.zeros(0), *parts]), dtype=dtype)
 
@@ -64,6 +75,7 @@ class LoadStage:
 
     Attributes:
         hinges, bases: of the model.
+        latest: impulse of each coupling in this step [N s], shape (coupling_count,), vec3d; empty without pinned bases.
     """
 
     def __init__(self, model: Model, scenes: int, work: Workspace, constraints: ConstraintStage, dt: float) -> None:
@@ -71,6 +83,7 @@ class LoadStage:
         self.hinges, self.bases, self.scenes = model.hinge_loads, model.bases, scenes
         self.work, self.constraints, self.dt = work, constraints, dt
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
+        self.device_bases, self.latest = base.Bases(), wp.zeros(0, dtype=wp.vec3d)
         if not (self.hinges or self.bases):
             return
         self.first_hinge, self.first_base = _firsts(self.hinges, scenes), _firsts(self.bases, scenes)
@@ -90,9 +103,14 @@ class LoadStage:
         self.loads.torques = _joined([item.torques for item in items], wp.float64)
 
     def _make_bases(self, model: Model) -> None:
-        items, found = self.bases, base.Bases()
+        items, found = self.bases, self.device_bases
+        pinned = [item.coupling >= 0 for item in items]
         found.begin = wp.array([item.start for item in items], dtype=wp.int32)
-        found.end = wp.array([item.end for item in items], dtype=wp.int32)
+        found.end = wp.array(
+            [item.start if own else item.end for item, own in zip(items, pinned, strict=True)], dtype=wp.int32
+        )
+        found.coupling = wp.array([item.coupling for item in items], dtype=wp.int32)
+        self.latest = wp.zeros(len(model.couplings) if any(pinned) else 0, dtype=wp.vec3d)
         found.direction = wp.array([item.direction for item in items], dtype=wp.vec3d)
         found.mass = wp.array([item.carriage_mass for item in items], dtype=wp.float64)
         found.gravity = wp.array([model.gravity[item.scene] for item in items], dtype=wp.vec3d)
@@ -101,8 +119,8 @@ class LoadStage:
         found.v_x = _joined([item.velocities[:, 0] for item in items], wp.float64)
         found.v_y = _joined([item.velocities[:, 1] for item in items], wp.float64)
         # half a step before the start, as `Solver.start` takes the nodes there
-        start = [model.V[model.joint_first[item.start]] - 0.5 * self.dt * model.gravity[item.scene] for item in items]
-        self.device_bases, self.start_velocities = found, np.array(start).reshape(-1, 3)
+        start = [_hinge_velocity(model, item) - 0.5 * self.dt * model.gravity[item.scene] for item in items]
+        self.start_velocities = np.array(start).reshape(-1, 3)
 
     def new_state(self) -> LoadState:
         """State before the first step, on the current device."""
@@ -134,7 +152,7 @@ class LoadStage:
     def move_bases(self, step: Step) -> None:
         """Nodes of ground hinges that move, once all of them have moved as free ones, and their carriages."""
         state, own = step.state, step.state.loads
-        inputs = [self.device_bases, self.constraints.bonds.first, self.work.mass, self.dt]
+        inputs = [self.device_bases, self.constraints.bonds.first, self.work.mass, self.latest, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse]
         outputs += [own.carriage, own.base_work, own.base_work_after, own.base_clock, self.kinetic]
         wp.launch(base.move_bases, len(self.bases), inputs=inputs, outputs=outputs)

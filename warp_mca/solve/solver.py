@@ -94,8 +94,8 @@ class Solver:
             for stage in self.elements:
                 stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
-        self.couplings = CouplingStage(model, self.work, self.constraints, self.dt)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, self.dt)
+        self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, self.dt)
         self.rigid = RigidStage(model, self.work, self.constraints, self.precision, self.dt)
         self.nodes = NodeStage(model, self.work, self.constraints, self.precision, self.dt, self._early)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)

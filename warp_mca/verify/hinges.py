@@ -196,8 +196,8 @@ def fe_double_pendulum(setup: Setup) -> list[Row]:
     catches=("pin_pulls_at_the_mean", "pin_stays_upright"),
 )
 def pinned_double_pendulum(setup: Setup) -> list[Row]:
-    """Four cells along the depth in place of two; pins of 80 mm."""
-    return _swinging_links(setup, joint_nodes="pin", pin_radius=0.08, deep=4)
+    """Pins of 150 mm; four cells along the depth in place of two."""
+    return _swinging_links(setup, joint_nodes="pin", pin_radius=0.15, deep=4)
 
 
 def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
