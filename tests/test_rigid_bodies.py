@@ -50,7 +50,7 @@ def keeps_momentum(scene: mca.Scene, axes: Sequence[int] = range(6), **settings:
     return impact
 
 
-def block(**change: object) -> mca.Scene:
+def block() -> mca.Scene:
     """A box with three different moments of inertia, turning freely near its middle axis."""
     box = mca.Box(size=(0.1, 0.2, 0.3), divisions=(2, 2, 2), origin=(-0.05, -0.1, -0.15))
     body = mca.Body(
@@ -61,7 +61,7 @@ def block(**change: object) -> mca.Scene:
         velocity=(1.0, -2.0, 3.0),
         angular_velocity=(0.1, 9.0, 0.2),
     )
-    return mca.Scene(name="block", bodies=(body,), impact=mca.ImpactPhase(duration=2.0, output_interval=1e-3), **change)
+    return mca.Scene(name="block", bodies=(body,), impact=mca.ImpactPhase(duration=2.0, output_interval=1e-3))
 
 
 @pytest.mark.parametrize("precision", ["mixed", "float64"])
@@ -215,7 +215,7 @@ def test_fixed_axes_leave_a_rigid_body_what_they_do_not_hold():
     start = found.solver.model.node_start["plate"]
     u, v = found.state.u.numpy()[start:], found.state.v.numpy()[start:]
     assert np.abs(u[:, 1:]).max() < 1e-18 and np.abs(v[:, 1:]).max() < 1e-12
-    assert np.ptp(v[:, 0]) < 1e-12 and v[0, 0] > 2.0  # friction has pushed it on
+    assert float(np.ptp(v[:, 0])) < 1e-12 and v[0, 0] > 2.0  # friction has pushed it on
     held = finished(replace(scene, fixed=(replace(fixed, axes="xyz"),)))
     assert np.abs(held.state.u.numpy()[start:]).max() < 1e-18
 

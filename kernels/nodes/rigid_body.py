@@ -152,7 +152,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
             if lane == 0:
                 find_motion(b, bodies, span, rotation_out, momentum_out, spin_out, turn_out, velocity_out, rate_out)
         for p in range(rows.pins[k], rows.pins[k + 1]):
-            find_cluster(p, lane, clusters, X, mass, span, orientation_out, u_out, v_out,
+            find_cluster(p, lane, rows.place[p], clusters, X, mass, span, orientation_out, u_out, v_out,
                          mean_out, point_out, pin_impulse_out)
         if size > 0:
             for r in range(begin + lane, begin + size, wp.block_dim()):
@@ -172,7 +172,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
         wait_for_block()
         if moves:
             for p in range(rows.pins[k], rows.pins[k + 1]):
-                pull_cluster(p, lane, clusters, X, span, mean_out, point_out, pin_impulse_out,
+                pull_cluster(p, lane, rows.place[p], clusters, X, span, mean_out, point_out, pin_impulse_out,
                              u_out, v_out, speed_square_out)
                 if lane == 0:
                     w = spin_of(mean_out[p], pin_impulse_out[p, 0], pin_impulse_out[p, 1])

@@ -16,6 +16,7 @@ wp.set_module_options({"enable_backward": False})
 def find_cluster(
     p: int,
     lane: int,
+    place: wp.vec3d,
     clusters: Clusters,
     X: wp.array(dtype=wp.vec3d),
     mass: wp.array(dtype=wp.float64),
@@ -29,7 +30,7 @@ def find_cluster(
 ):
     """Mean motion of a pin's cluster after the free step, and its point P at t(n), from the place at the start."""
     begin = clusters.begin[p]
-    total = cluster_sums(begin[0], begin[1], lane, clusters.place[p], clusters, X, mass, u, v, dt)
+    total = cluster_sums(begin[0], begin[1], lane, place, clusters, X, mass, u, v, dt)
     if lane == 0:
         P = wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(orientation[p], clusters.arm[p, 0])
         mean_out[p] = mean_motion(total, P)
@@ -80,6 +81,7 @@ def pin_lightness(mean: Mean, n: wp.vec3d, t: wp.vec3d, m: wp.vec3d, s: wp.vec3d
 def pull_cluster(
     p: int,
     lane: int,
+    place: wp.vec3d,
     clusters: Clusters,
     X: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
@@ -95,4 +97,4 @@ def pull_cluster(
     m = mean[p]
     J = impulse[p, 0]
     T = wp.cross(point[p] - m.centre, J) + impulse[p, 1]
-    pull(begin[0], begin[1], lane, clusters.place[p], m, J, T, clusters, X, dt, u_out, v_out, speed_square_out)
+    pull(begin[0], begin[1], lane, place, m, J, T, clusters, X, dt, u_out, v_out, speed_square_out)

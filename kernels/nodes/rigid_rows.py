@@ -27,6 +27,7 @@ class RigidRows:
         body, begin: first place in `member` and first row of each group, and the numbers of all, shape
             (group_count + 1,), int32.
         pins: first pin of each group, and the number of all, shape (group_count + 1,), int32.
+        place: of each pin at the start [m], shape (pin_count,), vec3d.
         entry: first entry of each group's matrix, shape (group_count,), int32.
         first, second: bodies of each row, second -1 where that is the ground, shape (row_count,), int32.
         first_arm, second_arm: reference position of the common point from the bodies' mass centres [m], shape
@@ -44,6 +45,7 @@ class RigidRows:
     body: wp.array(dtype=wp.int32)
     begin: wp.array(dtype=wp.int32)
     pins: wp.array(dtype=wp.int32)
+    place: wp.array(dtype=wp.vec3d)
     entry: wp.array(dtype=wp.int32)
     first: wp.array(dtype=wp.int32)
     second: wp.array(dtype=wp.int32)

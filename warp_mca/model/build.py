@@ -19,7 +19,7 @@ from warp_mca.model.joint_loads import hinge_loads, movable_bases
 from warp_mca.model.mass_scaling import check_masses, scale_masses
 from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
-from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, rigid_bodies
+from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.surfaces import ContactPass, contact_eigenvalues, contact_passes
 from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes
@@ -82,7 +82,8 @@ def build_model(
     parts = Assembly(scene, meshes, on_faces(ties, scene, X))
     velocity = np.concatenate([V[body.name] for body in scene.bodies])
     pairs, joints, couplings = join_bodies(parts)
-    bases = movable_bases(parts, joints, couplings, chain, start)
+    soft = flexible(couplings, pairs, own_nodes(parts))
+    bases = movable_bases(parts, joints, soft, chain, start)
     check_loads(scene, chain, bases)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
@@ -103,7 +104,7 @@ def build_model(
         **held,
         **pairs,
         joints=joints,
-        couplings=flexible(couplings, pairs, rigid.bodies),
+        couplings=soft,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
         bases=bases,
         absorbing=absorbing,

@@ -84,11 +84,10 @@ def own_nodes(parts: Assembly) -> dict[str, Index]:
 
 
 def flexible(
-    couplings: Sequence[Coupling], pairs: Mapping[str, NDArray], bodies: Sequence[RigidBody]
+    couplings: Sequence[Coupling], pairs: Mapping[str, NDArray], nodes: Mapping[str, Index]
 ) -> tuple[Coupling, ...]:
-    """The couplings without those of rigid bodies."""
-    own = np.concatenate([np.zeros(0, np.int32), *(body.own for body in bodies)])
-    rigid = np.isin(pairs["joint_first"], own)
+    """The couplings without those of rigid bodies, whose `nodes` are given by name."""
+    rigid = np.isin(pairs["joint_first"], np.concatenate([np.zeros(0, np.int32), *nodes.values()]))
     return tuple(item for item in couplings if not rigid[item.start : item.end].any())
 
 

@@ -140,7 +140,7 @@ class RigidStage:
         found.begin = wp.array([(item.start, item.end, item.end) for item in items], dtype=wp.vec3i)
         found.node = constraints.bonds.first
         found.weight = wp.array(weight, dtype=wp.float64)
-        found.place = wp.array([item.place for item in items], dtype=wp.vec3d)
+        self.rows.place = wp.array([item.place for item in items], dtype=wp.vec3d)
         found.axis = wp.array([item.axis for item in items], dtype=wp.vec3d)
         found.arm = wp.array(np.array([(item.arm, item.arm) for item in items]).reshape(-1, 2, 3), dtype=wp.vec3d)
         self.clusters = found
