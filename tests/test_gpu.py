@@ -131,6 +131,19 @@ def test_pins_give_the_motion_of_the_cpu_and_the_same_bits_twice():
     np.testing.assert_allclose(device.state.couplings.orientation.numpy(), turn, rtol=0.0, atol=1e-9)
 
 
+def test_tied_meshes_give_the_figures_of_the_cpu_and_repeat_bit_for_bit():
+    from test_tie import SIDE, bar
+
+    plane = mca.RigidPlane(point=(0.0, -0.5 * SIDE, 0.0))
+    contact = mca.Contact(slave=mca.Surface(body="fine", nodes="ymin"), master=plane)
+    scene = bar(6, 2, speed=(0.0, -1.0, 0.0), spin=(0.0, 30.0, 0.0), contacts=(contact,))
+    host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))
+    for name in ("F_n_N", "E_kinetic", "E_internal"):
+        assert device[name] == pytest.approx(host[name], abs=1e-7 * np.abs(host[name]).max())
+    again = mca.run(scene, device="cuda:0", precision="float64")
+    assert all(np.array_equal(again[name], device[name], equal_nan=True) for name in device.history)
+
+
 def test_elements_that_yield_are_listed_once_and_give_the_same_forces():
     scene = oblique()
     host, device = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0"))

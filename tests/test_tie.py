@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -276,7 +277,7 @@ def test_a_nested_plate_fills_the_plate_and_passes_constant_stress():
 
 
 def test_bad_plates_and_parts_are_refused():
-    plate = {"length": 0.2, "width": 0.06, "height": 0.03}
+    plate: dict[str, Any] = {"length": 0.2, "width": 0.06, "height": 0.03}
     with pytest.raises(mca.RequestError, match=r"NestedPlate.core = \(4, 6\): give multiples of 3"):
         mca.NestedPlate(**plate, core=(4, 6))
     with pytest.raises(mca.RequestError, match="multiples of 4, with ratio = 2"):
@@ -305,3 +306,16 @@ def test_a_link_is_not_tied_to_another_body():
     tie = mca.Tie(slave=mca.Surface(body="AB", nodes="start"), master=mca.Surface(body="OA", nodes="end"))
     with pytest.raises(mca.RequestError, match="a link of the rigid phase is one body; make both meshes Parts of it"):
         prepared(dataclasses.replace(scene, ties=(tie,)))
+
+
+def test_two_link_takes_tied_rods_and_a_nested_plate_and_swings_with_them():
+    tied = {"plate_mesh": "nested", "fine_length": 0.04, "joint_nodes": "axis", "rigid_inertia": "mesh"}
+    scene = mca.make_scene("two_link", **tied)
+    assert [tie.slave.nodes for tie in scene.ties] == ["outside0", "outside1", "outside2", "fine.start"]
+    ready = prepared(scene)
+    assert ready.model.element_count < 5000
+    start = ready.start
+    assert max(start.momentum_mismatch, start.angular_momentum_mismatch, start.energy_mismatch) < 1e-12
+    assert ready.warnings == ()
+    with pytest.raises(mca.RequestError, match=r"fine_length = 0.3: give a length between"):
+        mca.make_scene("two_link", fine_length=0.3)

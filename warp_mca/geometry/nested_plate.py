@@ -48,7 +48,7 @@ class NestedPlate:
     core_depth: int = 3
     core_size: float = 0.6e-3
     ratio: int = 3
-    shell: int = 4
+    shell: int = 2
     extension: int = 8
 
     def __post_init__(self) -> None:
@@ -83,15 +83,18 @@ class NestedPlate:
         h = self.core_size
         ends = 0.5 * self.length, self.height, 0.5 * self.width
         counts = self.core[0], self.core_depth, self.core[1]
-        axes = [h * (np.arange(n + 1) - (n if k == 1 else 0.5 * n)) for k, n in enumerate(counts)]
-        found, size = [tuple(axes)], h
+        axes: list[Array] = [
+            h * (np.arange(n + 1, dtype=np.float64) - (n if k == 1 else 0.5 * n)) for k, n in enumerate(counts)
+        ]
+        found: list[Axes] = [(axes[0], axes[1], axes[2])]
+        size = h
         while not all(np.isclose(-axis[0], end) for axis, end in zip(axes, ends, strict=True)):
             size *= self.ratio
             axes = [self._wider(self._coarser(axes[k]), size, ends[k], k == 1) for k in range(3)]
             if all(np.isclose(-axes[k][0], ends[k]) for k in (1, 2)):
                 axes[0] = self._extended(self._coarser(found[-1][0]), size, ends[0])
-            found.append(tuple(axes))
-        return found  # type: ignore[return-value]
+            found.append((axes[0], axes[1], axes[2]))
+        return found
 
     def _coarser(self, axis: Array) -> Array:
         """Every so many of its places; all of them where the plate's ends leave another number."""

@@ -28,8 +28,8 @@ class TieStage:
         self.nodes, self.count = nodes, len(model.ties)
         if not self.count:
             return
-        ties = model.ties
-        self.masters_kernel = tied.masters_kernel(precision, nodes.touched, nodes.each, nodes.rated)
+        ties, self.lanes = model.ties, tied.LANES if wp.get_device().is_cuda else 1
+        self.masters_kernel = tied.masters_kernel(precision, nodes.touched, nodes.each, nodes.rated, self.lanes)
         self.follow_kernel = tied.follow_kernel(nodes.touched)
         entry, corner = np.nonzero(ties.weight)
         master = ties.master[entry, corner]
@@ -56,7 +56,8 @@ class TieStage:
         inputs += [nodes.scene, nodes.gravity, self.tied, nodes.dt]
         before = work.v_before if step.records else None
         outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
-        wp.launch(self.masters_kernel, len(self.tied.master), inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        threads = self.lanes * len(self.tied.master)
+        wp.launch(self.masters_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def follow(self, step: Step) -> None:
         """Slaves, once their masters have moved."""
