@@ -123,7 +123,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     plastic = bool(law_name)
     # otherwise lanes of elements that yield still need the nodes of this patch where those of the next would go
     early = precision == "mixed" or not plastic
-    begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
+    begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)
     clear_nowhere, _, sum_patch = sum_functions(precision)
     compute_element, (_, flow_listed) = element_function(precision, law_name), flow_functions(precision, law_name)

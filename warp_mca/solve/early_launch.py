@@ -15,10 +15,12 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
+from warp_mca.kernels.resident.meeting import TOGETHER
 
 MIN_DRIVER = (12, 3)
 
 _KERNEL = 0  # CU_GRAPH_NODE_TYPE_KERNEL
+_COOPERATIVE = 2  # CU_LAUNCH_ATTRIBUTE_COOPERATIVE
 _PROGRAMMATIC = 1  # CU_GRAPH_DEPENDENCY_TYPE_PROGRAMMATIC and CU_GRAPH_KERNEL_NODE_PORT_PROGRAMMATIC
 _SUFFIX = "_cuda_kernel_forward"  # Warp's names are key, underscore, hash, and this
 
@@ -63,6 +65,31 @@ def _key(node: int) -> str:
     _call("cuGraphKernelNodeGetParams_v2", handle, ctypes.byref(params))
     _call("cuFuncGetName", ctypes.byref(name), ctypes.c_void_p(params.func))
     return (name.value or b"").decode().removesuffix(_SUFFIX).rpartition("_")[0]
+
+
+def launch_together(graph: Any) -> int:
+    """Launch all blocks of threads of the kernels that TOGETHER names at once, or not at all.
+
+    Args:
+        graph: captured by Warp, not launched yet.
+
+    Returns:
+        The number of kernels.
+
+    Raises:
+        RuntimeError: the driver failed.
+    """
+    if not graph.device.is_cuda:
+        return 0
+    count = ctypes.c_size_t()
+    _call("cuGraphGetNodes", graph.graph, None, ctypes.byref(count))
+    nodes = (ctypes.c_void_p * count.value)()
+    _call("cuGraphGetNodes", graph.graph, nodes, ctypes.byref(count))
+    chosen = [node for node in nodes if _key(node) in TOGETHER]
+    value = (ctypes.c_int * 16)(1)  # CUkernelNodeAttrValue, a union of 64 bytes
+    for node in chosen:
+        _call("cuGraphKernelNodeSetAttribute", ctypes.c_void_p(node), _COOPERATIVE, ctypes.byref(value))
+    return len(chosen)
 
 
 def launch_early(graph: Any) -> int:

@@ -32,6 +32,7 @@ from warp_mca.solve.node_stage import NodeStage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
+from warp_mca.solve.resident import resident
 from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.threads import ELEMENTS as RANGE
@@ -95,6 +96,7 @@ class Solver:
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = self._groups()
         self._streams = Streams(wp.get_device().is_cuda)
+        self.resident = resident(self)
 
     @property
     def _early(self) -> int:
@@ -187,7 +189,7 @@ class Solver:
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + elements, ELEMENT_BLOCK),
+            (self.nodes.kernels() + elements + ([self.resident.kernel] if self.resident else []), ELEMENT_BLOCK),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
@@ -221,6 +223,13 @@ class Solver:
     def _step(self, step: Step) -> None:
         self._streams.run(self.groups, step)
 
+    def _steps(self, state: State, count: int) -> None:
+        if self.resident and count:
+            self.resident.launch(state, count)
+            return
+        for _ in range(count):
+            self._step(Step(state))
+
     def _schedule(self) -> None:
         for stage in self.elements:
             stage.schedule()
@@ -249,8 +258,7 @@ class Solver:
         def interval() -> None:
             self._schedule()
             record()
-            for _ in range(count - 1):
-                self._step(Step(state))
+            self._steps(state, count - 1)
 
         self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count
@@ -267,8 +275,7 @@ class Solver:
 
             def steps() -> None:
                 self._schedule()
-                for _ in range(count):
-                    self._step(Step(state))
+                self._steps(state, count)
 
             self._replay.graph(state, f"step {count}", steps)
         state.steps += count
