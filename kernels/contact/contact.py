@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.laws import LINEAR
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, nearest_face, passes_by, reachable
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.spring import Spring, open_function, rest_function, spring_function
@@ -22,56 +22,6 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 
 @cache
-def touch_function(friction: bool, stress_free: bool, law: str) -> Any:
-    """The function that presses a slave node on the nearest face, or releases it where there is none."""
-    settle, let_go = settle_functions(friction, stress_free, law)
-
-    @wp.func
-    def touch_nearest(
-        s: int,
-        i: int,
-        scene: int,
-        v: wp.array(dtype=wp.vec3d),
-        near: Nearest,
-        along: wp.vec3f,
-        stiffness: wp.array(dtype=wp.float64),
-        master: Master,
-        mu: wp.float64,
-        per_newton: wp.float64,
-        dt: wp.float64,
-        spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        normal_force_out: wp.array(dtype=wp.int64),
-        flag_out: wp.array2d(dtype=wp.int32),
-    ):
-        held = spring.held[s]
-        if near.face >= 0:
-            touch = meet(v, master.face, i, near, dt, held, along)
-            edge = wp.float64(2.0) * wp.sqrt(near.area)
-            touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
-            if passes_by(near.beside, held, near.front, edge):
-                touch.touches = bool(False)
-            touch.own = stiffness[s]
-            touch.limit = master.stiffness[near.face]
-            contact_force_out[i] = contact_force_out[i] + settle(
-                s, scene, near, touch, mu, per_newton, spring, normal_force_out, flag_out
-            )
-        else:
-            let_go(s, i, v, master.face, dt, near.front, held, spring)
-
-    return touch_nearest
-
-
-@wp.func
-def last_pressure(s: int, friction: bool, spring: Spring):
-    """Contact force of a spring along the normal of the face that it pressed last [N]."""
-    pressed = spring.force[s]
-    if friction:
-        pressed -= spring.tangential[s]
-    return wp.vec3f(pressed)
-
-
-@cache
 def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
@@ -83,7 +33,7 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: s
     until the spring opens.
     `stress_free`: springs of bodies that overlap at the start begin without force. `law`: module of the contact law.
     """
-    touch_nearest = touch_function(friction, stress_free, law)
+    settle, let_go = settle_functions(friction, stress_free, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
@@ -111,25 +61,25 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: s
         s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
-        along = last_pressure(s, wp.static(friction), spring)
+        pressed = spring.force[s]
+        if wp.static(friction):
+            pressed -= spring.tangential[s]
+        along = wp.vec3f(pressed)
         near = nearest_face(X, u, master, s, X[i] + u[i], along)
-        touch_nearest(
-            s,
-            i,
-            k,
-            v,
-            near,
-            along,
-            stiffness,
-            master,
-            of(mu, k),
-            of(per_newton, k),
-            dt,
-            spring,
-            contact_force_out,
-            normal_force_out,
-            flag_out,
-        )
+        held = spring.held[s]
+        if near.face >= 0:
+            touch = meet(v, master.face, i, near, dt, held, along)
+            edge = wp.float64(2.0) * wp.sqrt(near.area)
+            touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
+            if passes_by(near.beside, held, near.front, edge):
+                touch.touches = bool(False)
+            touch.own = stiffness[s]
+            touch.limit = master.stiffness[near.face]
+            contact_force_out[i] = contact_force_out[i] + settle(
+                s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out
+            )
+        else:
+            let_go(s, i, v, master.face, dt, near.front, held, spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 

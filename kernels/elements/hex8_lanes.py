@@ -147,8 +147,10 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
-    """The functions (list the element of a thread; compute the listed elements of a patch, four lanes for each).
+def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
+    """The functions (list the element of a thread; compute the listed elements of a patch; some of them).
+
+    Four lanes compute each.
 
     A list has its length first, shape (PATCH + 1,).
     """
@@ -228,6 +230,33 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
             force_out[i * wp.static(ROW) + thread] = W[i // 3, i % 3]
 
     @wp.func
+    def flow_range(
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        first: int,
+        head: wp.vec4i,
+        begin: int,
+        end: int,
+        lane: int,
+        threads: int,
+        patches: Patches,
+        law: wp.array2d(dtype=R),
+        listed: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=R),
+    ):
+        """Compute the listed elements from number `begin` to `end`, by so many threads."""
+        for batch in range((4 * (end - begin) + threads - 1) // threads):
+            item = begin + ((batch * threads + lane) >> 2)
+            thread = listed[from_start(1 + wp.min(item, end - 1))] & wp.static(PATCH - 1)
+            mine = from_start(head[0] + thread)
+            valid = item < end
+            grid = exponent_of(head)
+            q = lane & 3
+            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
+
+    @wp.func
     def flow_listed(
         points: wp.array(dtype=point),
         pool: wp.array(dtype=wp.vec3d),
@@ -242,18 +271,26 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         force_out: wp.array(dtype=R),
     ):
         """Compute the listed elements, then clear the list."""
-        listed = listed_out[0]
-        for batch in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
-            item = (batch * wp.static(PATCH) + lane) >> 2
-            thread = listed_out[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
-            mine = from_start(head[0] + thread)
-            valid = item < listed
-            grid = exponent_of(head)
-            q = lane & 3
-            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
-        if listed > 0:
+        n = listed_out[0]
+        flow_range(
+            points,
+            pool,
+            first,
+            head,
+            0,
+            n,
+            lane,
+            wp.static(PATCH),
+            patches,
+            law,
+            listed_out,
+            history_out,
+            extreme_out,
+            force_out,
+        )
+        if n > 0:
             barrier()
             if lane == 0:
                 listed_out[0] = 0
 
-    return list_element, flow_listed
+    return list_element, flow_listed, flow_range

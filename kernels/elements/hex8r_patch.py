@@ -47,7 +47,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     load_patterns = load_pattern_function(precision)
     _, load_displacements, _ = load_functions(precision)
-    clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
+    clear_nowhere, keep_forces, sum_patch, _ = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
     _, keep_volume, _ = keep_functions(R)
     shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False)

@@ -12,7 +12,8 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
-from warp_mca.kernels.resident.node_role import Nodes, hold_node, motion_functions
+from warp_mca.kernels.resident.node_role import Nodes, gather_function, hold_node, next_velocity
+from warp_mca.model.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 
@@ -72,15 +73,89 @@ def less_listed(total: wp.vec3d, mine: wp.vec4d, f: int, begin: int, end: int, f
     return total
 
 
+@wp.struct
+class Near:
+    """What a lane knows of the first of its faces of a master node before forces have come.
+
+    Attributes:
+        face: its number.
+        count: slaves in its list.
+        mine: 1 for the corners that the node is.
+        s0, s1, s2, s3: the first of these slaves.
+        begin, end: entries of the lane's other faces, every LANES-th.
+    """
+
+    face: wp.int32
+    count: wp.int32
+    mine: wp.vec4d
+    s0: wp.int32
+    s1: wp.int32
+    s2: wp.int32
+    s3: wp.int32
+    begin: wp.int32
+    end: wp.int32
+
+
+@wp.func
+def faces_near(m: int, lane: int, i: int, faces: Faces):
+    """What lane `lane` knows of the faces of the m-th master node, node i."""
+    near = Near()
+    begin = faces.offset[m] + lane
+    near.end = faces.offset[m + 1]
+    near.begin = begin + wp.static(LANES)
+    if begin < near.end:
+        f = faces.of_node[begin]
+        near.face = f
+        near.count = wp.min(faces.count[f], faces.slave.shape[1])
+        near.mine = corners_of_node(f, i, faces)
+        last = wp.max(near.count - 1, 0)
+        near.s0 = wp.where(near.count > 0, faces.slave[f, 0], 0)
+        near.s1 = wp.where(near.count > 0, faces.slave[f, wp.min(last, 1)], 0)
+        near.s2 = wp.where(near.count > 0, faces.slave[f, wp.min(last, 2)], 0)
+        near.s3 = wp.where(near.count > 0, faces.slave[f, wp.min(last, 3)], 0)
+    return near
+
+
+@wp.func
+def reaction(i: int, near: Near, faces: Faces, spring: Spring):
+    """Reactions of the springs that press a lane's faces of node i, in the order of `contact.react_kernel` [N]."""
+    total = wp.vec3d()
+    if near.count > 0:
+        f = near.face
+        p0 = spring.face[near.s0]  # all are under way at once
+        p1 = wp.where(near.count > 1, spring.face[near.s1], -1)
+        p2 = wp.where(near.count > 2, spring.face[near.s2], -1)
+        p3 = wp.where(near.count > 3, spring.face[near.s3], -1)
+        w0 = spring.weight[near.s0]
+        w1 = spring.weight[near.s1]
+        w2 = spring.weight[near.s2]
+        w3 = spring.weight[near.s3]
+        f0 = spring.force[near.s0]
+        f1 = spring.force[near.s1]
+        f2 = spring.force[near.s2]
+        f3 = spring.force[near.s3]
+        total = less_reaction(total, near.mine, p0, f, w0, f0)
+        total = less_reaction(total, near.mine, p1, f, w1, f1)
+        total = less_reaction(total, near.mine, p2, f, w2, f2)
+        total = less_reaction(total, near.mine, p3, f, w3, f3)
+        total = less_listed(total, near.mine, f, 4, near.count, faces, spring)
+    for j in range(near.begin, near.end, wp.static(LANES)):
+        g = faces.of_node[j]
+        length = wp.min(faces.count[g], faces.slave.shape[1])
+        total = less_listed(total, corners_of_node(g, i, faces), g, 0, length, faces, spring)
+    return total
+
+
 @cache
 def master_role(precision: str) -> Any:
     """The function that gives nodes of master faces their reactions and moves them, in each of some steps."""
     vec3 = scalars(precision).vec3
-    gather_held, move_held = motion_functions(precision)
+    gather_held = gather_function(precision)
 
     @wp.func
     def move_masters(
-        item: int,
+        block: int,
+        lane: int,
         steps: int,
         pushers: int,
         nodes: Nodes,
@@ -94,58 +169,33 @@ def master_role(precision: str) -> Any:
         speed_square_out: wp.array(dtype=wp.float32),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        """Lane `item` of all lanes; `pushers`: blocks of threads that give forces."""
+        """The first PATCH threads of each block; `pushers`: blocks of threads that give forces."""
+        item = (block * wp.static(PATCH) + lane) // wp.static(LANES)
         last = faces.master.shape[0] - 1
-        m = wp.min(item // wp.static(LANES), last)
-        exists = item // wp.static(LANES) <= last
-        lane = item % wp.static(LANES)
+        m = wp.min(item, last)
+        mine = item <= last and lane < wp.static(PATCH) and lane % wp.static(LANES) == 0
         held = hold_node(faces.master[m], nodes)
+        near = faces_near(m, lane % wp.static(LANES), held.node, faces)
         searched = faces.u_search[held.node]
-        begin = faces.offset[m] + lane
-        end = faces.offset[m + 1]
-        # of the first face: its list is short
-        f = faces.of_node[wp.min(begin, end - 1)]
-        count = wp.where(begin < end, wp.min(faces.count[f], faces.slave.shape[1]), 0)
-        mine = corners_of_node(f, held.node, faces)
-        s0 = wp.where(count > 0, faces.slave[f, 0], 0)
-        s1 = wp.where(count > 1, faces.slave[f, 1], s0)
-        s2 = wp.where(count > 2, faces.slave[f, 2], s0)
-        s3 = wp.where(count > 3, faces.slave[f, 3], s0)
+        u = u_out[held.node]
+        v = v_out[held.node]
         for n in range(steps):
-            if exists and lane == 0 and moved_too_far(u_out[held.node], searched, faces.margin):
+            if mine and moved_too_far(u, searched, faces.margin):
                 flag_out[0, wp.static(STALE)] = 1
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
-            total = wp.vec3d()
-            if count > 0:
-                p0 = spring.face[s0]
-                p1 = wp.where(count > 1, spring.face[s1], -1)
-                p2 = wp.where(count > 2, spring.face[s2], -1)
-                p3 = wp.where(count > 3, spring.face[s3], -1)
-                w0 = spring.weight[s0]
-                w1 = spring.weight[s1]
-                w2 = spring.weight[s2]
-                w3 = spring.weight[s3]
-                f0 = spring.force[s0]
-                f1 = spring.force[s1]
-                f2 = spring.force[s2]
-                f3 = spring.force[s3]
-                total = less_reaction(total, mine, p0, f, w0, f0)
-                total = less_reaction(total, mine, p1, f, w1, f1)
-                total = less_reaction(total, mine, p2, f, w2, f2)
-                total = less_reaction(total, mine, p3, f, w3, f3)
-                total = less_listed(total, mine, f, 4, count, faces, spring)
-            for j in range(begin + wp.static(LANES), end, wp.static(LANES)):
-                g = faces.of_node[j]
-                length = wp.min(faces.count[g], faces.slave.shape[1])
-                total = less_listed(total, corners_of_node(g, held.node, faces), g, 0, length, faces, spring)
-            for k in range(wp.static(LANES.bit_length() - 1)):
-                for c in range(3):
-                    total[c] += exchange(total[c], 1 << k)
-            v = wp.vec3d()
-            if exists and lane == 0:
-                v = move_held(held, gather_held(held, nodes.more_slots, force) + total, nodes.gravity, dt, u_out, v_out)
+            if lane < wp.static(PATCH):
+                total = gather_held(held, nodes.more_slots, force)
+                share = reaction(held.node, near, faces, spring)
+                for k in range(wp.static(LANES.bit_length() - 1)):
+                    for c in range(3):
+                        share[c] += exchange(share[c], 1 << k)
+                if mine:
+                    v = next_velocity(held, v, total + share, nodes.gravity, dt)
+                    u = u + dt * v
+                    v_out[held.node] = v
+                    u_out[held.node] = u
             arrive(wp.static(NODES), count_out)
-            if exists and lane == 0:
+            if mine:
                 keep_speed(held.node, v, speed_square_out)
 
     return move_masters

@@ -9,9 +9,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.node import TOUCHABLE, hold, take_contact
+from warp_mca.kernels.nodes.node import TOUCHABLE, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
+from warp_mca.model.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 
@@ -88,9 +89,15 @@ def hold_node(i: int, nodes: Nodes):
     return held
 
 
+@wp.func
+def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, gravity: wp.vec3d, dt: wp.float64):
+    """As `kernels.nodes.node.integrate_kernel` has it [m/s]."""
+    return v + dt * hold(held.role, held.inverse * total + gravity)
+
+
 @cache
-def motion_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (sum the forces of elements on a node; move a node)."""
+def gather_function(precision: str) -> Any:
+    """The function that sums the forces of elements on a node."""
     vec3 = scalars(precision).vec3
 
     @wp.func
@@ -132,57 +139,67 @@ def motion_functions(precision: str) -> tuple[Any, Any]:
             total = add_row(total, r, force_at(r[0], force), force_at(r[1], force), force_at(r[2], force))
         return total
 
-    @wp.func
-    def move_held(
-        held: Held,
-        total: wp.vec3d,
-        gravity: wp.vec3d,
-        dt: wp.float64,
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-    ):
-        """As `kernels.nodes.node.integrate_kernel`; the velocity."""
-        a = hold(held.role, held.inverse * total + gravity)
-        v = v_out[held.node] + dt * a
-        v_out[held.node] = v
-        u_out[held.node] = u_out[held.node] + dt * v
-        return v
+    return gather_held
 
-    return gather_held, move_held
+
+@cache
+def total_function(precision: str, contact: bool) -> Any:
+    """The function that sums all forces on a node, of elements and as a slave; that is given once."""
+    vec3 = scalars(precision).vec3
+    gather_held = gather_function(precision)
+
+    @wp.func
+    def total_force(
+        held: Held,
+        more_slots: wp.array(dtype=wp.vec4i),
+        force: wp.array(dtype=vec3),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+    ):
+        fc = wp.vec3d()
+        if wp.static(contact):
+            if held.role & wp.static(TOUCHABLE) != 0:
+                fc = contact_force_out[held.node]  # under way with the others
+        total = gather_held(held, more_slots, force)
+        if wp.static(contact):
+            total += fc
+            if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
+                contact_force_out[held.node] = wp.vec3d()
+        return total
+
+    return total_force
 
 
 @cache
 def free_role(precision: str, contact: bool) -> Any:
     """The function that moves free nodes in each of some steps."""
     vec3 = scalars(precision).vec3
-    gather_held, move_held = motion_functions(precision)
+    total_force = total_function(precision, contact)
 
     @wp.func
-    def take(held: Held, contact_force_out: wp.array(dtype=wp.vec3d)):
-        fc = wp.vec3d()
-        if held.role & wp.static(TOUCHABLE) != 0:
-            fc = take_contact(held.node, contact_force_out)
-        return fc
-
-    @wp.func
-    def advance(
-        held: Held,
+    def move_others(
+        begin: int,
+        stride: int,
         nodes: Nodes,
         dt: wp.float64,
         force: wp.array(dtype=vec3),
         contact_force_out: wp.array(dtype=wp.vec3d),
         u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
     ):
-        total = gather_held(held, nodes.more_slots, force)
-        if wp.static(contact):
-            total += take(held, contact_force_out)
-        return move_held(held, total, nodes.gravity, dt, u_out, v_out)
+        for k in range(begin, nodes.free.shape[0], stride):
+            held = hold_node(nodes.free[k], nodes)
+            total = total_force(held, nodes.more_slots, force, contact_force_out)
+            v = next_velocity(held, v_out[held.node], total, nodes.gravity, dt)
+            v_out[held.node] = v
+            u_out[held.node] = u_out[held.node] + dt * v
+            keep_speed(held.node, v, speed_square_out)
 
     @wp.func
     def move_free(
-        item: int,
-        stride: int,
+        block: int,
+        lane: int,
+        blocks: int,
         steps: int,
         pushers: int,
         nodes: Nodes,
@@ -194,20 +211,25 @@ def free_role(precision: str, contact: bool) -> Any:
         v_out: wp.array(dtype=wp.vec3d),
         speed_square_out: wp.array(dtype=wp.float32),
     ):
-        """Every `stride`-th free node from `item` on; `pushers`: blocks of threads that give forces."""
+        """The first PATCH threads of each of some blocks; `pushers`: blocks of threads that give forces."""
         free = nodes.free.shape[0]
-        first = hold_node(nodes.free[wp.min(item, free - 1)], nodes)
+        item = block * wp.static(PATCH) + lane
+        mine = item < free and lane < wp.static(PATCH)
+        held = hold_node(nodes.free[wp.min(item, free - 1)], nodes)
+        u = u_out[held.node]
+        v = v_out[held.node]
         for n in range(steps):
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
-            v = wp.vec3d()
-            if item < free:
-                v = advance(first, nodes, dt, force, contact_force_out, u_out, v_out)
-            for k in range(item + stride, free, stride):
-                other = hold_node(nodes.free[k], nodes)
-                w = advance(other, nodes, dt, force, contact_force_out, u_out, v_out)
-                if wp.length_sq(w) > wp.length_sq(v):
-                    v = w
+            if mine:
+                total = total_force(held, nodes.more_slots, force, contact_force_out)
+                v = next_velocity(held, v, total, nodes.gravity, dt)
+                u = u + dt * v
+                v_out[held.node] = v
+                u_out[held.node] = u
+                stride = blocks * wp.static(PATCH)
+                move_others(item + stride, stride, nodes, dt, force, contact_force_out, u_out, v_out, speed_square_out)
             arrive(wp.static(NODES), count_out)
-            keep_speed(first.node, v, speed_square_out)
+            if mine:
+                keep_speed(held.node, v, speed_square_out)
 
     return move_free

@@ -184,6 +184,15 @@ class ContactStage:
         return self.items[0].plane is not None
 
     @property
+    def is_replayable(self) -> bool:
+        """Whether a graph can hold the search: on a GPU, once a first one has built the tree of boxes."""
+        import os
+
+        return (
+            os.environ.get("SG", "1") == "1" and self.slave.device.is_cuda and (self.on_plane or self.bvh is not None)
+        )
+
+    @property
     def blocks(self) -> int:
         """Blocks of threads that look at the slaves."""
         return -(-len(self.slave) // contact.BLOCK_DIM)

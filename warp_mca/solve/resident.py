@@ -16,12 +16,12 @@ from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
-from warp_mca.kernels.elements.patch import RESIDENT
 from warp_mca.kernels.resident.contact_role import Slaves
 from warp_mca.kernels.resident.master_role import Faces
 from warp_mca.kernels.resident.meeting import COUNTS
 from warp_mca.kernels.resident.node_role import Nodes
-from warp_mca.kernels.resident.steps import Roles, resident_kernel
+from warp_mca.kernels.resident.patch_role import THREADS
+from warp_mca.kernels.resident.steps import KEEPERS, Roles, resident_kernel
 from warp_mca.model.patches import PATCH
 from warp_mca.solve.contact_stage import ContactStage
 
@@ -34,7 +34,7 @@ MOST_FREE = 4  # nodes that a thread moves in turn at most
 
 
 def blocks_of(threads: int) -> int:
-    """Blocks of so many threads."""
+    """Blocks of which PATCH threads take part."""
     return -(-threads // PATCH)
 
 
@@ -52,10 +52,12 @@ def is_known(solver: Solver) -> bool:
     (elements,) = solver.elements
     if not isinstance(elements, PatchStage) or elements.block.element != "hex8":
         return False
+    if solver.constraints.count > THREADS - KEEPERS:
+        return False
     contact = surface_of(solver)
     if contact is None:
         return True
-    bound = np.concatenate([contact.items[0].master, _bound(solver)])
+    bound = np.concatenate([contact.items[0].master, contact.items[0].slave, _bound(solver)])
     return not contact.on_plane and contact.sides == 1 and len(np.unique(bound)) == len(bound)
 
 
@@ -101,9 +103,9 @@ class Resident:
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]
         outputs = [self.count, own.yielded, own.history, own.extreme, elements.flowing, work.force, work.contact_force]
-        outputs += [state.normal_force, state.u, state.v, None, state.speed_square]
+        outputs += [state.normal_force, state.u, state.v, state.speed_square]
         outputs += [bonds.impulse, bonds.work, bonds.work_after, bonds.clock, state.flag]
-        wp.launch(self.kernel, self.blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=PATCH)
+        wp.launch(self.kernel, self.blocks * THREADS, inputs=inputs, outputs=outputs, block_dim=THREADS)
 
 
 def resident(solver: Solver) -> Resident | None:
@@ -118,7 +120,7 @@ def roles_of(solver: Solver) -> Roles | None:
     """Which blocks of threads do what; None if the device does not hold them all at once."""
     (elements,), contact, constraints = solver.elements, surface_of(solver), solver.constraints
     assert isinstance(elements, PatchStage)
-    most = wp.get_device().sm_count * RESIDENT[solver.precision]
+    most = wp.get_device().sm_count  # with the registers that the kernel takes
     roles = Roles()
     roles.contact = len(elements.patches.head)
     roles.master = roles.contact + (blocks_of(LANES * len(contact.slave)) if contact else 0)

@@ -21,6 +21,7 @@ from warp_mca.kernels.contact.search import FLAGS
 from warp_mca.kernels.hardware import subnormals
 from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
+from warp_mca.kernels.resident.patch_role import THREADS
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.constraint_stage import ConstraintStage
@@ -189,15 +190,23 @@ class Solver:
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + elements + ([self.resident.kernel] if self.resident else []), ELEMENT_BLOCK),
+            (self.nodes.kernels() + elements, ELEMENT_BLOCK),
+            ([self.resident.kernel] if self.resident else [], THREADS),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
-        with wp.ScopedDevice(self.device):
+
+        def search() -> None:
             for stage in self.contacts:
                 stage.search(self.work, state)
+
+        if all(stage.is_replayable for stage in self.contacts):
+            self._replay.graph(state, "search", search)
+            return
+        with wp.ScopedDevice(self.device):
+            search()
 
     def begin(self, state: State) -> None:
         """First search of a new state, after `compile`."""
