@@ -46,7 +46,7 @@ THREADS = 4 * PATCH  # of a block: one for each slot of a patch; one for each el
 def element_role(precision: str, law_name: str) -> Any:
     """The function that computes the elements of a patch by all threads of a block."""
     t = scalars(precision)
-    R, mat33, mat83, point = t.real, t.mat33, t.mat83, POINT[precision]
+    R, mat33, point = t.real, t.mat33, POINT[precision]
     plastic = bool(law_name)
     load_points, load_displacements, _ = load_functions(precision)
     element_rotation, _ = frame_functions(precision)
@@ -74,13 +74,11 @@ def element_role(precision: str, law_name: str) -> Any:
         """Number of elements that took the return map; forces as `hex8_patch` has them."""
         e = from_start(head[0] + lane)
         flows = bool(False)
-        Xl = mat83()
-        ul = mat83()
         W = mat33()
         if exists:
-            Xl = load_points(kept_points, pool, corners, 0, exponent_of(head))
-            ul = load_displacements(pool, corners, 0)
-            W, J = element_rotation(Xl, ul)
+            W, J = element_rotation(
+                load_points(kept_points, pool, corners, 0, exponent_of(head)), load_displacements(pool, corners, 0)
+            )
             keep_volume(e, R(1.0) - J, extreme_out)
             if wp.static(plastic):
                 flows = yielded_out[e] != 0
@@ -92,6 +90,8 @@ def element_role(precision: str, law_name: str) -> Any:
             known = listed_out[0]
             barrier()
         if exists and not flows:
+            Xl = load_points(kept_points, pool, corners, 0, exponent_of(head))  # again: they take registers
+            ul = load_displacements(pool, corners, 0)
             if elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out):
                 if wp.static(plastic):
                     list_element(W, lane, listed_out, force_out)
