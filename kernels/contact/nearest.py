@@ -101,63 +101,6 @@ def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float6
 
 
 @wp.func
-def goes_before(
-    gap: wp.float64, beside: wp.bool, f: int, other_gap: wp.float64, other_beside: wp.bool, other_f: int
-) -> bool:
-    """Whether face f presses a node rather than another one does; see `nearest_face`."""
-    better = (gap > other_gap) != beside
-    if beside != other_beside:
-        better = other_beside
-    elif gap == other_gap:
-        better = f < other_f  # whatever the order of the search
-    return better
-
-
-@wp.func
-def nothing_near() -> Nearest:
-    """No face."""
-    best = Nearest()
-    best.face = -1
-    best.front = wp.float64(FAR)
-    best.front_face = -1
-    return best
-
-
-@wp.func
-def nearer(
-    best: Nearest,
-    f: int,
-    inside: bool,
-    at: wp.vec2d,
-    away: wp.vec3d,
-    area_normal: wp.vec3d,
-    triangle: bool,
-    along: wp.vec3f,
-) -> Nearest:
-    """The better one of a face and of face f, on which a node projects as `projection.project` says."""
-    if inside:
-        area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
-        normal = (wp.float64(1.0) / area) * area_normal
-        gap = wp.dot(away, normal)
-        cosine = wp.dot(wp.vec3f(normal), along)  # times the size of the force
-        kept = cosine >= 0.0 or cosine * cosine < wp.static(_OPPOSED**2) * wp.dot(along, along)
-        if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
-            beside = is_beside(at, triangle, wp.float64(_RIM))
-            if best.face < 0 or goes_before(gap, beside, f, best.gap, best.beside, best.face):
-                best.face = f
-                best.gap = gap
-                best.normal = normal
-                best.at = at
-                best.beside = beside
-                best.area = area
-        elif gap >= wp.float64(0.0):
-            if gap < best.front:
-                best.front_face = f
-            best.front = wp.min(best.front, gap)
-    return best
-
-
-@wp.func
 def nearest_face(
     X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, s: int, x: wp.vec3d, along: wp.vec3f
 ) -> Nearest:
@@ -167,7 +110,7 @@ def nearest_face(
     none: a concave fold needs that. Ties go to the lower number. Skip faces whose normal opposes the last contact
     force: they are the far side of a thin body.
     """
-    return nearest_of(X, u, master, s, x, along, nothing_near(), 0, 1)
+    return nearest_of(X, u, master, s, x, along, 0, 1)
 
 
 @wp.func
@@ -178,15 +121,40 @@ def nearest_of(
     s: int,
     x: wp.vec3d,
     along: wp.vec3f,
-    best: Nearest,
     first: int,
     stride: int,
 ) -> Nearest:
-    """`nearest_face` among `best` and every `stride`-th candidate, from `first` on."""
-    last = master.candidate.shape[1] - 1
-    f = master.candidate[s, wp.min(first, last)]  # read before the count is known: memory answers late
+    """`nearest_face` among every `stride`-th candidate, from `first` on."""
+    f = master.candidate[s, first]  # read before the count is known: memory answers late
+    best = Nearest()
+    best.face = -1
+    best.front = wp.float64(FAR)
+    best.front_face = -1
     for c in range(first, master.count[s], stride):
         inside, at, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
-        best = nearer(best, f, inside, at, away, area_normal, triangle, along)
-        f = master.candidate[s, wp.min(c + stride, last)]
+        if inside:
+            area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
+            normal = (wp.float64(1.0) / area) * area_normal
+            gap = wp.dot(away, normal)
+            cosine = wp.dot(wp.vec3f(normal), along)  # times the size of the force
+            kept = cosine >= 0.0 or cosine * cosine < wp.static(_OPPOSED**2) * wp.dot(along, along)
+            if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
+                beside = is_beside(at, triangle, wp.float64(_RIM))
+                better = (gap > best.gap) != beside
+                if beside != best.beside:
+                    better = best.beside
+                elif gap == best.gap:
+                    better = f < best.face  # whatever the order of the search
+                if better or best.face < 0:
+                    best.face = f
+                    best.gap = gap
+                    best.normal = normal
+                    best.at = at
+                    best.beside = beside
+                    best.area = area
+            elif gap >= wp.float64(0.0):
+                if gap < best.front:
+                    best.front_face = f
+                best.front = wp.min(best.front, gap)
+        f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best

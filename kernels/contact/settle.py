@@ -50,16 +50,9 @@ def meet(
     along: wp.vec3f,
 ) -> Touch:
     """How node i meets the nearest face; whether the face presses it is still open."""
-    weight = weights_at(near.at, face[near.face, 2] == face[near.face, 3])
-    return meet_at(v[i] - master_velocity(v, face, near.face, weight), weight, dt, held, along)
-
-
-@wp.func
-def meet_at(approach: wp.vec3d, weight: wp.vec4d, dt: wp.float64, held: wp.float64, along: wp.vec3f) -> Touch:
-    """The same from the node's velocity relative to the point of the face with these shape functions [m/s]."""
     touch = Touch()
-    touch.weight = weight
-    touch.du = dt * approach
+    touch.weight = weights_at(near.at, face[near.face, 2] == face[near.face, 3])
+    touch.du = dt * (v[i] - master_velocity(v, face, near.face, touch.weight))
     touch.held = held
     touch.along = along
     return touch

@@ -148,7 +148,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 @cache
 def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
-    """The functions (list the element of a thread; compute the listed elements of a patch; some of them).
+    """The functions (list the element of a thread; compute the listed elements of a patch; compute one of a patch).
 
     Four lanes compute each.
 
@@ -182,7 +182,10 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
+        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will.
+
+        Returns whether a lane's points flow.
+        """
         a = q ^ (q >> 1)  # corners run around the faces
         x0, d0, x1, d1 = load_corners(points, pool, patches, e, a, first, exponent)
         m = material_of(patches.corner[0, e], patches.corner[1, e])
@@ -203,7 +206,8 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
         largest = lane_max(wp.max(trial0, trial1))
         if valid and q == 0:
             keep_strain(e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
-        if valid and (p0 > history[last] or p1 > history[size + last]):
+        flows = valid and (p0 > history[last] or p1 > history[size + last])
+        if flows:
             write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
         f0, f1 = to_corners(
@@ -221,6 +225,7 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
             for i in range(3):
                 force_out[(3 * a + i) * wp.static(ROW) + thread] = f0[i]
                 force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = f1[i]
+        return flows
 
     @wp.func
     def list_element(W: mat33, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
@@ -228,33 +233,6 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
         listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
         for i in range(9):
             force_out[i * wp.static(ROW) + thread] = W[i // 3, i % 3]
-
-    @wp.func
-    def flow_range(
-        points: wp.array(dtype=point),
-        pool: wp.array(dtype=wp.vec3d),
-        first: int,
-        head: wp.vec4i,
-        begin: int,
-        end: int,
-        lane: int,
-        threads: int,
-        patches: Patches,
-        law: wp.array2d(dtype=R),
-        listed: wp.array(dtype=wp.int32),
-        history_out: wp.array2d(dtype=R),
-        extreme_out: wp.array2d(dtype=R),
-        force_out: wp.array(dtype=R),
-    ):
-        """Compute the listed elements from number `begin` to `end`, by so many threads."""
-        for batch in range((4 * (end - begin) + threads - 1) // threads):
-            item = begin + ((batch * threads + lane) >> 2)
-            thread = listed[from_start(1 + wp.min(item, end - 1))] & wp.static(PATCH - 1)
-            mine = from_start(head[0] + thread)
-            valid = item < end
-            grid = exponent_of(head)
-            q = lane & 3
-            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
 
     @wp.func
     def flow_listed(
@@ -271,26 +249,18 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
         force_out: wp.array(dtype=R),
     ):
         """Compute the listed elements, then clear the list."""
-        n = listed_out[0]
-        flow_range(
-            points,
-            pool,
-            first,
-            head,
-            0,
-            n,
-            lane,
-            wp.static(PATCH),
-            patches,
-            law,
-            listed_out,
-            history_out,
-            extreme_out,
-            force_out,
-        )
-        if n > 0:
+        listed = listed_out[0]
+        for batch in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
+            item = (batch * wp.static(PATCH) + lane) >> 2
+            thread = listed_out[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
+            mine = from_start(head[0] + thread)
+            valid = item < listed
+            grid = exponent_of(head)
+            q = lane & 3
+            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
+        if listed > 0:
             barrier()
             if lane == 0:
                 listed_out[0] = 0
 
-    return list_element, flow_listed, flow_range
+    return list_element, flow_listed, flow

@@ -149,7 +149,7 @@ def total_function(precision: str, contact: bool) -> Any:
     gather_held = gather_function(precision)
 
     @wp.func
-    def total_force(
+    def all_forces(
         held: Held,
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
@@ -166,14 +166,14 @@ def total_function(precision: str, contact: bool) -> Any:
                 contact_force_out[held.node] = wp.vec3d()
         return total
 
-    return total_force
+    return all_forces
 
 
 @cache
 def free_role(precision: str, contact: bool) -> Any:
     """The function that moves free nodes in each of some steps."""
     vec3 = scalars(precision).vec3
-    total_force = total_function(precision, contact)
+    all_forces = total_function(precision, contact)
 
     @wp.func
     def move_others(
@@ -189,7 +189,7 @@ def free_role(precision: str, contact: bool) -> Any:
     ):
         for k in range(begin, nodes.free.shape[0], stride):
             held = hold_node(nodes.free[k], nodes)
-            total = total_force(held, nodes.more_slots, force, contact_force_out)
+            total = all_forces(held, nodes.more_slots, force, contact_force_out)
             v = next_velocity(held, v_out[held.node], total, nodes.gravity, dt)
             v_out[held.node] = v
             u_out[held.node] = u_out[held.node] + dt * v
@@ -221,7 +221,7 @@ def free_role(precision: str, contact: bool) -> Any:
         for n in range(steps):
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             if mine:
-                total = total_force(held, nodes.more_slots, force, contact_force_out)
+                total = all_forces(held, nodes.more_slots, force, contact_force_out)
                 v = next_velocity(held, v, total, nodes.gravity, dt)
                 u = u + dt * v
                 v_out[held.node] = v

@@ -20,7 +20,7 @@ from warp_mca.kernels.resident.contact_role import Slaves, contact_role
 from warp_mca.kernels.resident.master_role import Faces, master_role
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, leave, together, wait_for
 from warp_mca.kernels.resident.node_role import Nodes, free_role, gather_function, hold_node
-from warp_mca.kernels.resident.patch_role import THREADS, patch_role
+from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS, patch_role
 
 wp.set_module_options({"enable_backward": False})
 
@@ -138,7 +138,7 @@ def resident_kernel(
         enable_backward=False,
         module="unique",
         grid_stride=False,
-        launch_bounds=(THREADS, 1),
+        launch_bounds=(THREADS, RESIDENT),
         module_options={"fast_math": True},
     )
     def resident_steps(
@@ -160,7 +160,6 @@ def resident_kernel(
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
-        flowing_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=vec3),
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array2d(dtype=wp.int64),
@@ -180,7 +179,7 @@ def resident_kernel(
         if block < roles.contact:
             compute_patch(
                 block, lane, steps, movers, X, points, patches, law, slot, u_out,
-                count_out, yielded_out, history_out, extreme_out, flowing_out, force_out,
+                count_out, yielded_out, history_out, extreme_out, force_out,
             )  # fmt: skip
         elif block < roles.master:
             if wp.static(contact):

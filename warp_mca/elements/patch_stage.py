@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from warp_mca.solve.workspace import Workspace
 
 
+def patch_size(elements: int, multiprocessors: int) -> int:
+    """Elements of a patch: fewer where each patch then still has a multiprocessor to itself, and others are left."""
+    return PATCH if elements > PATCH // 2 * (3 * multiprocessors // 4) else PATCH // 2
+
+
 class PatchStage(ElementStage):
     """Patches of the block on the device; a slot for each node of a patch.
 
@@ -45,7 +50,8 @@ class PatchStage(ElementStage):
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
-        host = make_patches(block.conn, block.ends, SLOTS[precision], X if mixed else None)
+        size = patch_size(block.conn.shape[1], wp.get_device().sm_count)
+        host = make_patches(block.conn, block.ends, SLOTS[precision], X if mixed else None, size)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
@@ -83,7 +89,7 @@ class PatchStage(ElementStage):
 
     def schedule(self) -> None:
         """Patches in which elements yield come first, because they take longer."""
-        if self.scheduled:
+        if self.scheduled and self.blocks < len(self.patches.head):
             for kernel, inputs, output in (
                 (patch.count_flowing, [self.flowing], self.flowing_of_run),
                 (patch.schedule, [self.flowing, self.flowing_of_run, self.patches.head], self.patches.turn),

@@ -20,7 +20,7 @@ from warp_mca.kernels.resident.contact_role import Slaves
 from warp_mca.kernels.resident.master_role import Faces
 from warp_mca.kernels.resident.meeting import COUNTS
 from warp_mca.kernels.resident.node_role import Nodes
-from warp_mca.kernels.resident.patch_role import THREADS
+from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS
 from warp_mca.kernels.resident.steps import KEEPERS, Roles, resident_kernel
 from warp_mca.model.patches import PATCH
 from warp_mca.solve.contact_stage import ContactStage
@@ -102,7 +102,7 @@ class Resident:
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]
-        outputs = [self.count, own.yielded, own.history, own.extreme, elements.flowing, work.force, work.contact_force]
+        outputs = [self.count, own.yielded, own.history, own.extreme, work.force, work.contact_force]
         outputs += [state.normal_force, state.u, state.v, state.speed_square]
         outputs += [bonds.impulse, bonds.work, bonds.work_after, bonds.clock, state.flag]
         wp.launch(self.kernel, self.blocks * THREADS, inputs=inputs, outputs=outputs, block_dim=THREADS)
@@ -120,7 +120,9 @@ def roles_of(solver: Solver) -> Roles | None:
     """Which blocks of threads do what; None if the device does not hold them all at once."""
     (elements,), contact, constraints = solver.elements, surface_of(solver), solver.constraints
     assert isinstance(elements, PatchStage)
-    most = wp.get_device().sm_count  # with the registers that the kernel takes
+    most = wp.get_device().sm_count * RESIDENT
+    if len(elements.patches.head) > wp.get_device().sm_count:
+        return None  # patches would wait for each other
     roles = Roles()
     roles.contact = len(elements.patches.head)
     roles.master = roles.contact + (blocks_of(LANES * len(contact.slave)) if contact else 0)
