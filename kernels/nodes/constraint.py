@@ -108,15 +108,6 @@ def bound_node(k: int, bonds: Bonds):
 
 
 @wp.func
-def other_node(k: int, bonds: Bonds):
-    """Second node of the k-th pair; -1 where there is none."""
-    j = int(-1)
-    if k < bonds.first.shape[0]:
-        j = bonds.second[k]
-    return j
-
-
-@wp.func
 def move(
     i: int,
     u: wp.vec3d,
@@ -131,116 +122,6 @@ def move(
     keep_speed(i, v, speed_square_out)
 
 
-@wp.struct
-class BoundNode:
-    """A bound node before a step.
-
-    Attributes:
-        node: its number, -1 where there is none.
-        role: as in `kernels.nodes.node`.
-        mass, inverse: [kg], [1/kg].
-        u: displacement [m].
-        v: velocity [m/s].
-        gravity: [m/s^2].
-    """
-
-    node: wp.int32
-    role: wp.int32
-    mass: wp.float64
-    inverse: wp.float64
-    u: wp.vec3d
-    v: wp.vec3d
-    gravity: wp.vec3d
-
-
-@wp.struct
-class BoundMotion:
-    """How a pair, or a driven node, moves in a step.
-
-    Attributes:
-        u, v: of the first node [m], [m/s].
-        other_u, other_v: of the second node [m], [m/s].
-        push: impulse that the joint gives to the first node [N s].
-    """
-
-    u: wp.vec3d
-    v: wp.vec3d
-    other_u: wp.vec3d
-    other_v: wp.vec3d
-    push: wp.vec3d
-
-
-@cache
-def bond_functions(each: bool = False, partial: bool = False) -> tuple[Any, Any]:
-    """Functions (what is known of a bound node; motion of the k-th pair or, beyond the pairs, of a driven node).
-
-    Arguments as of `bound_kernel`.
-    """
-    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
-
-    @wp.func
-    def bound_at(
-        i: int,
-        mass: wp.array(dtype=wp.float64),
-        inverse_mass: wp.array(dtype=wp.float64),
-        role: wp.array(dtype=wp.uint8),
-        scene: Index,
-        gravity: Vector,
-        u: wp.array(dtype=wp.vec3d),
-        v: wp.array(dtype=wp.vec3d),
-    ):
-        found = BoundNode()
-        found.node = i
-        if i >= 0:
-            found.role = int(role[i])
-            found.mass = mass[i]
-            found.inverse = inverse_mass[i]
-            found.u = u[i]
-            found.v = v[i]
-            found.gravity = of(gravity, of(scene, i))
-        return found
-
-    @wp.func
-    def bound_motion(
-        k: int,
-        one: BoundNode,
-        other: BoundNode,
-        total: wp.vec3d,
-        other_total: wp.vec3d,
-        bonds: Bonds,
-        dt: wp.float64,
-        work_out: wp.array(dtype=wp.vec3d),
-        work_after_out: wp.array(dtype=wp.vec3d),
-        clock_out: wp.array(dtype=wp.int32),
-    ):
-        pairs = bonds.first.shape[0]
-        a = hold(one.role, one.inverse * total + one.gravity)
-        free = one.v + dt * a
-        u_free = one.u + dt * free
-        motion = BoundMotion()
-        if k < pairs:
-            if other.node >= 0:
-                v_j = other.v + dt * (other.inverse * other_total + other.gravity)
-                u_j = other.u + dt * v_j
-                motion.u = weighted_mean(one.mass, u_free, other.mass, u_j)
-                motion.v = weighted_mean(one.mass, free, other.mass, v_j)
-                motion.other_u = motion.u
-                motion.other_v = motion.v
-                if wp.static(partial):
-                    motion.other_u = u_j + bonds.tied[k] * (motion.u - u_j)
-                    motion.other_v = v_j + bonds.tied[k] * (motion.v - v_j)
-            if wp.static(partial):
-                motion.u = u_free + bonds.tied[k] * (motion.u - u_free)
-                motion.v = free + bonds.tied[k] * (motion.v - free)
-            motion.push = one.mass * (motion.v - free)
-        else:
-            motion.v = drive(k - pairs, one.mass, dt, bonds, free, work_out, work_after_out, clock_out)
-            motion.u = u_free + dt * (motion.v - free)
-        return motion
-
-    return bound_at, bound_motion
-
-
 @cache
 def bound_kernel(precision: str, contact: bool, each: bool = False, partial: bool = False) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
@@ -249,8 +130,7 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node.
     """
-    bound_at, bound_motion = bond_functions(each, partial)
-    Vector, Index = kind(wp.vec3d, each), kind(wp.int32, each)
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision)
 
@@ -262,11 +142,9 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
         force: wp.array(dtype=vec3),
         contact_force_out: wp.array(dtype=wp.vec3d),
     ):
-        total = wp.vec3d()
-        if i >= 0:
-            total = gather(first_slots[i], more_slots, force)
-            if wp.static(contact):
-                total += take_contact(i, contact_force_out)
+        total = gather(first_slots[i], more_slots, force)
+        if wp.static(contact):
+            total += take_contact(i, contact_force_out)
         return total
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
@@ -294,21 +172,40 @@ def bound_kernel(precision: str, contact: bool, each: bool = False, partial: boo
         wait_for_previous()
         let_next_begin()
         k = wp.tid()
+        pairs = bonds.first.shape[0]
         i = bound_node(k, bonds)
-        j = other_node(k, bonds)
         total = total_force(i, first_slots, more_slots, force, contact_force_out)
-        other_total = total_force(j, first_slots, more_slots, force, contact_force_out)
-        one = bound_at(i, mass, inverse_mass, role, scene, gravity, u_out, v_out)
-        other = bound_at(j, mass, inverse_mass, role, scene, gravity, u_out, v_out)
-        motion = bound_motion(k, one, other, total, other_total, bonds, dt, work_out, work_after_out, clock_out)
+        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
+        free = v_out[i] + dt * a
+        u_free = u_out[i] + dt * free
         if v_before_out.shape[0] > 0:
-            v_before_out[i] = one.v
+            v_before_out[i] = v_out[i]
+        u = wp.vec3d()
+        v = wp.vec3d()
+        if k < pairs:
+            j = bonds.second[k]
             if j >= 0:
-                v_before_out[j] = other.v
-        if j >= 0:
-            move(j, motion.other_u, motion.other_v, u_out, v_out, speed_square_out)
-        if k < bonds.first.shape[0]:
-            impulse_out[k] = impulse_out[k] + motion.push
-        move(i, motion.u, motion.v, u_out, v_out, speed_square_out)
+                if v_before_out.shape[0] > 0:
+                    v_before_out[j] = v_out[j]
+                total = total_force(j, first_slots, more_slots, force, contact_force_out)
+                v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
+                u_j = u_out[j] + dt * v_j
+                u = weighted_mean(mass[i], u_free, mass[j], u_j)
+                v = weighted_mean(mass[i], free, mass[j], v_j)
+                if wp.static(partial):
+                    u_j += bonds.tied[k] * (u - u_j)
+                    v_j += bonds.tied[k] * (v - v_j)
+                else:
+                    u_j = u
+                    v_j = v
+                move(j, u_j, v_j, u_out, v_out, speed_square_out)
+            if wp.static(partial):
+                u = u_free + bonds.tied[k] * (u - u_free)
+                v = free + bonds.tied[k] * (v - free)
+            impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
+        else:
+            v = drive(k - pairs, mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
+            u = u_free + dt * (v - free)
+        move(i, u, v, u_out, v_out, speed_square_out)
 
     return begins_early(advance_bound)

@@ -185,12 +185,8 @@ class ContactStage:
 
     @property
     def is_replayable(self) -> bool:
-        """Whether a graph can hold the search: on a GPU, once a first one has built the tree of boxes."""
-        import os
-
-        return (
-            os.environ.get("SG", "1") == "1" and self.slave.device.is_cuda and (self.on_plane or self.bvh is not None)
-        )
+        """Whether a graph can hold the search: on a GPU, once a first search has built the tree of boxes."""
+        return not self.on_plane and self.bvh is not None and self.slave.device.is_cuda
 
     @property
     def blocks(self) -> int:

@@ -1,6 +1,7 @@
-"""Owns which kernels of a captured CUDA graph begin while the one before them ends, by marks on its edges.
+"""Owns which kernels of a captured CUDA graph begin while the one before them ends, and which need the device at once.
 
-See `kernels.hardware.early_launch` for the kernels' side.
+The first by marks on its edges, the second by an attribute of its nodes; see `kernels.hardware.early_launch` and
+`kernels.resident.meeting` for the kernels' side.
 
 Warp captures graphs but leaves their edges as they are, so that the driver is asked to change them: CUDA Driver API,
 "Graph Management".
@@ -83,6 +84,8 @@ def launch_together(graph: Any) -> int:
         return 0
     count = ctypes.c_size_t()
     _call("cuGraphGetNodes", graph.graph, None, ctypes.byref(count))
+    if not count.value:
+        return 0
     nodes = (ctypes.c_void_p * count.value)()
     _call("cuGraphGetNodes", graph.graph, nodes, ctypes.byref(count))
     chosen = [node for node in nodes if _key(node) in TOGETHER]
@@ -116,6 +119,8 @@ def launch_early(graph: Any) -> int:
         return 0
     count = ctypes.c_size_t()
     _call("cuGraphGetEdges_v2", graph.graph, None, None, None, ctypes.byref(count))
+    if not count.value:  # the driver refuses to list none
+        return 0
     Nodes, Edges = ctypes.c_void_p * count.value, _Edge * count.value
     begin, end, data = Nodes(), Nodes(), Edges()
     _call("cuGraphGetEdges_v2", graph.graph, begin, end, data, ctypes.byref(count))

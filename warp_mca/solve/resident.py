@@ -6,7 +6,7 @@ a cooperative one, which the driver refuses otherwise. CUDA Driver API, "Graph M
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -16,12 +16,13 @@ from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.resident.bound_role import MOST_BOUND
 from warp_mca.kernels.resident.contact_role import Slaves
 from warp_mca.kernels.resident.master_role import Faces
 from warp_mca.kernels.resident.meeting import COUNTS
 from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS
-from warp_mca.kernels.resident.steps import KEEPERS, Roles, resident_kernel
+from warp_mca.kernels.resident.steps import Roles, resident_kernel
 from warp_mca.model.patches import PATCH
 from warp_mca.solve.contact_stage import ContactStage
 
@@ -52,7 +53,7 @@ def is_known(solver: Solver) -> bool:
     (elements,) = solver.elements
     if not isinstance(elements, PatchStage) or elements.block.element != "hex8":
         return False
-    if solver.constraints.count > THREADS - KEEPERS:
+    if solver.constraints.count > MOST_BOUND:
         return False
     contact = surface_of(solver)
     if contact is None:
@@ -93,6 +94,10 @@ class Resident:
         )
         self.count = wp.zeros(COUNTS, dtype=wp.int32)
         self.nodes = _nodes(solver)
+
+    def kernels(self) -> tuple[list[Any], int]:
+        """The kernel, and the threads of its blocks."""
+        return [self.kernel], THREADS
 
     def launch(self, state: State, steps: int) -> None:
         """Advance so many steps that record nothing."""

@@ -21,7 +21,6 @@ from warp_mca.kernels.contact.search import FLAGS
 from warp_mca.kernels.hardware import subnormals
 from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
-from warp_mca.kernels.resident.patch_role import THREADS
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.constraint_stage import ConstraintStage
@@ -191,22 +190,21 @@ class Solver:
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
             (self.nodes.kernels() + elements, ELEMENT_BLOCK),
-            ([self.resident.kernel] if self.resident else [], THREADS),
+            *([self.resident.kernels()] if self.resident else []),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
+        if any(stage.is_replayable for stage in self.contacts):
+            self._replay.graph(state, "search", lambda: self._search(state))
+        else:
+            with wp.ScopedDevice(self.device):
+                self._search(state)
 
-        def search() -> None:
-            for stage in self.contacts:
-                stage.search(self.work, state)
-
-        if all(stage.is_replayable for stage in self.contacts):
-            self._replay.graph(state, "search", search)
-            return
-        with wp.ScopedDevice(self.device):
-            search()
+    def _search(self, state: State) -> None:
+        for stage in self.contacts:
+            stage.search(self.work, state)
 
     def begin(self, state: State) -> None:
         """First search of a new state, after `compile`."""
@@ -234,8 +232,7 @@ class Solver:
 
     def _steps(self, state: State, count: int) -> None:
         if self.resident and count:
-            self.resident.launch(state, count)
-            return
+            return self.resident.launch(state, count)
         for _ in range(count):
             self._step(Step(state))
 
