@@ -186,7 +186,7 @@ class ContactStage:
     @property
     def is_replayable(self) -> bool:
         """Whether a graph can hold the search: on a GPU, once a first search has built the tree of boxes."""
-        return not self.on_plane and self.bvh is not None and self.slave.device.is_cuda
+        return not self.on_plane and self.bvh is not None and wp.get_device(self.slave.device).is_cuda
 
     @property
     def blocks(self) -> int:

@@ -77,7 +77,7 @@ class Resident:
         blocks: their number.
     """
 
-    def __init__(self, solver: Solver, roles: Roles) -> None:
+    def __init__(self, solver: Solver, roles: Any) -> None:
         """Allocate on the current device; `roles` are those of `roles_of`."""
         self.solver, self.roles, self.blocks = solver, roles, int(roles.end)
         contact, block = surface_of(solver), solver.elements[0].block
@@ -121,7 +121,7 @@ def resident(solver: Solver) -> Resident | None:
     return Resident(solver, roles) if roles else None
 
 
-def roles_of(solver: Solver) -> Roles | None:
+def roles_of(solver: Solver) -> Any:
     """Which blocks of threads do what; None if the device does not hold them all at once."""
     (elements,), contact, constraints = solver.elements, surface_of(solver), solver.constraints
     assert isinstance(elements, PatchStage)
@@ -141,7 +141,7 @@ def roles_of(solver: Solver) -> Roles | None:
     return roles
 
 
-def _nodes(solver: Solver) -> Nodes:
+def _nodes(solver: Solver) -> Any:
     work, contact = solver.work, surface_of(solver)
     others = [_bound(solver)] + ([contact.items[0].master] if contact else [])
     free = np.setdiff1d(np.arange(solver.model.node_count), np.concatenate(others))
@@ -153,7 +153,7 @@ def _nodes(solver: Solver) -> Nodes:
     return found
 
 
-def _contact(solver: Solver, state: State) -> tuple[Slaves, Master, Faces, Spring]:
+def _contact(solver: Solver, state: State) -> tuple[Any, Any, Any, Any]:
     """What the kernel takes of the contact pass; empty if there is none."""
     stage = surface_of(solver)
     slaves, master, faces, spring = Slaves(), Master(), Faces(), Spring()
