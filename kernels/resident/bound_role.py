@@ -125,6 +125,7 @@ def bound_role(precision: str, partial: bool) -> Any:
                 j = bonds.second[lane]
         held = hold_node(wp.max(i, 0), nodes)
         other_held = hold_node(wp.max(j, 0), nodes)
+        other_held.role = 0  # a pair keeps the axes at rest of its first node
         for n in range(steps):
             one = node_at(i, nodes, u_out, v_out)
             other = node_at(j, nodes, u_out, v_out)
