@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
+from impacts import begun
 from sharp_edges import bars, in_frame, roof
 
 import warp_mca as mca
@@ -57,6 +58,31 @@ def test_device_gives_the_figures_of_the_cpu(precision, tolerance):
 def test_device_repeats_bit_for_bit():
     one, two = (mca.run(oblique(), device="cuda:0") for _ in range(2))
     assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one.history)
+
+
+@pytest.mark.parametrize("precision", ["mixed", "float64"])
+@pytest.mark.parametrize("plastic", [True, False])
+def test_steps_of_one_launch_give_what_launches_of_each_step_give(precision, plastic):
+    """Contact with friction, yield and held nodes; sums of forces are grouped otherwise."""
+    scene = oblique()
+    metal = scene.bodies[0].material if plastic else mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
+    scene = replace(
+        scene,
+        bodies=tuple(replace(body, material=metal) for body in scene.bodies),
+        contacts=(replace(scene.contacts[0], two_way=False),),
+    )
+    runs = [begun(scene, device="cuda:0", precision=precision) for _ in range(3)]
+    assert runs[0].solver.resident is not None
+    runs[2].solver.resident = None
+    for run in runs:
+        run.advance()
+        assert run.stopped == [None]
+    u, again, single = (run.state.u.numpy() for run in runs)
+    assert np.array_equal(u, again)
+    assert u == pytest.approx(single, abs=(1e-4 if precision == "mixed" else 1e-9) * np.abs(single).max())
+    sums = [run.solver.normal_force.greatest(run.state.normal_force, 0) for run in runs]
+    assert sums[0] == sums[1] > 0.0
+    assert sums[0] == pytest.approx(sums[2], rel=1e-4 if precision == "mixed" else 1e-9)
 
 
 @pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])

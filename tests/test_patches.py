@@ -178,6 +178,15 @@ def test_elements_leave_room_for_contact():
         assert patches > 2000 or blocks > 264 or stage.blocks == min(patches, 528 - blocks)
 
 
+def test_small_models_have_smaller_patches():
+    """6,144 hexahedra on 132 multiprocessors: 96 patches of 64; a few more elements would leave no room for others."""
+    from warp_mca.elements.patch_stage import patch_size
+
+    assert [patch_size(n, 132) for n in (1, 6144, 6336, 6337, 158080)] == [64, 64, 64, PATCH, PATCH]
+    conn = meshes()["box"]
+    assert np.array_equal(make_patches(conn, size=64).start, [*range(0, conn.shape[1], 64), conn.shape[1]])
+
+
 def test_patches_are_those_of_each_scene_alone():
     """Scenes of a batch begin new patches, wherever the ranges that are computed together end."""
     count, ends = 3 * SORT_CHUNK + 40, (SORT_CHUNK - 5, 2 * SORT_CHUNK + 77, 3 * SORT_CHUNK + 40)

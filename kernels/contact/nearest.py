@@ -110,12 +110,27 @@ def nearest_face(
     none: a concave fold needs that. Ties go to the lower number. Skip faces whose normal opposes the last contact
     force: they are the far side of a thin body.
     """
-    f = master.candidate[s, 0]  # read before the count is known: memory answers late
+    return nearest_of(X, u, master, s, x, along, 0, 1)
+
+
+@wp.func
+def nearest_of(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    master: Master,
+    s: int,
+    x: wp.vec3d,
+    along: wp.vec3f,
+    first: int,
+    stride: int,
+) -> Nearest:
+    """`nearest_face` among every `stride`-th candidate, from `first` on."""
+    f = master.candidate[s, first]  # read before the count is known: memory answers late
     best = Nearest()
     best.face = -1
     best.front = wp.float64(FAR)
     best.front_face = -1
-    for c in range(master.count[s]):
+    for c in range(first, master.count[s], stride):
         inside, at, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
         if inside:
             area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
@@ -141,5 +156,5 @@ def nearest_face(
                 if gap < best.front:
                     best.front_face = f
                 best.front = wp.min(best.front, gap)
-        f = master.candidate[s, wp.min(c + 1, master.candidate.shape[1] - 1)]
+        f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best

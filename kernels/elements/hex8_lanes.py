@@ -148,8 +148,12 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
-    """The functions (list the element of a thread; compute the listed elements of a patch, four lanes for each).
+def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
+    """The functions.
+
+    (List the element of a thread; compute the listed elements of a patch; compute one of a patch; keep its rotation.)
+
+    Four lanes compute each.
 
     A list has its length first, shape (PATCH + 1,).
     """
@@ -182,7 +186,10 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will."""
+        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will.
+
+        Returns whether a lane's points flow.
+        """
         a = q ^ (q >> 1)  # corners run around the faces
         x0, d0, x1, d1 = load_corners(points, pool, patches, e, a, first, exponent)
         m = material_of(patches.corner[0, e], patches.corner[1, e])
@@ -209,7 +216,8 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         largest = lane_max(wp.max(trial0, trial1))
         if valid and q == 0:
             keep_strain(e, strain_square(largest, R(scale) * law[m, 1]), extreme_out)
-        if valid and (p0 > history[last] or p1 > history[size + last]):
+        flows = valid and (p0 > history[last] or p1 > history[size + last])
+        if flows:
             write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
         f0, f1 = to_corners(
@@ -227,16 +235,22 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
             for i in range(3):
                 force_out[(3 * a + i) * wp.static(ROW) + thread] = f0[i]
                 force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = f1[i]
+        return flows
 
     @wp.func
-    def list_element(W: wp.mat33d, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
-        """List the element of a thread, and keep its rotation where its forces will be: what float32 leaves follows."""
-        listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
+    def keep_rotation(W: wp.mat33d, thread: int, force_out: wp.array(dtype=R)):
+        """Keep the rotation of a thread's element where its forces will be: what float32 leaves follows."""
         for i in range(9):
             first = R(W[i // 3, i % 3])
             force_out[i * wp.static(ROW) + thread] = first
             if wp.static(mixed):
                 force_out[(9 + i) * wp.static(ROW) + thread] = R(W[i // 3, i % 3] - wp.float64(first))
+
+    @wp.func
+    def list_element(W: wp.mat33d, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
+        """List the element of a thread, and keep its rotation."""
+        listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
+        keep_rotation(W, thread, force_out)
 
     @wp.func
     def flow_listed(
@@ -267,4 +281,4 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any]:
             if lane == 0:
                 listed_out[0] = 0
 
-    return list_element, flow_listed
+    return list_element, flow_listed, flow, keep_rotation

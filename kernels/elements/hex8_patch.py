@@ -43,16 +43,16 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element_function(precision: str, law_name: str) -> Any:
-    """The function that computes the element of a thread as if it were elastic, and lists it where it yields."""
+def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
+    """Functions: compute the element of a thread as if it were elastic, and list it where it yields; the first part."""
     t = scalars(precision)
     R, mat33, mat83, reads_again = t.real, t.mat33, t.mat83, precision == "mixed"
-    plastic, (list_element, _) = bool(law_name), flow_functions(precision, law_name)
+    plastic, (list_element, *_) = bool(law_name), flow_functions(precision, law_name)
     _, element_rotation, local_displacement = frame_functions(precision)
     _, load_displacements, _ = load_functions(precision)
     rounded, _ = width_functions(precision)
     element_forces = small_strain_function(precision, "")
-    _, keep_forces, _ = sum_functions(precision)
+    _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
 
@@ -126,7 +126,7 @@ def element_function(precision: str, law_name: str) -> Any:
             if flows:
                 list_element(wide, lane, listed_out, force_out)
 
-    return compute_element
+    return compute_element, elastic_element
 
 
 @cache
@@ -143,11 +143,12 @@ def force_kernel(precision: str, law_name: str) -> Any:
     plastic = bool(law_name)
     # otherwise lanes of elements that yield still need the nodes of this patch where those of the next would go
     early = precision == "mixed" or not plastic
-    begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
+    begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)
     rounded_corners, _, _ = frame_functions(precision)
-    clear_nowhere, _, sum_patch = sum_functions(precision)
-    compute_element, (_, flow_listed) = element_function(precision, law_name), flow_functions(precision, law_name)
+    clear_nowhere, _, sum_patch, _ = sum_functions(precision)
+    compute_element, _ = element_functions(precision, law_name)
+    _, flow_listed, *_ = flow_functions(precision, law_name)
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(

@@ -44,10 +44,10 @@ def force_kernel(precision: str, law_name: str) -> Any:
     force_pool, _ = shared_functions(precision)
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
-    begin_turns, copy_nodes, copy_ahead = copy_functions(precision)
+    begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     load_patterns = load_pattern_function(precision)
     _, load_displacements, _ = load_functions(precision)
-    clear_nowhere, keep_forces, sum_patch = sum_functions(precision)
+    clear_nowhere, keep_forces, sum_patch, _ = sum_functions(precision)
     to_wide = pattern_sum_function(wp.float64)
     rounded_patterns, mean_rotation, strain_in_frame = frame_functions(precision)
     _, keep_volume, _ = keep_functions(R)

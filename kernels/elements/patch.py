@@ -145,8 +145,8 @@ def corners_of(patches: Patches, head: wp.vec4i, lane: int):
 
 
 @cache
-def copy_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions (begin a block of threads; begin to copy the nodes of a patch; what comes after the next).
+def copy_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+    """Functions that begin to copy (begin a block of threads; nodes of a patch; what comes after the next; its points).
 
     In shared memory, points of successive patches lie in turn from 0 and from SLOTS on. So do displacements of nodes in
     `mixed`; otherwise positions lie from 0 on, displacements from SLOTS on.
@@ -231,4 +231,4 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any]:
             copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring_out)
         copy_points(points, ring_out[(k + 2) % wp.static(HEADS)], lane, first, point_out)
 
-    return begin_turns, copy_nodes, copy_ahead
+    return begin_turns, copy_nodes, copy_ahead, copy_points

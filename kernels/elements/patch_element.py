@@ -145,8 +145,10 @@ def load_pattern_function(precision: str) -> Any:
 
 
 @cache
-def sum_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions that prepare shared memory, store the forces of a thread's element there, and sum those of a patch.
+def sum_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+    """Functions.
+
+    (Prepare shared memory; store the forces of a thread's element there; sum those of a patch; sum those of a slot.)
 
     Component i of the force on corner a of a thread's element lies in row 3 a + i, in the thread's column.
     """
@@ -171,6 +173,13 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any]:
         return vec3(pool[first], pool[first + wp.static(ROW)], pool[first + wp.static(2 * ROW)])
 
     @wp.func
+    def sum_slot(pool: wp.array(dtype=R), w: wp.vec2i):
+        total = kept(pool, 0, w[0])
+        for a in range(1, 8):
+            total = total + kept(pool, a, w[a // 4] >> (8 * (a % 4)))
+        return total
+
+    @wp.func
     def sum_patch(
         pool: wp.array(dtype=R),
         places: wp.array(dtype=wp.vec2i),
@@ -183,10 +192,6 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any]:
         for k in range(wp.static(SLOTS_OF_THREAD)):
             n = lane + k * wp.static(PATCH)
             if n < slot_count(head):
-                w = places[n]
-                total = kept(pool, 0, w[0])
-                for a in range(1, 8):
-                    total = total + kept(pool, a, w[a // 4] >> (8 * (a % 4)))
-                force_out[from_start(slot + head[1] + n)] = total
+                force_out[from_start(slot + head[1] + n)] = sum_slot(pool, places[n])
 
-    return clear_nowhere, keep_forces, sum_patch
+    return clear_nowhere, keep_forces, sum_patch, sum_slot

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from warp_mca.solve.workspace import Workspace
 
 
+def patch_size(elements: int, multiprocessors: int) -> int:
+    """Elements of a patch: fewer where each patch then still has a multiprocessor to itself, and others are left."""
+    return PATCH if elements > PATCH // 2 * (3 * multiprocessors // 4) else PATCH // 2
+
+
 class PatchStage(ElementStage):
     """Patches of the block on the device; a slot for each node of a patch.
 
@@ -46,8 +51,8 @@ class PatchStage(ElementStage):
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
-        ends = (*block.ends, *block.level_ends)
-        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None)
+        ends, size = (*block.ends, *block.level_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
+        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
@@ -96,7 +101,7 @@ class PatchStage(ElementStage):
 
     def schedule(self) -> None:
         """Patches of a level in which elements yield come before its others, because they take longer."""
-        if not self.scheduled:
+        if not self.scheduled or self.blocks >= len(self.patches.head):
             return
         ends = sorted({0, *self.level_patches, len(self.patches.head)})
         for part in (slice(a, b) for a, b in pairwise(ends)):

@@ -167,7 +167,13 @@ def grid_points(X: Array, patches: Patches) -> tuple[Index, Index]:
     return points, (exponent + 127).astype(np.int32)
 
 
-def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixed"], X: Array | None = None) -> Patches:
+def make_patches(
+    conn: Index,
+    ends: Sequence[int] = (),
+    slots: int = SLOTS["mixed"],
+    X: Array | None = None,
+    size: int = PATCH,
+) -> Patches:
     """Patches of elements that stand in a compact order; those with too many nodes are halved.
 
     So are those that are too large for one of their elements, where there will be grids.
@@ -179,10 +185,11 @@ def make_patches(conn: Index, ends: Sequence[int] = (), slots: int = SLOTS["mixe
         ends: where the elements of each scene of a batch end; each has patches of its own, as if it were alone.
         slots: that a patch may have.
         X: positions of the nodes [m], shape (node_count, 3), float64, where `grid_points` will be called.
+        size: elements of a patch at most.
     """
     count = conn.shape[1]
     ends = sorted({0, *ends, count})
-    start = np.concatenate([*(np.arange(a, b, PATCH) for a, b in pairwise(ends)), [count]])
+    start = np.concatenate([*(np.arange(a, b, size) for a, b in pairwise(ends)), [count]])
     lots = chunks(len(start) - 1, SORT_CHUNK // PATCH)
     made = []
     for lot in lots:

@@ -184,6 +184,11 @@ class ContactStage:
         return self.items[0].plane is not None
 
     @property
+    def is_replayable(self) -> bool:
+        """Whether a graph can hold the search: on a GPU, once a first search has built the tree of boxes."""
+        return not self.on_plane and self.bvh is not None and wp.get_device(self.slave.device).is_cuda
+
+    @property
     def blocks(self) -> int:
         """Blocks of threads that look at the slaves."""
         return -(-len(self.slave) // contact.BLOCK_DIM)
@@ -242,14 +247,14 @@ class ContactStage:
             return
         if self.sides > 1:
             slaves = [self.slave, self.slave_faces, self.stiffness]
-        inputs = [*nodes, own.u_search, *slaves, self._master(own)]
+        inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [own.face_count, own.face_slave, self.master_scene, self.margin, own.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
 
-    def _master(self, own: ContactState) -> Any:
+    def faces_of(self, own: ContactState) -> Any:
         """The master's faces with what the latest search listed."""
         found = nearest.Master()
         found.face, found.stiffness = self.face, self.face_stiffness

@@ -1,6 +1,7 @@
-"""Owns which kernels of a captured CUDA graph begin while the one before them ends, by marks on its edges.
+"""Owns which kernels of a captured CUDA graph begin while the one before them ends, and which need the device at once.
 
-See `kernels.hardware.early_launch` for the kernels' side.
+The first by marks on its edges, the second by an attribute of its nodes; see `kernels.hardware.early_launch` and
+`kernels.resident.meeting` for the kernels' side.
 
 Warp captures graphs but leaves their edges as they are, so that the driver is asked to change them: CUDA Driver API,
 "Graph Management".
@@ -15,10 +16,12 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
+from warp_mca.kernels.resident.meeting import TOGETHER
 
 MIN_DRIVER = (12, 3)
 
 _KERNEL = 0  # CU_GRAPH_NODE_TYPE_KERNEL
+_COOPERATIVE = 2  # CU_LAUNCH_ATTRIBUTE_COOPERATIVE
 _PROGRAMMATIC = 1  # CU_GRAPH_DEPENDENCY_TYPE_PROGRAMMATIC and CU_GRAPH_KERNEL_NODE_PORT_PROGRAMMATIC
 _SUFFIX = "_cuda_kernel_forward"  # Warp's names are key, underscore, hash, and this
 
@@ -65,6 +68,33 @@ def _key(node: int) -> str:
     return (name.value or b"").decode().removesuffix(_SUFFIX).rpartition("_")[0]
 
 
+def launch_together(graph: Any) -> int:
+    """Launch all blocks of threads of the kernels that TOGETHER names at once, or not at all.
+
+    Args:
+        graph: captured by Warp, not launched yet.
+
+    Returns:
+        The number of kernels.
+
+    Raises:
+        RuntimeError: the driver failed.
+    """
+    if not graph.device.is_cuda:
+        return 0
+    count = ctypes.c_size_t()
+    _call("cuGraphGetNodes", graph.graph, None, ctypes.byref(count))
+    if not count.value:
+        return 0
+    nodes = (ctypes.c_void_p * count.value)()
+    _call("cuGraphGetNodes", graph.graph, nodes, ctypes.byref(count))
+    chosen = [node for node in nodes if _key(node) in TOGETHER]
+    value = (ctypes.c_int * 16)(1)  # CUkernelNodeAttrValue, a union of 64 bytes
+    for node in chosen:
+        _call("cuGraphKernelNodeSetAttribute", ctypes.c_void_p(node), _COOPERATIVE, ctypes.byref(value))
+    return len(chosen)
+
+
 def launch_early(graph: Any) -> int:
     """Let a kernel that is registered by `begins_early` begin while the registered kernel before it ends.
 
@@ -89,6 +119,8 @@ def launch_early(graph: Any) -> int:
         return 0
     count = ctypes.c_size_t()
     _call("cuGraphGetEdges_v2", graph.graph, None, None, None, ctypes.byref(count))
+    if not count.value:  # the driver refuses to list none
+        return 0
     Nodes, Edges = ctypes.c_void_p * count.value, _Edge * count.value
     begin, end, data = Nodes(), Nodes(), Edges()
     _call("cuGraphGetEdges_v2", graph.graph, begin, end, data, ctypes.byref(count))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
-from warp_mca.solve.early_launch import launch_early
+from warp_mca.solve.early_launch import launch_early, launch_together
 from warp_mca.solve.threads import Pool, Split, Stages, flushing
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ class Replay:
                 with wp.ScopedCapture() as capture:
                     body()
                 launch_early(capture.graph)
+                launch_together(capture.graph)
                 graphs[name] = capture.graph
             with self._flush():
                 wp.capture_launch(graphs[name])

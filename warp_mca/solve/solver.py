@@ -34,6 +34,7 @@ from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
+from warp_mca.solve.resident import resident
 from warp_mca.solve.rigid_stage import RigidStage
 from warp_mca.solve.stage import Step, Streams
 from warp_mca.solve.state import State
@@ -109,6 +110,7 @@ class Solver:
         self.groups = step_groups(self)
         self.subgroups = [step_groups(self, level) for level in range(model.rates.top if model.rates else 0)]
         self._streams = Streams(wp.get_device().is_cuda)
+        self.resident = resident(self)
 
     @property
     def _early(self) -> int:
@@ -163,14 +165,21 @@ class Solver:
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
             (self.nodes.kernels() + self.absorbing.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
+            *([self.resident.kernels()] if self.resident else []),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
-        with wp.ScopedDevice(self.device):
-            for stage in self.contacts:
-                stage.search(self.work, state)
+        if any(stage.is_replayable for stage in self.contacts):
+            self._replay.graph(state, "search", lambda: self._search(state))
+        else:
+            with wp.ScopedDevice(self.device):
+                self._search(state)
+
+    def _search(self, state: State) -> None:
+        for stage in self.contacts:
+            stage.search(self.work, state)
 
     def begin(self, state: State) -> None:
         """First search of a new state, after `compile`."""
@@ -201,6 +210,12 @@ class Solver:
             level = (j & -j).bit_length() - 1
             self._streams.run(self.subgroups[level], Step(step.state, step.split))
 
+    def _steps(self, state: State, count: int) -> None:
+        if self.resident and count:
+            return self.resident.launch(state, count)
+        for _ in range(count):
+            self._step(Step(state))
+
     def _schedule(self) -> None:
         for stage in self.elements:
             stage.schedule()
@@ -229,8 +244,7 @@ class Solver:
         def interval() -> None:
             self._schedule()
             record()
-            for _ in range(count - 1):
-                self._step(Step(state))
+            self._steps(state, count - 1)
 
         self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count
@@ -247,8 +261,7 @@ class Solver:
 
             def steps() -> None:
                 self._schedule()
-                for _ in range(count):
-                    self._step(Step(state))
+                self._steps(state, count)
 
             self._replay.graph(state, f"step {count}", steps)
         state.steps += count

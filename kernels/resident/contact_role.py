@@ -1,0 +1,176 @@
+"""Owns the blocks of threads that press slave nodes on the faces of a master in every step: LANES threads for each.
+
+Each of these looks at candidate faces of its own; the one that found the face that presses the node goes on.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.contact import LANES
+from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of, passes_by, reachable
+from warp_mca.kernels.contact.search import STALE, moved_too_far
+from warp_mca.kernels.contact.settle import meet, settle_functions
+from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.hardware.shared_memory import shared_functions
+from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
+from warp_mca.model.patches import PATCH
+
+wp.set_module_options({"enable_backward": False})
+
+_, exchange = shared_functions("float64")
+
+
+@wp.struct
+class Slaves:
+    """Slave nodes of a contact pass, and what they may touch.
+
+    Attributes:
+        node: shape (slave_count,), int32.
+        stiffness: penalty stiffness [N/m], shape (slave_count,), float64.
+        u_search: displacement of each node at the latest search [m], shape (node_count,), vec3d.
+        mu: coefficient of friction [-].
+        margin: of the search [m].
+        per_newton: what sums of normal forces count for a newton [1/N].
+    """
+
+    node: wp.array(dtype=wp.int32)
+    stiffness: wp.array(dtype=wp.float64)
+    u_search: wp.array(dtype=wp.vec3d)
+    mu: wp.float64
+    margin: wp.float64
+    per_newton: wp.float64
+
+
+@wp.func
+def comes_first(
+    gap: wp.float64, beside: wp.bool, f: int, other_gap: wp.float64, other_beside: wp.bool, other: int
+) -> bool:
+    """Whether face f presses a node rather than another face that it penetrates; the rule of `nearest_face`."""
+    if beside != other_beside:
+        return other_beside
+    if gap == other_gap:
+        return f < other
+    return (gap > other_gap) != beside
+
+
+@wp.func
+def nearest_of_lanes(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    master: Master,
+    s: int,
+    x: wp.vec3d,
+    along: wp.vec3f,
+    q: int,
+):
+    """`nearest_face`, by LANES lanes: what lane q found, and whether that, or its absence, holds for the node."""
+    near = nearest_of(X, u, master, s, x, along, q, wp.static(LANES))
+    gap = near.gap
+    beside = near.beside
+    face = near.face
+    for k in range(wp.static(LANES.bit_length() - 1)):
+        other_gap = exchange(gap, 1 << k)
+        other_beside = exchange(wp.where(beside, wp.float64(1.0), wp.float64(0.0)), 1 << k) > wp.float64(0.0)
+        other = int(exchange(wp.float64(face), 1 << k))
+        near.front = wp.min(near.front, exchange(near.front, 1 << k))
+        if other >= 0 and (face < 0 or comes_first(other_gap, other_beside, other, gap, beside, face)):
+            gap = other_gap
+            beside = other_beside
+            face = other
+    holds = near.face >= 0 and near.face == face
+    if face < 0:
+        holds = q == 0
+    return near, holds
+
+
+@wp.func
+def last_pressure(s: int, friction: bool, spring: Spring):
+    """Contact force of a spring along the normal of the face that it pressed last [N]."""
+    pressed = spring.force[s]
+    if friction:
+        pressed -= spring.tangential[s]
+    return wp.vec3f(pressed)
+
+
+@cache
+def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
+    """The function that gives slave nodes their contact forces in each of some steps."""
+    settle, let_go = settle_functions(friction, stress_free, law)
+
+    @wp.func
+    def touch_nearest(
+        s: int,
+        i: int,
+        v: wp.array(dtype=wp.vec3d),
+        near: Nearest,
+        along: wp.vec3f,
+        held: wp.float64,
+        slaves: Slaves,
+        master: Master,
+        dt: wp.float64,
+        spring: Spring,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        """As `contact.surface_kernel` presses a node, or lets it go."""
+        if near.face >= 0:
+            touch = meet(v, master.face, i, near, dt, held, along)
+            edge = wp.float64(2.0) * wp.sqrt(near.area)
+            touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
+            if passes_by(near.beside, held, near.front, edge):
+                touch.touches = bool(False)
+            touch.own = slaves.stiffness[s]
+            touch.limit = master.stiffness[near.face]
+            contact_force_out[i] = contact_force_out[i] + settle(
+                s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out
+            )
+        else:
+            let_go(s, i, v, master.face, dt, near.front, held, spring)
+
+    @wp.func
+    def touch_slaves(
+        block: int,
+        lane: int,
+        steps: int,
+        movers: int,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        slaves: Slaves,
+        master: Master,
+        dt: wp.float64,
+        spring: Spring,
+        count_out: wp.array(dtype=wp.int32),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        """The first PATCH threads of each block; `movers`: blocks of threads that move nodes."""
+        item = (block * wp.static(PATCH) + lane) // wp.static(LANES)
+        last = slaves.node.shape[0] - 1
+        s = wp.min(item, last)
+        exists = item <= last
+        q = lane % wp.static(LANES)
+        i = slaves.node[s]
+        x = X[i]
+        searched = slaves.u_search[i]
+        for n in range(steps):
+            along = last_pressure(s, wp.static(friction), spring)
+            held = spring.held[s]
+            if n > 0:
+                wait_for(wp.static(NODES), n * movers, count_out)
+            if lane < wp.static(PATCH):
+                near, holds = nearest_of_lanes(X, u, master, s, x + u[i], along, q)
+                if exists and holds:
+                    touch_nearest(
+                        s, i, v, near, along, held, slaves, master, dt, spring,
+                        contact_force_out, normal_force_out, flag_out,
+                    )  # fmt: skip
+                if q == 0 and moved_too_far(u[i], searched, slaves.margin):
+                    flag_out[0, wp.static(STALE)] = 1
+            arrive(wp.static(FORCES), count_out)
+
+    return touch_slaves

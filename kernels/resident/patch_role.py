@@ -1,0 +1,183 @@
+"""Owns the blocks of threads that compute one patch of elements in every step.
+
+What says where its points lie stays in shared memory from step to step.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.hex8_lanes import flow_functions
+from warp_mca.kernels.elements.hex8_patch import element_functions
+from warp_mca.kernels.elements.hexahedron import frame_functions
+from warp_mca.kernels.elements.patch import (
+    POINT,
+    Patches,
+    copy_functions,
+    copy_places,
+    corners_of,
+    element_count,
+    exponent_of,
+    from_start,
+    slot_count,
+)
+from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.shared_memory import FORCES as POOL
+from warp_mca.kernels.hardware.shared_memory import (
+    barrier,
+    copy_vector,
+    shared_functions,
+    slot_pools,
+    wait_for_copies,
+)
+from warp_mca.kernels.records.extremes import keep_functions
+from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
+from warp_mca.model.patches import PATCH, SLOTS
+
+wp.set_module_options({"enable_backward": False})
+
+THREADS = 2 * PATCH  # of a block
+RESIDENT = 2  # blocks of threads that a multiprocessor holds, by the registers they need
+ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread
+
+
+@cache
+def element_role(precision: str, law_name: str) -> Any:
+    """The function that computes the elements of a patch by all threads of a block.
+
+    Those of a law are computed by four lanes each, whether they yield or not.
+    """
+    t = scalars(precision)
+    R, point = t.real, POINT[precision]
+    plastic = bool(law_name)
+    load_points, load_displacements, _ = load_functions(precision)
+    rounded_corners, element_rotation, _ = frame_functions(precision)
+    _, keep_volume, _ = keep_functions(R)
+    _, elastic_element = element_functions(precision, law_name)
+    _, _, flow, keep_rotation = flow_functions(precision, law_name)
+
+    @wp.func
+    def rotate_element(
+        lane: int,
+        head: wp.vec4i,
+        corners: wp.vec4ui,
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        extreme_out: wp.array2d(dtype=R),
+    ):
+        Xl = load_points(points, pool, corners, 0, exponent_of(head))
+        ul = rounded_corners(load_displacements(pool, corners, 0))
+        _W, wide, J = element_rotation(Xl, ul)
+        keep_volume(from_start(head[0] + lane), R(1.0) - J, extreme_out)
+        return wide, Xl, ul
+
+    @wp.func
+    def compute_elements(
+        lane: int,
+        head: wp.vec4i,
+        corners: wp.vec4ui,
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        patches: Patches,
+        law: wp.array2d(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=R),
+    ):
+        """Forces as `hex8_patch` keeps them."""
+        count = element_count(head)
+        if lane < count:
+            wide, Xl, ul = rotate_element(lane, head, corners, points, pool, extreme_out)
+            if wp.static(plastic):
+                keep_rotation(wide, lane, force_out)
+            else:
+                m = material_of(corners[0], corners[1])
+                e = from_start(head[0] + lane)
+                elastic_element(
+                    Xl, ul, wide, pool, corners, 0, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
+                )
+        if wp.static(plastic):
+            barrier()
+            for batch in range((4 * count + wp.static(THREADS - 1)) // wp.static(THREADS)):
+                item = (batch * wp.static(THREADS) + lane) >> 2
+                thread = wp.min(item, count - 1)
+                e = from_start(head[0] + thread)
+                if flow(
+                    points, pool, 0, exponent_of(head), patches, e, law, thread, lane & 3, item < count,
+                    history_out, extreme_out, force_out,
+                ):  # fmt: skip
+                    yielded_out[e] = 1
+        barrier()
+
+    return compute_elements
+
+
+@cache
+def patch_role(precision: str, law_name: str) -> Any:
+    """The function that computes the forces of a patch of `hex8` in each of some steps."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    force_pool, _ = shared_functions(precision)
+    point_pool, vector_pool, places_pool = slot_pools(precision)
+    point, slots, mixed = POINT[precision], SLOTS[precision], precision == "mixed"
+    copy_points = copy_functions(precision)[3]
+    clear_nowhere, _, _, sum_slot = sum_functions(precision)
+    compute_elements = element_role(precision, law_name)
+
+    @wp.func
+    def compute_patch(
+        block: int,
+        lane: int,
+        steps: int,
+        movers: int,
+        X: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
+        patches: Patches,
+        law: wp.array2d(dtype=R),
+        slot: int,
+        u: wp.array(dtype=wp.vec3d),
+        count_out: wp.array(dtype=wp.int32),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        """`movers`: blocks of threads that move nodes."""
+        forces = wp.array(ptr=force_pool(), shape=(POOL,), dtype=R)
+        kept_points = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
+        pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)
+        places = wp.array(ptr=places_pool(), shape=(slots,), dtype=wp.vec2i)
+        clear_nowhere(forces, lane)
+        head = patches.turn[block]
+        corners = corners_of(patches, head, lane)
+        if lane < wp.static(PATCH):
+            copy_points(points, head, lane, 0, kept_points)
+            copy_places(patches, head, lane, places)
+        wait_for_copies()
+        barrier()
+        for n in range(steps):
+            if n > 0:
+                wait_for(wp.static(NODES), n * movers, count_out)
+            for k in range(wp.static(ROUNDS)):
+                a = lane + k * wp.static(THREADS)
+                if a < slot_count(head):
+                    if wp.static(mixed):
+                        copy_vector(u, kept_points[a][3], a, pool)
+                    else:
+                        copy_vector(X, kept_points[a], a, pool)
+                        copy_vector(u, kept_points[a], wp.static(slots) + a, pool)
+            wait_for_copies()
+            barrier()
+            compute_elements(
+                lane, head, corners, kept_points, pool, patches, law, yielded_out, history_out, extreme_out, forces
+            )
+            for k in range(wp.static(ROUNDS)):
+                a = lane + k * wp.static(THREADS)
+                if a < slot_count(head):
+                    force_out[from_start(slot + head[1] + a)] = sum_slot(forces, places[a])
+            arrive(wp.static(FORCES), count_out)
+
+    return compute_patch

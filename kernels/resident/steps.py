@@ -1,0 +1,198 @@
+"""Owns the kernel that takes many steps in one launch, for models that a GPU holds at once.
+
+Blocks of threads keep their roles from step to step: patches of elements and slave nodes of a contact give forces;
+master, bound and free nodes move. Those that move nodes wait for all forces of a step, and those that give forces for
+all nodes. All blocks must be on the device together (`warp_mca.solve.resident`).
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.nearest import Master
+from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.elements.patch import POINT, Patches
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.constraint import Bonds
+from warp_mca.kernels.resident.bound_role import bound_role
+from warp_mca.kernels.resident.contact_role import Slaves, contact_role
+from warp_mca.kernels.resident.master_role import Faces, master_role
+from warp_mca.kernels.resident.meeting import leave, together
+from warp_mca.kernels.resident.node_role import Nodes, free_role
+from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS, patch_role
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Roles:
+    """First block of threads of each role but that of patches, and the number of blocks.
+
+    Attributes:
+        contact: slave nodes.
+        master: nodes of master faces.
+        bound: bound nodes, and the greatest normal force: one block, or none.
+        free: other nodes.
+        end: number of blocks.
+    """
+
+    contact: wp.int32
+    master: wp.int32
+    bound: wp.int32
+    free: wp.int32
+    end: wp.int32
+
+
+@cache
+def resident_kernel(
+    precision: str, law_name: str, contact: bool, friction: bool, stress_free: bool, contact_law: str, partial: bool
+) -> Any:
+    """Kernel: `steps` steps of a model of one block of `hex8`, with a contact pass if `contact`.
+
+    Arguments are those of the kernels that take the same steps one by one: `hex8_patch`, `contact`, `nodes.node`,
+    `nodes.constraint`. count_out are the counts of `meeting`, zero before and after.
+    """
+    t = scalars(precision)
+    R, vec3, point = t.real, t.vec3, POINT[precision]
+    compute_patch, move_free = patch_role(precision, law_name), free_role(precision, contact)
+    touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision)
+    move_bound = bound_role(precision, partial)
+
+    @wp.func
+    def give_forces(
+        block: int,
+        lane: int,
+        steps: int,
+        roles: Roles,
+        X: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
+        patches: Patches,
+        law: wp.array2d(dtype=R),
+        slot: int,
+        slaves: Slaves,
+        master: Master,
+        dt: wp.float64,
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        spring: Spring,
+        count_out: wp.array(dtype=wp.int32),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array(dtype=wp.int64),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        """Forces of patches and slave nodes."""
+        movers = roles.end - roles.master
+        if block < roles.contact:
+            compute_patch(
+                block, lane, steps, movers, X, points, patches, law, slot, u,
+                count_out, yielded_out, history_out, extreme_out, force_out,
+            )  # fmt: skip
+        elif wp.static(contact):
+            touch_slaves(
+                block - roles.contact, lane, steps, movers, X, u, v, slaves, master, dt, spring,
+                count_out, contact_force_out, normal_force_out, flag_out,
+            )  # fmt: skip
+
+    @wp.func
+    def move_nodes(
+        block: int,
+        lane: int,
+        steps: int,
+        roles: Roles,
+        nodes: Nodes,
+        faces: Faces,
+        bonds: Bonds,
+        dt: wp.float64,
+        force: wp.array(dtype=vec3),
+        spring: Spring,
+        count_out: wp.array(dtype=wp.int32),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array2d(dtype=wp.int64),
+        u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
+        impulse_out: wp.array(dtype=wp.vec3d),
+        work_out: wp.array(dtype=wp.vec3d),
+        work_after_out: wp.array(dtype=wp.vec3d),
+        clock_out: wp.array(dtype=wp.int32),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        """Motion of master, bound and free nodes."""
+        pushers = roles.master
+        if block < roles.bound:
+            if wp.static(contact):
+                move_masters(
+                    block - roles.master, lane, steps, pushers, nodes, faces, dt, force, spring,
+                    count_out, u_out, v_out, speed_square_out, flag_out,
+                )  # fmt: skip
+        elif block < roles.free:
+            move_bound(
+                lane, steps, pushers, nodes, bonds, dt, force, count_out, normal_force_out, u_out, v_out,
+                speed_square_out, impulse_out, work_out, work_after_out, clock_out,
+            )  # fmt: skip
+        else:
+            move_free(
+                block - roles.free, lane, roles.end - roles.free, steps, pushers, nodes, dt, force,
+                count_out, contact_force_out, u_out, v_out, speed_square_out,
+            )  # fmt: skip
+
+    @wp.kernel(
+        enable_backward=False,
+        module="unique",
+        grid_stride=False,
+        launch_bounds=(THREADS, RESIDENT),
+        module_options={"fast_math": True},
+    )
+    def resident_steps(
+        roles: Roles,
+        steps: int,
+        X: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
+        patches: Patches,
+        law: wp.array2d(dtype=R),
+        slot: int,
+        nodes: Nodes,
+        slaves: Slaves,
+        master: Master,
+        faces: Faces,
+        bonds: Bonds,
+        dt: wp.float64,
+        spring: Spring,
+        count_out: wp.array(dtype=wp.int32),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+        contact_force_out: wp.array(dtype=wp.vec3d),
+        normal_force_out: wp.array2d(dtype=wp.int64),
+        u_out: wp.array(dtype=wp.vec3d),
+        v_out: wp.array(dtype=wp.vec3d),
+        speed_square_out: wp.array(dtype=wp.float32),
+        impulse_out: wp.array(dtype=wp.vec3d),
+        work_out: wp.array(dtype=wp.vec3d),
+        work_after_out: wp.array(dtype=wp.vec3d),
+        clock_out: wp.array(dtype=wp.int32),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        lane = wp.tid() % wp.static(THREADS)
+        block = wp.tid() // wp.static(THREADS)
+        if block < roles.master:
+            give_forces(
+                block, lane, steps, roles, X, points, patches, law, slot, slaves, master, dt, u_out, v_out, spring,
+                count_out, yielded_out, history_out, extreme_out, force_out, contact_force_out,
+                normal_force_out[wp.static(1 if contact else 0)], flag_out,
+            )  # fmt: skip
+        else:
+            move_nodes(
+                block, lane, steps, roles, nodes, faces, bonds, dt, force_out, spring,
+                count_out, contact_force_out, normal_force_out, u_out, v_out, speed_square_out,
+                impulse_out, work_out, work_after_out, clock_out, flag_out,
+            )  # fmt: skip
+        leave(count_out)
+
+    return together(resident_steps)
