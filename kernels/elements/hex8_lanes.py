@@ -13,8 +13,7 @@ from warp_mca.kernels.elements.hex8_small import stress_functions
 from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
 from warp_mca.kernels.elements.patch import POINT, Patches, exponent_of, from_start
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
-from warp_mca.kernels.elements.rotation import local_function
-from warp_mca.kernels.hardware.scalars import THIRD, scalars, width_functions
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import keep_functions
@@ -148,21 +147,18 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
-    """The functions.
-
-    (List the element of a thread; compute the listed elements of a patch; compute one of a patch; keep its rotation.)
+def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
+    """The functions (list the element of a thread; compute the listed elements of a patch; compute one of a patch).
 
     Four lanes compute each.
 
     A list has its length first, shape (PATCH + 1,).
     """
     t = scalars(precision)
-    R, mat33, mixed = t.real, t.mat33, precision == "mixed"
-    local_of, (_, widened) = local_function(precision), width_functions(precision)
+    R, mat33 = t.real, t.mat33
     point = POINT[precision]
     _, _, load_corners = load_functions(precision)
-    add_product = fused(precision).add_product
+    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
     to_point_lines, to_corners, lane_sum, lane_max = lane_functions(precision)
     shape_of_point, stress_of_point, history_of_points, force_of_edge = point_functions(precision, law_name)
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
@@ -194,20 +190,14 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
         x0, d0, x1, d1 = load_corners(points, pool, patches, e, a, first, exponent)
         m = material_of(patches.corner[0, e], patches.corner[1, e])
         W = mat33()
-        wide = wp.mat33d()
         for k in range(9):
             W[k // 3, k % 3] = force_out[k * wp.static(ROW) + thread]
-            wide[k // 3, k % 3] = wp.float64(W[k // 3, k % 3])
-            if wp.static(mixed):
-                wide[k // 3, k % 3] += wp.float64(force_out[(9 + k) * wp.static(ROW) + thread])
         warp_barrier()
         history = read_row(history_out, 2 * size * q, e)
         xi = wp.where((q & 1) != 0, R(1.0), R(-1.0))
         eta = wp.where(q > 1, R(1.0), R(-1.0))
         gx0, gx1, gy0, gy1, gz = to_point_lines(x0, x1, xi, eta)
-        lx0, lx1, ly0, ly1, lz = to_point_lines(
-            local_of(widened(x0), d0, wide), local_of(widened(x1), d1, wide), xi, eta
-        )
+        lx0, lx1, ly0, ly1, lz = to_point_lines(add_transposed(d0, W, x0 + d0), add_transposed(d1, W, x1 + d1), xi, eta)
         b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
         b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
         pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
@@ -238,19 +228,11 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
         return flows
 
     @wp.func
-    def keep_rotation(W: wp.mat33d, thread: int, force_out: wp.array(dtype=R)):
-        """Keep the rotation of a thread's element where its forces will be: what float32 leaves follows."""
-        for i in range(9):
-            first = R(W[i // 3, i % 3])
-            force_out[i * wp.static(ROW) + thread] = first
-            if wp.static(mixed):
-                force_out[(9 + i) * wp.static(ROW) + thread] = R(W[i // 3, i % 3] - wp.float64(first))
-
-    @wp.func
-    def list_element(W: wp.mat33d, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
-        """List the element of a thread, and keep its rotation."""
+    def list_element(W: mat33, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
+        """List the element of a thread, and keep its rotation where its forces will be."""
         listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
-        keep_rotation(W, thread, force_out)
+        for i in range(9):
+            force_out[i * wp.static(ROW) + thread] = W[i // 3, i % 3]
 
     @wp.func
     def flow_listed(
@@ -281,4 +263,4 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
             if lane == 0:
                 listed_out[0] = 0
 
-    return list_element, flow_listed, flow, keep_rotation
+    return list_element, flow_listed, flow

@@ -25,7 +25,7 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
 from warp_mca.kernels.hardware.early_launch import begins_early
-from warp_mca.kernels.hardware.scalars import scalars, width_functions
+from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,
     HEADS,
@@ -46,11 +46,9 @@ wp.set_module_options({"enable_backward": False})
 def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
     """Functions: compute the element of a thread as if it were elastic, and list it where it yields; the first part."""
     t = scalars(precision)
-    R, mat33, mat83, reads_again = t.real, t.mat33, t.mat83, precision == "mixed"
+    R, mat33, mat83 = t.real, t.mat33, t.mat83
     plastic, (list_element, *_) = bool(law_name), flow_functions(precision, law_name)
-    _, element_rotation, local_displacement = frame_functions(precision)
-    _, load_displacements, _ = load_functions(precision)
-    rounded, _ = width_functions(precision)
+    element_rotation, local_displacement = frame_functions(precision)
     element_forces = small_strain_function(precision, "")
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
@@ -60,10 +58,7 @@ def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
     def elastic_element(
         Xl: mat83,
         ul: mat83,
-        wide: wp.mat33d,
-        pool: wp.array(dtype=wp.vec3d),
-        corners: wp.vec4ui,
-        first: int,
+        W: mat33,
         e: int,
         m: int,
         lane: int,
@@ -73,18 +68,9 @@ def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Whether the element begins to yield; its forces do not hold then.
-
-        In mixed, displacements are read a second time: in float64 they would take registers from the rotation on.
-        """
+        """Whether the element begins to yield; its forces do not hold then."""
         G = R(scale) * law[m, 1]
-        if wp.static(reads_again):
-            local = local_displacement(Xl, load_displacements(pool, corners, first), wide)
-        else:
-            local = local_displacement(Xl, ul, wide)
-        W = mat33()  # from here on, so that it takes no registers before
-        for k in range(3):
-            W[k] = rounded(wide[k])
+        local = local_displacement(Xl, ul, W)
         f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
@@ -99,10 +85,8 @@ def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
     def compute_element(
         Xl: mat83,
         ul: mat83,
-        pool: wp.array(dtype=wp.vec3d),
-        corners: wp.vec4ui,
-        head: wp.vec4i,
-        first: int,
+        e: int,
+        m: int,
         lane: int,
         law: wp.array2d(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
@@ -111,20 +95,16 @@ def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         listed_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=R),
     ):
-        e = from_start(head[0] + lane)
-        m = material_of(corners[0], corners[1])
-        _W, wide, J = element_rotation(Xl, ul)
+        W, J = element_rotation(Xl, ul)
         keep_volume(e, R(1.0) - J, extreme_out)
         flows = bool(False)
         if wp.static(plastic):
             flows = yielded_out[e] != 0
         if not flows:
-            flows = elastic_element(
-                Xl, ul, wide, pool, corners, first, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
-            )
+            flows = elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
         if wp.static(plastic):
             if flows:
-                list_element(wide, lane, listed_out, force_out)
+                list_element(W, lane, listed_out, force_out)
 
     return compute_element, elastic_element
 
@@ -145,10 +125,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
     early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)
-    rounded_corners, _, _ = frame_functions(precision)
     clear_nowhere, _, sum_patch, _ = sum_functions(precision)
     compute_element, _ = element_functions(precision, law_name)
-    _, flow_listed, *_ = flow_functions(precision, law_name)
+    _, flow_listed, _ = flow_functions(precision, law_name)
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(
@@ -187,9 +166,11 @@ def force_kernel(precision: str, law_name: str) -> Any:
         head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, kept_points, pool)
         k = int(0)
         while element_count(head) > 0:
+            e = from_start(head[0] + lane)
+            m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
             Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
-            ul = rounded_corners(load_displacements(pool, corners, first))
+            ul = load_displacements(pool, corners, first)
             next_head = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
@@ -197,9 +178,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
             if wp.static(early):
                 copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                compute_element(
-                    Xl, ul, pool, corners, head, first, lane, law, yielded_out, history_out, extreme_out, listed, forces
-                )
+                compute_element(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces)
             wait_for_copies()
             barrier()
             if wp.static(plastic):

@@ -13,10 +13,10 @@ import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
-from warp_mca.kernels.elements.hourglass import DISSIPATED, amplitude_functions, hourglass_function
+from warp_mca.kernels.elements.hourglass import DISSIPATED, amplitude_functions, hourglass_functions
 from warp_mca.kernels.elements.hourglass import VECTORS as HOURGLASS_VECTORS
 from warp_mca.kernels.elements.kinematics import kinematics
-from warp_mca.kernels.elements.patterns import VOLUME_SCALE, frame_functions, pattern_functions, pattern_sum_function
+from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
 from warp_mca.kernels.elements.point_records import history_functions, stress_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import law_functions
@@ -28,10 +28,10 @@ VECTORS = HOURGLASS_VECTORS  # plastic hourglass amplitudes, which turn with the
 
 
 @cache
-def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any]:
-    """Functions (stress and hourglass forces of an element, with plastic flow; corner forces).
+def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
+    """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
-    The first keeps the greatest strain.
+    The first also gives the ratio of volumes J, the second keeps the greatest strain.
 
     A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
     """
@@ -39,7 +39,9 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
     add_product, add_matrices = fused(precision).add_product, fused(precision).add_matrices
     _, to_corners = pattern_functions(precision)
-    hourglass = hourglass_function(precision)
+    rotated = mean_frame(precision, finite)
+    mean_gradients, mean_gradient_of = mean_functions(precision)
+    amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, write_plastic_strain = history_functions(precision)
     read_amplitudes, write_amplitudes = amplitude_functions(precision)
     keep_strain, _, _ = keep_functions(R)
@@ -47,6 +49,14 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
+
+    @wp.func
+    def shape_and_strain(x: mat73, du: mat73):
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H_world)
+        return b, R(VOLUME_SCALE) * scaled_volume, W, H, J, amplitudes(x, du, H_world, W)
 
     @wp.func
     def stress_and_flow(
@@ -110,31 +120,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
             f[3 + n] = add_product(f[3 + n], P, b[3 + n])
         return to_corners(f)
 
-    return stress_and_flow, corner_forces
-
-
-@cache
-def strain_function(precision: str, finite: bool) -> Any:
-    """The function (X, u, conn, e) -> patterns of an element, what `patterns.frame_functions` gives, its volume.
-
-    (Patterns x, mean gradients b, volume, W, H, J, amplitudes q.)
-    """
-    R = scalars(precision).real
-    load_element, load_wide = load_function(precision), load_function("float64")
-    to_patterns, to_wide = pattern_sum_function(R), pattern_sum_function(wp.float64)
-    rounded_patterns, mean_rotation, strain_in_frame = frame_functions(precision, finite)
-
-    @wp.func
-    def strain_of_element(
-        X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int
-    ):
-        x = to_patterns(load_element(X, conn, e))
-        du = to_wide(load_wide(u, conn, e))
-        b, volume, W, wide, S, J = mean_rotation(x, rounded_patterns(du))
-        H, q = strain_in_frame(x, du, b, volume, W, wide, S)
-        return x, b, R(VOLUME_SCALE) * volume, W, H, J, q
-
-    return strain_of_element
+    return shape_and_strain, stress_and_flow, corner_forces
 
 
 @cache
@@ -142,8 +128,9 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
-    strain_of_element = strain_function(precision, finite)
-    stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
+    load_element = load_function(precision)
+    to_patterns, _ = pattern_functions(precision)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
     store_force = store_function(precision)
     _, keep_volume, _ = keep_functions(R)
 
@@ -163,7 +150,9 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
-        x, b, volume, W, H, J, q = strain_of_element(X, u, conn, e)
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, volume, W, H, J, q = shape_and_strain(x, du)
         P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
         keep_volume(e, R(1.0) - J, extreme_out)
@@ -178,7 +167,11 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
     t = scalars(precision)
     R, mat33, mat43 = t.real, t.mat33, t.mat43
-    strain_of_element, hourglass = strain_function(precision, finite), hourglass_function(precision)
+    to_patterns, _ = pattern_functions(precision)
+    rotated = mean_frame(precision, finite)
+    load_element = load_function(precision)
+    mean_gradients, mean_gradient_of = mean_functions(precision)
+    amplitudes, hourglass = hourglass_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
     read_amplitudes, _ = amplitude_functions(precision)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
@@ -200,7 +193,12 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         energy_out: wp.array2d(dtype=R),
     ):
         e = wp.tid()
-        x, _b, volume, W, H, _J, q = strain_of_element(X, u, conn, e)
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
+        volume = R(VOLUME_SCALE) * scaled_volume
         m = material[e]
         K = law[m, 0]
         G = law[m, 1]
@@ -212,6 +210,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
                 eps_p, p = read_plastic_strain(history, 0, e)
                 dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
                 dissipated += history[wp.static(DISSIPATED), e]
+        q = amplitudes(x, du, H_world, W)
         if wp.static(plastic):
             q_p = mat43()
             if yielded[e] != 0:
@@ -236,7 +235,10 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    strain_of_element = strain_function(precision, finite)
+    to_patterns, _ = pattern_functions(precision)
+    rotated = mean_frame(precision, finite)
+    load_element = load_function(precision)
+    mean_gradients, mean_gradient_of = mean_functions(precision)
     read_plastic_strain, _ = history_functions(precision)
     plastic = bool(law_name)
     write_stress = stress_function(precision)
@@ -258,7 +260,11 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     ):
         item = wp.tid()
         e = element[item]
-        _x, _b, _volume, W, H, _J, _q = strain_of_element(X, u, conn, e)
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
         m = material[e]
         eps_p = mat33()
         p = R(0.0)

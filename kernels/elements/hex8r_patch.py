@@ -18,7 +18,7 @@ from warp_mca.kernels.elements.patch import (
     from_start,
 )
 from warp_mca.kernels.elements.patch_element import load_functions, load_pattern_function, material_of, sum_functions
-from warp_mca.kernels.elements.patterns import VOLUME_SCALE, frame_functions, pattern_sum_function
+from warp_mca.kernels.elements.patterns import pattern_functions
 from warp_mca.kernels.hardware.early_launch import begins_early
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
@@ -48,10 +48,9 @@ def force_kernel(precision: str, law_name: str) -> Any:
     load_patterns = load_pattern_function(precision)
     _, load_displacements, _ = load_functions(precision)
     clear_nowhere, keep_forces, sum_patch, _ = sum_functions(precision)
-    to_wide = pattern_sum_function(wp.float64)
-    rounded_patterns, mean_rotation, strain_in_frame = frame_functions(precision)
+    to_patterns, _ = pattern_functions(precision)
     _, keep_volume, _ = keep_functions(R)
-    stress_and_flow, corner_forces = element_functions(precision, law_name, False)
+    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False)
 
     @wp.kernel(
         enable_backward=False,
@@ -88,16 +87,14 @@ def force_kernel(precision: str, law_name: str) -> Any:
             m = material_of(corners[0], corners[1])
             first = (k & 1) * wp.static(slots)
             x = load_patterns(kept_points, pool, corners, first, exponent_of(head))
-            du = to_wide(load_displacements(pool, corners, first))
+            du = to_patterns(load_displacements(pool, corners, first))
             next_head = ring[(k + 1) % wp.static(HEADS)]
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
             copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                b, scaled_volume, W, wide, S, J = mean_rotation(x, rounded_patterns(du))
-                H, q = strain_in_frame(x, du, b, scaled_volume, W, wide, S)
-                volume = R(VOLUME_SCALE) * scaled_volume
+                b, volume, W, H, J, q = shape_and_strain(x, du)
                 P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out, extreme_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
                 keep_volume(e, R(1.0) - J, extreme_out)

@@ -10,8 +10,8 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
-from warp_mca.kernels.elements.rotation import local_function, nearest_rotation
-from warp_mca.kernels.hardware.scalars import scalars, width_functions
+from warp_mca.kernels.elements.rotation import nearest_rotation
+from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -141,30 +141,21 @@ def lines_of_point(g: int):
 
 
 @cache
-def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any]:
+def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
     """Functions that take an element to its rotated frame.
 
-    (Displacements relative to the first node, rounded; its rotation as W = Q - I, the same in float64, and the
-    ratio of volumes J at its centre; local displacements.)
+    (Its rotation as W = Q - I and the ratio of volumes J at its centre; local displacements.)
     """
     t = scalars(precision)
-    R, mat83, mat83d = t.real, t.mat83, scalars("float64").mat83
-    rounded, widened = width_functions(precision)
+    R, mat33, mat83 = t.real, t.mat33, t.mat83
     edges, _ = line_functions(precision)
-    polar_rotation = nearest_rotation(precision, finite, exact=True)
-    local_of = local_function(precision)
+    polar_rotation = nearest_rotation(precision, finite)
+    add_transposed = fused(precision).add_transposed
 
     @wp.func
     def edge_sum(x: mat83, direction: int):
         e = edges(x, direction)
         return (e[0] + e[1]) + (e[2] + e[3])
-
-    @wp.func
-    def rounded_corners(wide: mat83d):
-        u = mat83()
-        for a in range(1, 8):
-            u[a] = rounded(wide[a])
-        return u
 
     @wp.func
     def element_rotation(X: mat83, u: mat83):
@@ -177,17 +168,16 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any
         inverse = R(1.0) / wp.dot(c0, a0)
         grad = wp.outer(edge_sum(u, 0), a0) + wp.outer(edge_sum(u, 1), a1) + wp.outer(edge_sum(u, 2), a2)
         F = wp.identity(n=3, dtype=R) + inverse * grad
-        W, wide, _S = polar_rotation(F)
-        return W, wide, wp.determinant(F)
+        return polar_rotation(F), wp.determinant(F)
 
     @wp.func
-    def local_displacement(X: mat83, u: mat83d, W: wp.mat33d):
+    def local_displacement(X: mat83, u: mat83, W: mat33):
         local = mat83()
         for a in range(1, 8):  # the first node is the origin of both
-            local[a] = local_of(widened(X[a]), u[a], W)
+            local[a] = add_transposed(u[a], W, X[a] + u[a])  # Q^T (X + u) - X, without the digits that would cancel
         return local
 
-    return rounded_corners, element_rotation, local_displacement
+    return element_rotation, local_displacement
 
 
 @cache
@@ -271,16 +261,16 @@ def load_function(precision: str) -> Any:
 @cache
 def framed_function(precision: str, finite: bool = False) -> Any:
     """The function (X, u, conn, e) -> (corners, local displacements, frame W, ratio of volumes J at the centre)."""
-    load_element, load_wide = load_function(precision), load_function("float64")
-    rounded_corners, element_rotation, local_displacement = frame_functions(precision, finite)
+    load_element = load_function(precision)
+    element_rotation, local_displacement = frame_functions(precision, finite)
 
     @wp.func
     def load_in_frame(
         X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int
     ):
         Xl = load_element(X, conn, e)
-        ul = load_wide(u, conn, e)
-        W, wide, J = element_rotation(Xl, rounded_corners(ul))
-        return Xl, local_displacement(Xl, ul, wide), W, J
+        ul = load_element(u, conn, e)
+        W, J = element_rotation(Xl, ul)
+        return Xl, local_displacement(Xl, ul, W), W, J
 
     return load_in_frame

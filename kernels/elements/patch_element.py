@@ -10,7 +10,7 @@ import warp as wp
 
 from warp_mca.kernels.elements.patch import POINT, SLOTS_OF_THREAD, Patches, from_start, slot_count
 from warp_mca.kernels.elements.patterns import pattern_functions, pattern_sum_function
-from warp_mca.kernels.hardware.scalars import scalars, width_functions
+from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, place_of, power_of_two
 from warp_mca.model.patches import MATERIAL_BITS, NOWHERE, PATCH, SECOND_SLOT, SLOT_BITS, SLOTS
 
@@ -39,14 +39,20 @@ def material_of(first: wp.uint32, second: wp.uint32):
 
 @cache
 def load_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions: points of an element relative to its first [m]; displacements so; both, of two of its corners.
-
-    Displacements are float64 in both precisions.
-    """
+    """Functions: points of an element relative to its first [m]; displacements so; both, of two of its corners."""
     t = scalars(precision)
-    R, vec3, mat83, mat83d, slots = t.real, t.vec3, t.mat83, scalars("float64").mat83, SLOTS[precision]
+    R, vec3, mat83, slots = t.real, t.vec3, t.mat83, SLOTS[precision]
     point, mixed = POINT[precision], precision == "mixed"
-    rounded, _ = width_functions(precision)
+    # Fast math would also flush what is too small, in three instructions for each number.
+    convert = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
+
+    @wp.func_native(convert if precision == "mixed" else "return value;")
+    def rounded(value: wp.float64) -> R: ...
+
+    @wp.func
+    def difference(pool: wp.array(dtype=wp.vec3d), slot: int, origin: wp.vec3d):
+        d = pool[slot] - origin
+        return vec3(rounded(d[0]), rounded(d[1]), rounded(d[2]))
 
     @wp.func
     def point_difference(
@@ -55,7 +61,7 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
         if wp.static(mixed):
             d = place_of(points, first + slot) - place_of(points, first + origin)  # only what comes next rounds
             return power_of_two(exponent) * vec3(R(d[0]), R(d[1]), R(d[2]))
-        return rounded(pool[slot] - pool[origin])
+        return difference(pool, slot, pool[origin])
 
     @wp.func
     def load_points(
@@ -78,13 +84,13 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
 
     @wp.func
     def load_displacements(pool: wp.array(dtype=wp.vec3d), corners: wp.vec4ui, first: int):
-        local = mat83d()
+        local = mat83()
         begin = displacements_of(first)
         origin = pool[begin + lower(corners[0])]
         for k in range(4):
             if k > 0:
-                local[2 * k] = pool[begin + lower(corners[k])] - origin
-            local[2 * k + 1] = pool[begin + upper(corners[k])] - origin
+                local[2 * k] = difference(pool, begin + lower(corners[k]), origin)
+            local[2 * k + 1] = difference(pool, begin + upper(corners[k]), origin)
         return local
 
     @wp.func
@@ -106,9 +112,9 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
         u = pool[begin + origin]
         return (
             point_difference(points, pool, low, origin, first, exponent),
-            pool[begin + low] - u,
+            difference(pool, begin + low, u),
             point_difference(points, pool, top, origin, first, exponent),
-            pool[begin + top] - u,
+            difference(pool, begin + top, u),
         )
 
     return load_points, load_displacements, load_corners

@@ -10,8 +10,8 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.fused import NOTHING, fused
-from warp_mca.kernels.elements.rotation import local_function, nearest_rotation
-from warp_mca.kernels.hardware.scalars import scalars, width_functions
+from warp_mca.kernels.elements.rotation import nearest_rotation
+from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
@@ -131,55 +131,17 @@ def mean_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any, Any]:
-    """Functions that take an element to the frame of its mean deformation gradient.
-
-    (Patterns of displacements, rounded; mean gradients times volume, the volume, what `rotation.nearest_rotation` has,
-    ratio of volumes J; the mean displacement gradient H in the frame, and what it leaves of the sums over the patterns
-    of hourglass modes, one row for each.)
-    What is left is eight times the amplitudes of docs/theory.md; forces are conjugate to these.
-    """
+def mean_frame(precision: str, finite: bool = False) -> Any:
+    """The function H -> (rotation of the mean deformation gradient I + H as W = Q - I, H in the rotated frame)."""
     t = scalars(precision)
-    R, mat33, mat43, mat63, mat73, mat73d = t.real, t.mat33, t.mat43, t.mat63, t.mat73, scalars("float64").mat73
-    polar_rotation, local_of = nearest_rotation(precision, finite), local_function(precision)
-    mean_gradients, mean_gradient_of = mean_functions(precision)
-    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
+    R, mat33 = t.real, t.mat33
+    polar_rotation = nearest_rotation(precision, finite)
     add_matrices = fused(precision).add_matrices
-    rounded, widened = width_functions(precision)
 
     @wp.func
-    def rounded_patterns(wide: mat73d):
-        du = mat73()
-        for p in range(7):
-            du[p] = rounded(wide[p])
-        return du
+    def rotated(H: mat33):
+        F = wp.identity(n=3, dtype=R) + H
+        W = polar_rotation(F)
+        return W, add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without the digits that would cancel
 
-    @wp.func
-    def mean_rotation(x: mat73, du: mat73):
-        b, volume = mean_gradients(x)
-        F = wp.identity(n=3, dtype=R) + mean_gradient_of(du, b, volume)
-        W, wide, S = polar_rotation(F)
-        return b, volume, W, wide, S, wp.determinant(F)
-
-    @wp.func
-    def strain_of_local(x: mat73, du: mat73d, b: mat63, volume: R, W: mat33, wide: wp.mat33d, S: mat33):
-        local = mat73()
-        for p in range(7):
-            local[p] = local_of(widened(x[p]), du[p], wide)
-        H = mean_gradient_of(local, b, volume)
-        q = mat43()
-        for m in range(4):
-            q[m] = add_product(local[3 + m], H, -x[3 + m])
-        return H - S, q  # which q does not feel
-
-    @wp.func
-    def turned_strain(x: mat73, du: mat73, b: mat63, volume: R, W: mat33, wide: mat33, S: mat33):
-        """The same in fewer operations, whose digits cancel."""
-        H = mean_gradient_of(du, b, volume)
-        q = mat43()
-        for m in range(4):
-            left = add_product(du[3 + m], H, -x[3 + m])
-            q[m] = add_transposed(left, W, left)
-        return add_matrices(H, wp.transpose(W), wp.identity(n=3, dtype=R) + H), q
-
-    return rounded_patterns, mean_rotation, strain_of_local if precision == "mixed" else turned_strain
+    return rotated

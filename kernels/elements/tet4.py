@@ -12,10 +12,10 @@ import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.kinematics import kinematics
+from warp_mca.kernels.elements.patterns import mean_frame
 from warp_mca.kernels.elements.point_records import history_functions, stress_function
-from warp_mca.kernels.elements.rotation import local_function, nearest_rotation
 from warp_mca.kernels.hardware.early_launch import begins_early, wait_for_previous
-from warp_mca.kernels.hardware.scalars import THIRD, scalars, width_functions
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
 
@@ -27,43 +27,32 @@ def gradient_function(precision: str, finite: bool) -> Any:
     """The function (X, conn, u, e) -> (W, H, cofactors of the edges as rows, volume, J): rotation W = Q - I."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    polar_rotation, local_of = nearest_rotation(precision, finite), local_function(precision)
-    rounded, _ = width_functions(precision)
-    add_matrices, mixed = fused(precision).add_matrices, precision == "mixed"
+    rotated = mean_frame(precision, finite)
 
     @wp.func
-    def gradient(l0: vec3, l1: vec3, l2: vec3, c0: vec3, c1: vec3, c2: vec3, inverse: R):
-        return inverse * (wp.outer(l0, c0) + wp.outer(l1, c1) + wp.outer(l2, c2))
+    def edge(field: wp.array(dtype=wp.vec3d), i: int, j: int):
+        d = field[j] - field[i]
+        return vec3(R(d[0]), R(d[1]), R(d[2]))
 
     @wp.func
     def tet_gradient(
         X: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), u: wp.array(dtype=wp.vec3d), e: int
     ):
         n = conn[0, e]
-        x0 = X[conn[1, e]] - X[n]
-        x1 = X[conn[2, e]] - X[n]
-        x2 = X[conn[3, e]] - X[n]
-        d0 = rounded(x0)
-        d1 = rounded(x1)
-        d2 = rounded(x2)
-        l0 = u[conn[1, e]] - u[n]
-        l1 = u[conn[2, e]] - u[n]
-        l2 = u[conn[3, e]] - u[n]
+        d0 = edge(X, n, conn[1, e])
+        d1 = edge(X, n, conn[2, e])
+        d2 = edge(X, n, conn[3, e])
+        l0 = edge(u, n, conn[1, e])
+        l1 = edge(u, n, conn[2, e])
+        l2 = edge(u, n, conn[3, e])
         c0 = wp.cross(d1, d2)
         c1 = wp.cross(d2, d0)
         c2 = wp.cross(d0, d1)
         det = wp.dot(d0, c0)
         inverse = R(1.0) / det
-        H = gradient(rounded(l0), rounded(l1), rounded(l2), c0, c1, c2, inverse)
-        F = wp.identity(n=3, dtype=R) + H
-        J = wp.determinant(F)
-        W, wide, S = polar_rotation(F)
-        if wp.static(mixed):
-            r0 = local_of(x0, l0, wide)
-            r1 = local_of(x1, l1, wide)
-            H = gradient(r0, r1, local_of(x2, l2, wide), c0, c1, c2, inverse) - S
-        else:
-            H = add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without the digits that would cancel
+        H = inverse * (wp.outer(l0, c0) + wp.outer(l1, c1) + wp.outer(l2, c2))
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H)
+        W, H = rotated(H)
         rows = mat33(c0[0], c0[1], c0[2], c1[0], c1[1], c1[2], c2[0], c2[1], c2[2])
         return W, H, rows, det / R(6.0), J
 

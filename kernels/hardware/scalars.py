@@ -38,28 +38,3 @@ def scalars(precision: str) -> Scalars:
         real, vec3, mat33 = wp.float64, wp.vec3d, wp.mat33d
     rows = (wp.types.matrix((count, 3), real) for count in (4, 8, 6, 7))
     return Scalars(real, vec3, mat33, *rows)
-
-
-@cache
-def width_functions(precision: str) -> tuple[Any, Any]:
-    """Functions: a vector of float64 in the scalars of `precision`; one of these in float64.
-
-    On a GPU, fast math would flush what is too small to zero as it rounds, in three instructions for each number.
-    """
-    t = scalars(precision)
-    vec3 = t.vec3
-    rounding = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
-    on_gpu = f"#if defined(__CUDA_ARCH__)\n{rounding}\n#else\nreturn (float)value;\n#endif\n"
-
-    @wp.func_native(on_gpu if precision == "mixed" else "return value;")
-    def narrow(value: wp.float64) -> t.real: ...
-
-    @wp.func
-    def rounded(a: wp.vec3d):
-        return vec3(narrow(a[0]), narrow(a[1]), narrow(a[2]))
-
-    @wp.func
-    def widened(a: vec3):
-        return wp.vec3d(wp.float64(a[0]), wp.float64(a[1]), wp.float64(a[2]))
-
-    return rounded, widened

@@ -26,6 +26,7 @@ from warp_mca.kernels.elements.patch_element import load_functions, material_of,
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import FORCES as POOL
 from warp_mca.kernels.hardware.shared_memory import (
+    ROW,
     barrier,
     copy_vector,
     shared_functions,
@@ -53,10 +54,10 @@ def element_role(precision: str, law_name: str) -> Any:
     R, point = t.real, POINT[precision]
     plastic = bool(law_name)
     load_points, load_displacements, _ = load_functions(precision)
-    rounded_corners, element_rotation, _ = frame_functions(precision)
+    element_rotation, _ = frame_functions(precision)
     _, keep_volume, _ = keep_functions(R)
     _, elastic_element = element_functions(precision, law_name)
-    _, _, flow, keep_rotation = flow_functions(precision, law_name)
+    _, _, flow = flow_functions(precision, law_name)
 
     @wp.func
     def rotate_element(
@@ -68,10 +69,10 @@ def element_role(precision: str, law_name: str) -> Any:
         extreme_out: wp.array2d(dtype=R),
     ):
         Xl = load_points(points, pool, corners, 0, exponent_of(head))
-        ul = rounded_corners(load_displacements(pool, corners, 0))
-        _W, wide, J = element_rotation(Xl, ul)
+        ul = load_displacements(pool, corners, 0)
+        W, J = element_rotation(Xl, ul)
         keep_volume(from_start(head[0] + lane), R(1.0) - J, extreme_out)
-        return wide, Xl, ul
+        return W, Xl, ul
 
     @wp.func
     def compute_elements(
@@ -90,15 +91,14 @@ def element_role(precision: str, law_name: str) -> Any:
         """Forces as `hex8_patch` keeps them."""
         count = element_count(head)
         if lane < count:
-            wide, Xl, ul = rotate_element(lane, head, corners, points, pool, extreme_out)
+            W, Xl, ul = rotate_element(lane, head, corners, points, pool, extreme_out)
             if wp.static(plastic):
-                keep_rotation(wide, lane, force_out)
+                for i in range(9):
+                    force_out[i * wp.static(ROW) + lane] = W[i // 3, i % 3]
             else:
                 m = material_of(corners[0], corners[1])
                 e = from_start(head[0] + lane)
-                elastic_element(
-                    Xl, ul, wide, pool, corners, 0, e, m, lane, law, yielded_out, history_out, extreme_out, force_out
-                )
+                elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
         if wp.static(plastic):
             barrier()
             for batch in range((4 * count + wp.static(THREADS - 1)) // wp.static(THREADS)):

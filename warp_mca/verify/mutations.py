@@ -142,9 +142,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "rotation_to_first_order": Mutation(
         "displacements are turned back without their own part",
-        "kernels/elements/rotation.py",
-        "add_transposed(d, W, x + d)",
-        "add_transposed(d, W, x)",
+        "kernels/elements/hexahedron.py",
+        "add_transposed(u[a], W, X[a] + u[a])",
+        "add_transposed(u[a], W, X[a])",
     ),
     "forces_not_turned_back": Mutation(
         "forces stay in the element's own frame",
