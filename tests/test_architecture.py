@@ -120,7 +120,7 @@ def everything() -> mca.Scene:
         ),
         joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
-        absorbing=(mca.Absorbing(body="cart", nodes="zmax"),),
+        absorbing=(mca.Absorbing(body="carrier", nodes="zmax"),),
         contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
         ties=(mca.Tie(slave=mca.Surface(body="tied", nodes="zmax"), master=mca.Surface(body="carrier", nodes="zmin")),),
         impact=mca.ImpactPhase(duration=1e-5),

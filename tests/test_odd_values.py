@@ -33,6 +33,7 @@ SOUND: dict[type, Any] = {
     mca.Plate: mca.Plate(
         length=0.1, width=0.1, height=0.05, core=(2, 2), core_depth=1, core_size=0.005, layers=2, extension=1
     ),
+    mca.NestedPlate: mca.NestedPlate(length=0.1, width=0.1, height=0.05, core_size=0.002),
     mca.MeshFile: mca.MeshFile("none.vtu"),
     mca.Point: mca.Point(body="low", at=(0.0, 0.0, 0.0)),
     mca.Line: LINE,
@@ -55,6 +56,9 @@ SOUND: dict[type, Any] = {
     mca.Slide: mca.Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.1, velocity=0.1),
     mca.JointTorque: mca.JointTorque(joint="O", times=(0.0, 1.0), torques=(0.0, 1.0)),
 }
+SOUND[mca.Part] = mca.Part(name="a", geometry=SOUND[mca.Box])
+SOUND[mca.Parts] = mca.Parts(parts=(SOUND[mca.Part],))
+SOUND[mca.Tie] = mca.Tie(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, gap=0.5)
 SOUND[mca.Body] = mca.Body(name="low", geometry=SOUND[mca.Box], material=STEEL)
 SOUND[mca.Scene] = mca.Scene(
     name="s",
@@ -138,7 +142,11 @@ def scene_with(item: Any) -> mca.Scene:
             return scene_with(dataclasses.replace(SOUND[mca.RigidPhase], **loads))
         case mca.Elastic():
             change = {"bodies": (dataclasses.replace(low, material=item), up)}
-        case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.MeshFile() | mca.Mesh():
+        case mca.Part():
+            change = {"bodies": (dataclasses.replace(low, geometry=mca.Parts(parts=(item,))), up)}
+        case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.NestedPlate() | mca.Parts():
+            change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
+        case mca.MeshFile() | mca.Mesh():
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():
             change = {"bodies": (item, up)}
@@ -158,6 +166,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Fixed: "fixed",
                 mca.Prescribed: "prescribed",
                 mca.Absorbing: "absorbing",
+                mca.Tie: "ties",
             }[type(item)]
             change = {name: item if name == "tip" else (item,)}
     return dataclasses.replace(whole, **change)

@@ -38,8 +38,7 @@ class Clusters:
             (coupling_count,), vec3i; the second is empty for the ground.
         node: those of each cluster, shape (pair_count,), int32.
         weight: s_i of each of these [-], shape (pair_count,), float64.
-        place: of each joint at the start [m], shape (coupling_count,), vec3d; only of pins of rigid bodies, as those of
-            others are in the state.
+        place: of each pin of a rigid body at the start [m], shape (coupling_count,), vec3d; others are in the state.
         base: that each joint hangs on, -1 without, shape (coupling_count,), int32; empty where none moves or slides.
         axis: of each hinge at the start, a unit vector [-], shape (coupling_count,), vec3d.
         arm: from the mean position of the first and the second cluster to the joint at the start [m], shape

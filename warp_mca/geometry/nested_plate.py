@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from warp_mca.geometry.edit import compact
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.parts import Part, Parts
 from warp_mca.geometry.recipe import check_size
+from warp_mca.geometry.refinement import refined_count
 
 Array = NDArray[np.float64]
 Axes = tuple[Array, Array, Array]
@@ -67,6 +68,20 @@ class NestedPlate:
         if any(n * self.core_size >= size for n, size in extents):
             raise bad_value(f"{name}.core_size", self.core_size, "the core must fit inside the plate; make it smaller")
         check_size(name, [tuple(len(axis) for axis in axes) for axes in self._boxes()], core=self.core)  # type: ignore[misc]
+
+    def refined(self, factor: float) -> NestedPlate:
+        """The plate with cells about `factor` times smaller; its boxes can still be tied."""
+        unit = self._unit
+        core = tuple(unit * refined_count(n, factor / unit) for n in self.core)
+        depth = self.ratio * refined_count(self.core_depth, factor / self.ratio)
+        wider = max(core[0] / self.core[0], core[1] / self.core[1], depth / self.core_depth)
+        return replace(
+            self,
+            core=(core[0], core[1]),
+            core_depth=depth,
+            core_size=self.core_size / max(factor, wider),  # no wider than it was
+            extension=refined_count(self.extension, factor),
+        )
 
     @property
     def tied(self) -> tuple[tuple[str, str], ...]:

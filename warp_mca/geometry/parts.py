@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.refinement import refined
 
 if TYPE_CHECKING:
     from warp_mca.geometry.recipe import Recipe
@@ -55,6 +56,15 @@ class Parts:
         names = [part.name for part in self.parts]
         if not names or len(set(names)) < len(names):
             raise bad_value("Parts.parts", names, "give at least one part, each with a name of its own")
+
+    def refined(self, factor: float) -> Parts:
+        """The parts with cells about `factor` times smaller.
+
+        Raises:
+            RequestError: a part is a finished mesh, or a recipe without a method `refined(factor)`.
+        """
+        parts = [replace(part, geometry=refined(f"part {part.name}", part.geometry, factor)) for part in self.parts]
+        return replace(self, parts=tuple(parts))
 
     def build(self) -> Mesh:
         """The mesh: nodes of the parts one after the other; of the cells first all hexahedra, then all tetrahedra."""

@@ -16,8 +16,8 @@ def refined_count(count: int, factor: float, *, even: bool = False) -> int:
     return step * max(1, math.floor(wanted + 0.5))
 
 
-def refined(body: str, geometry: Any, factor: float) -> Any:
-    """The recipe of a body's mesh whose cells are about `factor` times smaller everywhere.
+def refined(owner: str, geometry: Any, factor: float) -> Any:
+    """The recipe of the mesh of its owner, as "body AB", whose cells are about `factor` times smaller everywhere.
 
     Raises:
         RequestError: the geometry is a finished mesh, or a recipe without a method `refined(factor)`.
@@ -25,11 +25,11 @@ def refined(body: str, geometry: Any, factor: float) -> Any:
     if not hasattr(geometry, "refined"):
         what = type(geometry).__name__
         remedy = (
-            f"body {body} is a {what}, whose cells cannot be made smaller or larger; give it a recipe such as "
+            f"{owner} is a {what}, whose cells cannot be made smaller or larger; give it a recipe such as "
             "warp_mca.Rod, or one of your own with a method refined(factor), or leave refine out"
         )
         raise bad_value("refine", factor, remedy)
-    field = f"Body {body}.geometry"
+    field = f"geometry of {owner}"
     made = validate.call(field, type(geometry).__name__, "refined()", lambda: geometry.refined(factor))
     if not hasattr(made, "build"):
         raise bad_value(f"{field}.refined()", validate.brief(made), "return a recipe")

@@ -227,9 +227,8 @@ def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Ind
         return
     driven = np.concatenate([held["prescribed_node"], *moved])
     if np.isin(np.concatenate([ties.slave, ties.carriers]), driven).any():
-        raise RequestError(
-            "Scene.ties: a tied node is also in a joint, driven, rigid or absorbing; bind other nodes, off the tie"
-        )
+        what = "a tied node is also in a joint or driven, absorbing or of a rigid body"
+        raise RequestError(f"Scene.ties: {what}; bind other nodes, off the tie")
     fixed = held["fixed_axes"]
     shared = np.bitwise_and.reduce(np.where(ties.weight != 0.0, fixed[ties.master], 7), axis=1)
     if (fixed[ties.slave] & ~shared).any():

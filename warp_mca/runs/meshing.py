@@ -59,7 +59,7 @@ def _geometry(scene: Scene, body: Body) -> object:
     Raises:
         RequestError: it cannot be made so.
     """
-    return body.geometry if scene.refine == 1.0 else refined(body.name, body.geometry, scene.refine)
+    return body.geometry if scene.refine == 1.0 else refined(f"body {body.name}", body.geometry, scene.refine)
 
 
 def _build(body: str, geometry: object) -> Mesh:
