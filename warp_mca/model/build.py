@@ -96,13 +96,11 @@ def build_model(
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
+    found: dict[str, Any] = {**bodies, **_steps(parts, rigid.bodies, added, velocity), **held, **pairs}
     model = Model(
         V=velocity,
-        **bodies,
-        **_steps(parts, rigid.bodies, added, velocity),
+        **found,
         mass=ties.carried(parts.mass),
-        **held,
-        **pairs,
         joints=joints,
         couplings=soft,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),

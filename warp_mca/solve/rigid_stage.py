@@ -79,10 +79,10 @@ class RigidStage:
         self._make_rows(own, model.rigid_rows)
         self._make_pins(model.rigid_pins, nodes.constraints)
         self._make_outputs()
-        nodes = [body.nodes for body in own]
+        moved = [body.nodes for body in own]
         arms = [model.X[body.nodes] - body.centre for body in own]
-        self.node = wp.array(np.concatenate(nodes), dtype=wp.int32)
-        self.body = wp.array(np.repeat(np.arange(len(own)), [len(n) for n in nodes]), dtype=wp.int32)
+        self.node = wp.array(np.concatenate(moved), dtype=wp.int32)
+        self.body = wp.array(np.repeat(np.arange(len(own)), [len(n) for n in moved]), dtype=wp.int32)
         self.arm = wp.array(np.concatenate(arms), dtype=wp.vec3d)
 
     def _make_bodies(self, model: Model, own: Sequence[RigidBody]) -> None:
