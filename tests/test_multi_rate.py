@@ -21,6 +21,7 @@ from warp_mca.model.rates import Rates
 from warp_mca.runs.division import divide
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.rate_groups import COSTS, StepCost, grouping
+from warp_mca.scene.catalogue import load_source
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
 METAL = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)
@@ -316,3 +317,24 @@ def test_patches_of_a_device_keep_to_their_level(element: str):
     assert cpu.summary["max_plastic_strain"] > 1e-3
     for name in ("F_n_N", "E_kinetic", "E_internal", "E_plastic"):
         assert cuda[name] == pytest.approx(cpu[name], abs=1e-4 * np.abs(cpu[name]).max()), name
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"joint_nodes": "pin", "plate_absorbs": "ends", "fine_length": 0.04},
+        {"joint_nodes": "pin", "rigid_bodies": "OA"},
+    ],
+)
+def test_pins_sides_ties_and_rigid_bodies_take_part(options: dict):
+    """What moves nodes in its own way takes the step of its fastest node; forces of slower elements count in full."""
+    source = load_source("two_link")
+    scene = source.build({**source.resolve("quick"), "penalty": 1.0, "duration": 6e-5, **options})
+    one, several = (mca.run(scene, refine=0.6, multi_rate=rate) for rate in (None, 3))
+    assert several.summary["multi_rate"] == 3
+    assert several.F_n.sum() == pytest.approx(one.F_n.sum(), rel=2e-3)
+    assert several.summary["energy_error"] < 1e-3
+    for name, impulse in one.summary["joint_impulse"].items():
+        np.testing.assert_allclose(
+            several.summary["joint_impulse"][name], impulse, atol=5e-3 * abs(one.F_n.sum()) * 1e-6
+        )
