@@ -57,11 +57,13 @@ class NestedPlate:
         name = "NestedPlate"
         validate.positive(name, length=self.length, width=self.width, height=self.height, core_size=self.core_size)
         validate.entries(name, 2, core=self.core)
+        for value in self.core:
+            validate.counts(name, core=value)
         validate.counts(name, core_depth=self.core_depth, ratio=self.ratio, shell=self.shell, extension=self.extension)
         if self.ratio < 2:
             raise bad_value(f"{name}.ratio", self.ratio, "give 2 or more")
         for field, value, unit in (("core", self.core, self._unit), ("core_depth", (self.core_depth,), self.ratio)):
-            if any(validate.is_number(n) and (n < 1 or n % unit) for n in value):
+            if any(n % unit for n in value):
                 remedy = f"give multiples of {unit}, with ratio = {self.ratio}"
                 raise bad_value(f"{name}.{field}", getattr(self, field), remedy)
         extents = (self.core[0], self.length), (self.core_depth, self.height), (self.core[1], self.width)
@@ -142,7 +144,7 @@ class NestedPlate:
             return hole
         factor = growth(left, self.extension, size)
         steps = factor ** np.arange(self.extension)
-        before = hole[0] - (left * np.cumsum(steps) / steps.sum())[::-1]
+        before = hole[0] - left * (np.cumsum(steps) / steps.sum())[::-1]
         before[0] = -end
         return np.concatenate([before, hole, -before[::-1]])
 
