@@ -264,6 +264,8 @@ def test_auto_takes_what_the_stored_costs_of_the_device_make_cheapest(monkeypatc
     monkeypatch.setitem(COSTS, "cpu", dear)
     rates = rates_of(scene, "auto")
     assert (rates.substeps if rates else 1) <= 2
+    monkeypatch.setitem(COSTS, "cpu", StepCost(0.0, 1.0, least=10**6))
+    assert rates_of(scene, "auto") is None
 
 
 @pytest.mark.parametrize("value", [0, 9, 2.5, "many", True])

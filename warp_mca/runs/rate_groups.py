@@ -32,10 +32,13 @@ class StepCost:
     Attributes:
         step: whatever is in it, with contact [s].
         element: for each element that it computes, nodes included [s].
+        least: elements of a model below which one rate is quicker whatever the others say [-]: a GPU takes many steps
+            of a small model in one launch.
     """
 
     step: float
     element: float
+    least: int = 0
 
     def of(self, steps: int, elements: int) -> float:
         """Time that so many steps take, which compute so many elements together [s]."""
@@ -44,9 +47,9 @@ class StepCost:
 
 # By a word of the device's name; `cuda` and `cpu` (one core) stand for all others. docs/decisions.md has the source.
 COSTS = {
-    "H100": StepCost(13e-6, 0.135e-9),
-    "H200": StepCost(13e-6, 0.135e-9),
-    "cuda": StepCost(13e-6, 0.3e-9),
+    "H100": StepCost(13e-6, 0.135e-9, 20_000),
+    "H200": StepCost(13e-6, 0.135e-9, 20_000),
+    "cuda": StepCost(13e-6, 0.3e-9, 20_000),
     "cpu": StepCost(40e-6, 1.4e-7),
 }
 
@@ -91,6 +94,8 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
     most = MOST if multi_rate == "auto" else int(multi_rate)
 
     def choose(model: Model, own: OwnSteps) -> Model:
+        if multi_rate == "auto" and model.element_count < cost_of(device).least:
+            return model
         choices = list(_choices(scene, span, model, own, most))
         if not choices:
             return model
