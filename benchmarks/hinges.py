@@ -36,8 +36,9 @@ def plastic_work(solver: Solver, state: State) -> Array:
     solver.forces(state)
     for stage in solver.elements:
         stage.energies(solver.work, state)
-    found = np.zeros(solver.model.element_count)
-    found[solver.model.element_of] = solver.work.energy.numpy()[1]
+    computed = solver.model.element_of[: solver.model.element_count]  # those of rigid bodies follow
+    found = np.zeros(len(solver.model.element_of))
+    found[computed] = solver.work.energy.numpy()[1]
     return found
 
 

@@ -143,7 +143,7 @@ def arm(
     shapes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
     shapes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
     tied: dict[str, Any] = {"nodes": joint_nodes}
-    if joint_nodes == "pin":
+    if joint_nodes == "pin" or pin_radius is not None:  # which other hinges refuse
         tied["pin_radius"] = 0.75 * radius if pin_radius is None else pin_radius
     hinges: list[dict[str, Any]] = [{"name": "O", "body": links[0], "at": (0.0, 0.0, 0.0)}]
     hinges += [

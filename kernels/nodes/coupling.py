@@ -38,17 +38,6 @@ def inertia_about(m: wp.float64, arm: wp.vec3d) -> wp.mat33d:
 
 
 @wp.func
-def rigid_response(inverse_mass: wp.float64, inverse_inertia: wp.mat33d, arm: wp.vec3d) -> Response:
-    """Response of a rigid body at `arm` from its mass centre [m], with its inertia about that."""
-    cross = wp.skew(arm)
-    found = Response()
-    found.turn = inverse_inertia
-    found.mixed = -cross * inverse_inertia
-    found.point = inverse_mass * wp.identity(3, dtype=wp.float64) + found.mixed * cross
-    return found
-
-
-@wp.func
 def sum_of(a: Response, b: Response) -> Response:
     """Response of the relative motion of two bodies."""
     found = Response()

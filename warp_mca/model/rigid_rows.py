@@ -68,6 +68,11 @@ class RigidPin:
 
 
 def check_joint(joint: Joint, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupled: bool) -> None:
+    """Refuse a joint of rigid bodies that ties its nodes in some directions only; `owner` is each node's rigid body.
+
+    Raises:
+        RequestError: so it does.
+    """
     first, second = (pairs[name][found.start : found.end] for name in ("joint_first", "joint_second"))
     sides = np.concatenate([owner[first], owner[second[second != GROUND]]])
     tied = pairs["joint_tied"][found.start : found.end]

@@ -15,7 +15,7 @@ from warp_mca.verify.impact import FINITE, HERTZ, STEEL, hertz, peak_and_duratio
 
 Array = NDArray[np.float64]
 
-RATE, TILT = 20.0, 0.4  # of the tops' precession [rad/s], [rad]
+RATE = 20.0  # of the tops' precession [rad/s]
 ROUND_OFF = 1e-12
 SECOND = "the scheme is of order 2 in the step"
 
