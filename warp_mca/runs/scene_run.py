@@ -82,14 +82,16 @@ class SceneRun:
     def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
         history = self.history()
-        contacts = contact_histories(self.ledger, contact_names(self.ready.scene.contacts))
-        facts = self._facts(wall)
+        names = contact_names(self.ready.scene.contacts)
+        contacts = contact_histories(self.ledger, names)
+        shares = spring_shares(self.ledger, self.ready.model, names)
+        facts = self._facts(wall, shares)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)
-        warnings = (*self._warnings(), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
+        warnings = (*self._warnings(shares), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
         return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
 
-    def _facts(self, wall: Mapping[str, float]) -> RunFacts:
+    def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
         count = self.steps.per_interval * max(ledger.kept.count - 1, 0)  # fewer than asked where it ended early
         more: dict[str, object] = {
@@ -120,7 +122,7 @@ class SceneRun:
         if any(model.penalties):
             names = contact_names(scene.contacts)
             more["penalty"] = {name: vars(item) for name, item in zip(names, model.penalties, strict=True) if item}
-        more |= {"contact_spring_share": self._shares(), "contact_spring_loss": peak_losses(self._shares())}
+        more |= {"contact_spring_share": dict(shares), "contact_spring_loss": peak_losses(shares)}
         if scene.ties:
             more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
         if scene.stress_paths:
@@ -149,10 +151,6 @@ class SceneRun:
             more=more,
         )
 
-    def _shares(self) -> dict[str, float | None]:
-        """As `spring_shares`."""
-        return spring_shares(self.ledger, self.ready.model, contact_names(self.ready.scene.contacts))
-
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
         return {
@@ -163,7 +161,7 @@ class SceneRun:
             "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _warnings(self) -> list[str]:
+    def _warnings(self, shares: Mapping[str, float | None]) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found: list[str] = []
         small = [body.name for body in scene.bodies if body.kinematics == "corotational"]
@@ -187,7 +185,7 @@ class SceneRun:
                 "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
             )
         depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
-        found += soft_springs(self._shares(), scene.contacts)
+        found += soft_springs(shares, scene.contacts)
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths)
         found += self.ready.warnings
         if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
