@@ -34,6 +34,8 @@ class PatchStage(ElementStage):
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where no
             order of patches is kept.
         most: blocks of threads that the device holds.
+        chains: patches of elements up to a level and of one chain, by these two numbers, where there are any.
+        beside: blocks of threads of one chain beside that of the fastest nodes.
         blocks: of threads; each computes one patch after another.
     """
 
@@ -51,7 +53,7 @@ class PatchStage(ElementStage):
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
-        ends, size = (*block.ends, *block.level_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
+        ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
         host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
@@ -71,12 +73,20 @@ class PatchStage(ElementStage):
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
-        self.first_patches = [self._first_patches(count) for count in self.level_patches]
+        levels = range(len(block.level_ends))
+        self.first_patches = [self._chosen(self.patches.head[:n], self.patches.turn[:n]) for n in self.level_patches]
+        self.beside = wp.get_device().sm_count * patch.BESIDE[precision]
+        self.chains: dict[tuple[int, int], Any] = {}
+        for level, chain in ((k, c) for k in levels for c in range(k + 1)):
+            places = [np.arange(*np.searchsorted(host.start[:-1], [p.start, p.stop])) for p in self.parts(level, chain)]
+            if places:
+                mine = wp.array(heads[np.concatenate(places)], dtype=wp.vec4i)
+                self.chains[level, chain] = self._chosen(mine, mine)
 
-    def _first_patches(self, count: int) -> Any:
-        """The first patches, which are those up to a level."""
+    def _chosen(self, head: wp.array, turn: wp.array) -> Any:
+        """Some of the patches."""
         found = patch.Patches()
-        found.head, found.turn = self.patches.head[:count], self.patches.turn[:count]
+        found.head, found.turn = head, turn
         found.corner, found.places = self.patches.corner, self.patches.places
         return found
 
@@ -112,11 +122,22 @@ class PatchStage(ElementStage):
             ):
                 wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
-    def launch(self, work: Workspace, state: State, split: Split = whole, level: int | None = None) -> None:
+    def launch(
+        self,
+        work: Workspace,
+        state: State,
+        split: Split = whole,
+        level: int | None = None,
+        chain: int | None = None,
+    ) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
         own = state.elements[self.index]
-        patches = self.patches if level is None else self.first_patches[level]
-        blocks = min(self.blocks, len(patches.head))
+        patches, most = self.patches, self.blocks
+        if level is not None:
+            patches = self.first_patches[level] if chain is None else self.chains[level, chain]
+        if chain:  # beside the chain of the fastest nodes, which waits for its own patches
+            most = min(most, self.beside)
+        blocks = min(most, len(patches.head))
         inputs = [work.X, self.point, patches, work.law, state.u, self.slot, blocks]
         outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
         wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

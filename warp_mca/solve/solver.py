@@ -30,6 +30,7 @@ from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
+from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
@@ -110,6 +111,7 @@ class Solver:
         self.groups = step_groups(self)
         self.subgroups = [step_groups(self, level) for level in range(model.rates.top if model.rates else 0)]
         self._streams = Streams(wp.get_device().is_cuda)
+        self.chains = Chains(self) if model.rates and wp.get_device().is_cuda else None
         self.resident = resident(self)
 
     @property
@@ -206,6 +208,9 @@ class Solver:
 
     def _step(self, step: Step) -> None:
         self._streams.run(self.groups, step)
+        if self.chains:
+            self.chains.run(Step(step.state), 1, 1 << len(self.subgroups))
+            return
         for j in range(1, 1 << len(self.subgroups)):
             level = (j & -j).bit_length() - 1
             self._streams.run(self.subgroups[level], Step(step.state, step.split))
@@ -213,6 +218,8 @@ class Solver:
     def _steps(self, state: State, count: int) -> None:
         if self.resident and count:
             return self.resident.launch(state, count)
+        if self.chains and count:
+            return self.chains.run(Step(state), 0, count << len(self.subgroups))
         for _ in range(count):
             self._step(Step(state))
 

@@ -69,9 +69,9 @@ class Streams:
         """Launch the stages of a step in their order."""
         summing = False
         for group in groups:
-            stages = [stage for stage in group if step.records or not stage.only_records]
-            summing = summing or any(stage.stream == SUMS for stage in stages)
-            self._run_group(stages, step)
+            if stages := [stage for stage in group if step.records or not stage.only_records]:
+                summing = summing or any(stage.stream == SUMS for stage in stages)
+                self._run_group(stages, step)
         if summing and self.streams[SUMS]:
             wp.wait_stream(self.streams[SUMS])
 
