@@ -54,7 +54,8 @@ class PatchStage(ElementStage):
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
         ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
-        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size)
+        halved = self._halved(size)
+        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size, halved)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
@@ -82,6 +83,13 @@ class PatchStage(ElementStage):
             if places:
                 mine = wp.array(heads[np.concatenate(places)], dtype=wp.vec4i)
                 self.chains[level, chain] = self._chosen(mine, mine)
+
+    def _halved(self, size: int) -> int:
+        """Elements of level 0 if they yield, and patches of half the size would still find places at once."""
+        if not self.block.level_ends or not self.block.plastic or self.points == 1:
+            return 0
+        count = self.block.level_ends[0]
+        return count if count <= patch.HALVED * wp.get_device().sm_count * (size // 2) else 0
 
     def _chosen(self, head: wp.array, turn: wp.array) -> Any:
         """Some of the patches."""

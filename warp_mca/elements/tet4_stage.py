@@ -57,7 +57,7 @@ class Tet4Stage(ElementStage):
         level: int | None = None,
         chain: int | None = None,
     ) -> None:
-        """Forces of each element on its nodes [N], after the dilatation at the pressure nodes; all have one level and chain."""
+        """Forces of each element on its nodes [N], after the dilatation at the pressure nodes; of all alike."""
 
         def grow(part: slice) -> None:
             count, inputs = part.stop - part.start, [work.X, self.conn[:, part], state.u]

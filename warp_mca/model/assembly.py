@@ -37,8 +37,8 @@ class Block:
         material: row of `Model.law`, shape (element_count,), int32.
         first: index of the first element in the model.
         ends: where the elements of each scene of a batch end in the block; empty for one scene.
-        part_ends: where elements end that have one level of `Model.rates` and one chain, the least level of their nodes:
-            levels one after the other, in each of them chains; empty with one rate.
+        part_ends: where elements end that have one level of `Model.rates` and one chain, the least level of their
+            nodes: levels one after the other, in each of them chains; empty with one rate.
     """
 
     element: str

@@ -86,7 +86,7 @@ def follow(model: Model, level: Levels) -> tuple[Levels, Rates]:
 
 
 def grouped(model: Model, level: Levels, rates: Rates) -> Model:
-    """The model with the elements of each block sorted by level and chain, and these rates; arguments as `follow` returns.
+    """The model with the elements of each block sorted by level and chain, and these rates; arguments of `follow`.
 
     The chain of an element is the least level of its nodes. Few elements of a level have another chain than their own.
     """

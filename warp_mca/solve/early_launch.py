@@ -98,9 +98,9 @@ def launch_together(graph: Any) -> int:
 def launch_early(graph: Any) -> int:
     """Let a kernel that is registered by `begins_early` begin while the registered kernel before it ends.
 
-    So may it after a kernel that is registered by `lets_begin`. Edges to and from other kernels stay as they are, because what these write may be read ahead of a wait. So do edges
-    between two kernels of one kind, such as elements of two blocks: the second would spread unevenly over
-    multiprocessors that are partly full.
+    That may be one that is registered by `lets_begin` alone. Edges to and from other kernels stay as they are, because
+    what these write may be read ahead of a wait. So do edges between two kernels of one kind, such as elements of two
+    blocks: the second would spread unevenly over multiprocessors that are partly full.
 
     Args:
         graph: captured by Warp, not launched yet.

@@ -29,6 +29,7 @@ from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
+from warp_mca.solve.fast_chain import fast_chain
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
@@ -111,6 +112,7 @@ class Solver:
         self.groups = step_groups(self)
         self.subgroups = [step_groups(self, level) for level in range(model.rates.top if model.rates else 0)]
         self._streams = Streams(wp.get_device().is_cuda)
+        self.fast = fast_chain(self) if wp.get_device().is_cuda else None
         self.chains = Chains(self) if model.rates and wp.get_device().is_cuda else None
         self.resident = resident(self)
 
@@ -168,6 +170,7 @@ class Solver:
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
             (self.nodes.kernels() + self.absorbing.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
             *([self.resident.kernels()] if self.resident else []),
+            *([(self.fast.kernels(), ELEMENT_BLOCK)] if self.fast else []),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from warp_mca.solve.fast_chain import MERGED
 from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step
 
 if TYPE_CHECKING:
@@ -31,10 +32,12 @@ def chain_groups(solver: Solver, level: int, chain: int) -> tuple[list[Group], l
     """
     assert solver.model.rates
     common = chain == solver.model.rates.common
-    return (
-        [_forces(solver, level, common, chain)],
-        [_advance(solver, level, common, chain), _follow(solver, common)],
-    )
+    forces, motion = _forces(solver, level, common, chain), _advance(solver, level, common, chain)
+    if fast := None if chain else solver.fast:
+        forces = [Stage("element forces, contact", lambda s: fast.forces(s, level))]
+        motion = [stage for stage in motion if stage.name not in MERGED]
+        motion += [Stage("nodes", lambda s: fast.motion(s, level))]
+    return [forces], [motion, _follow(solver, common)]
 
 
 def _forces(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
