@@ -110,8 +110,11 @@ def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
 
 
 @cache
-def patches_function(precision: str, law_name: str) -> Any:
-    """The function by which one of `stride` blocks of threads computes every `stride`-th patch, see `force_kernel`."""
+def force_kernel(precision: str, law_name: str) -> Any:
+    """Kernel: the forces of each patch on its nodes and, where there is a law, the plastic history.
+
+    flowing_out has the number of elements of each patch that took the return map, shape (patch_count,).
+    """
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
@@ -126,10 +129,15 @@ def patches_function(precision: str, law_name: str) -> Any:
     compute_element, _ = element_functions(precision, law_name)
     _, flow_listed, _ = flow_functions(precision, law_name)
 
-    @wp.func
-    def compute_patches(
-        lane: int,
-        block: int,
+    # in float32, a few registers spilled cost less than a quarter of the threads
+    @wp.kernel(
+        enable_backward=False,
+        module="unique",
+        grid_stride=False,
+        launch_bounds=(PATCH, RESIDENT[precision]),
+        module_options={"fast_math": True},
+    )
+    def hex8_patch_force(
         X: wp.array(dtype=wp.vec3d),
         points: wp.array(dtype=point),
         patches: Patches,
@@ -143,6 +151,8 @@ def patches_function(precision: str, law_name: str) -> Any:
         flowing_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=vec3),
     ):
+        lane = wp.tid() & wp.static(PATCH - 1)
+        block = wp.tid() // wp.static(PATCH)
         forces = wp.array(ptr=force_pool(), shape=(FORCES,), dtype=R)
         listed = wp.array(ptr=list_pool(), shape=(PATCH + 1,), dtype=wp.int32)
         kept_points = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
@@ -187,47 +197,5 @@ def patches_function(precision: str, law_name: str) -> Any:
                 barrier()
             head = next_head
             k += 1
-
-    return compute_patches
-
-
-@cache
-def force_kernel(precision: str, law_name: str) -> Any:
-    """Kernel: the forces of each patch on its nodes and, where there is a law, the plastic history.
-
-    flowing_out has the number of elements of each patch that took the return map, shape (patch_count,).
-    """
-    t = scalars(precision)
-    R, vec3, point = t.real, t.vec3, POINT[precision]
-    compute_patches = patches_function(precision, law_name)
-
-    # in float32, a few registers spilled cost less than a quarter of the threads
-    @wp.kernel(
-        enable_backward=False,
-        module="unique",
-        grid_stride=False,
-        launch_bounds=(PATCH, RESIDENT[precision]),
-        module_options={"fast_math": True},
-    )
-    def hex8_patch_force(
-        X: wp.array(dtype=wp.vec3d),
-        points: wp.array(dtype=point),
-        patches: Patches,
-        law: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        slot: int,
-        stride: int,
-        yielded_out: wp.array(dtype=wp.int32),
-        history_out: wp.array2d(dtype=R),
-        extreme_out: wp.array2d(dtype=R),
-        flowing_out: wp.array(dtype=wp.int32),
-        force_out: wp.array(dtype=vec3),
-    ):
-        lane = wp.tid() & wp.static(PATCH - 1)
-        block = wp.tid() // wp.static(PATCH)
-        compute_patches(
-            lane, block, X, points, patches, law, u, slot, stride,
-            yielded_out, history_out, extreme_out, flowing_out, force_out,
-        )  # fmt: skip
 
     return begins_early(hex8_patch_force)

@@ -124,10 +124,16 @@ def move(
 
 
 @cache
-def bound_function(
+def bound_kernel(
     precision: str, contact: bool, each: bool = False, partial: bool = False, skips: bool = False, rated: bool = False
 ) -> Any:
-    """The function that advances the k-th pair or driven node, see `bound_kernel`."""
+    """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
+
+    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
+    `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
+    impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
+    rigid bodies, which `rigid_body.advance_kernel` advances. `rated` as in `gather_function`.
+    """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision, rated)
@@ -145,9 +151,8 @@ def bound_function(
             total += take_contact(i, contact_force_out)
         return total
 
-    @wp.func
-    def advance_bound_node(
-        k: int,
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def advance_bound(
         mass: wp.array(dtype=wp.float64),
         inverse_mass: wp.array(dtype=wp.float64),
         first_slots: wp.array(dtype=wp.vec2i),
@@ -168,6 +173,9 @@ def bound_function(
         work_after_out: wp.array(dtype=wp.vec3d),
         clock_out: wp.array(dtype=wp.int32),
     ):
+        wait_for_previous()
+        let_next_begin()
+        k = wp.tid()
         i = bound_node(k, bonds)
         if wp.static(skips) and i < 0:
             return
@@ -204,53 +212,5 @@ def bound_function(
             v = drive(k - bonds.first.shape[0], mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
             u = u_free + dt * (v - free)
         move(i, u, v, u_out, v_out, speed_square_out)
-
-    return advance_bound_node
-
-
-@cache
-def bound_kernel(
-    precision: str, contact: bool, each: bool = False, partial: bool = False, skips: bool = False, rated: bool = False
-) -> Any:
-    """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
-
-    Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
-    `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
-    impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
-    rigid bodies, which `rigid_body.advance_kernel` advances. `rated` as in `gather_function`.
-    """
-    Vector, Index = kind(wp.vec3d, each), kind(wp.int32, each)
-    vec3 = scalars(precision).vec3
-    advance_bound_node = bound_function(precision, contact, each, partial, skips, rated)
-
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
-    def advance_bound(
-        mass: wp.array(dtype=wp.float64),
-        inverse_mass: wp.array(dtype=wp.float64),
-        first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i),
-        role: wp.array(dtype=wp.uint8),
-        force: wp.array(dtype=vec3),
-        scene: Index,
-        gravity: Vector,
-        bonds: Bonds,
-        dt: wp.float64,
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        v_before_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
-        impulse_out: wp.array(dtype=wp.vec3d),
-        work_out: wp.array(dtype=wp.vec3d),
-        work_after_out: wp.array(dtype=wp.vec3d),
-        clock_out: wp.array(dtype=wp.int32),
-    ):
-        wait_for_previous()
-        let_next_begin()
-        advance_bound_node(
-            wp.tid(), mass, inverse_mass, first_slots, more_slots, role, force, scene, gravity, bonds, dt,
-            contact_force_out, u_out, v_out, v_before_out, speed_square_out,
-            impulse_out, work_out, work_after_out, clock_out,
-        )  # fmt: skip
 
     return begins_early(advance_bound)

@@ -95,8 +95,8 @@ def last_pressure(s: int, friction: bool, spring: Spring):
 
 
 @cache
-def touch_function(friction: bool, stress_free: bool, law: str) -> Any:
-    """The function that presses a slave node on the face that a lane found for it, or lets it go."""
+def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
+    """The function that gives slave nodes their contact forces in each of some steps."""
     settle, let_go = settle_functions(friction, stress_free, law)
 
     @wp.func
@@ -129,14 +129,6 @@ def touch_function(friction: bool, stress_free: bool, law: str) -> Any:
             )
         else:
             let_go(s, i, v, master.face, dt, near.front, held, spring)
-
-    return touch_nearest
-
-
-@cache
-def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
-    """The function that gives slave nodes their contact forces in each of some steps."""
-    touch_nearest = touch_function(friction, stress_free, law)
 
     @wp.func
     def touch_slaves(

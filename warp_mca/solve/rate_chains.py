@@ -64,13 +64,14 @@ class Chains:
 
     Attributes:
         top: highest level.
+        substeps: of a step.
         groups: stages of each kind of task, by chain, level and whether nodes move.
     """
 
     def __init__(self, solver: Solver) -> None:
         """On the current device."""
         assert solver.model.rates
-        self.top = solver.model.rates.top
+        self.top, self.substeps = solver.model.rates.top, solver.model.rates.substeps
         self.groups: dict[tuple[int, int, bool], list[Group]] = {}
         for level in range(self.top + 1):
             for chain in range(level + 1):

@@ -64,7 +64,7 @@ class RatedNodeStage(NodeStage):
         self.rates: Rates = model.rates
         self.base = dt / (1 << self.rates.common)
         self.active = self._lists(elements)
-        self.chains = [self.items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
+        self.chains = [self._items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
         self.u_record = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
 
@@ -79,7 +79,7 @@ class RatedNodeStage(NodeStage):
         """As `NodeStage.kernels`."""
         return [*super().kernels(), *([self.beside_kernel] if wp.get_device().is_cuda else [])]
 
-    def items(self, nodes: NDArray[np.intp]) -> wp.array:
+    def _items(self, nodes: NDArray[np.intp]) -> wp.array:
         """Nodes with their levels, as the kernel takes them."""
         level = self.rates.node_level[nodes].astype(np.int32)
         return wp.array(nodes.astype(np.int32) + (level << node.LEVEL_BIT), dtype=wp.int32)
@@ -98,7 +98,7 @@ class RatedNodeStage(NodeStage):
         for k in range(self.rates.top + 1):
             slots = level <= k
             first, more = list_slots(entry[slots], node_of[slots], self.node_count)
-            item = self.items(np.flatnonzero(node_level <= k))
+            item = self._items(np.flatnonzero(node_level <= k))
             found.append(_Active(item, wp.array(first, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)))
         return found
 

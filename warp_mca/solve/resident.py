@@ -105,7 +105,7 @@ class Resident:
         """Advance so many steps that record nothing."""
         solver, work, elements = self.solver, self.solver.work, self.solver.elements[0]
         own, bonds = state.elements[0], state.constraints
-        slaves, master, faces, spring = contact_inputs(solver, state)
+        slaves, master, faces, spring = _contact(solver, state)
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]
@@ -155,11 +155,8 @@ def _nodes(solver: Solver) -> Any:
     return found
 
 
-def contact_inputs(solver: Solver, state: State) -> tuple[Any, Any, Any, Any]:
-    """What kernels take of the only contact pass (its slaves, the faces near them, those of each master node, springs).
-
-    Empty if there is none.
-    """
+def _contact(solver: Solver, state: State) -> tuple[Any, Any, Any, Any]:
+    """What the kernel takes of the contact pass; empty if there is none."""
     stage = surface_of(solver)
     slaves, master, faces, spring = Slaves(), Master(), Faces(), Spring()
     if stage:

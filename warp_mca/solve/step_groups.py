@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.fast_chain import MERGED
-from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step
+from warp_mca.solve.stage import BESIDE, CONTACT, SUMS, Group, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -32,12 +31,10 @@ def chain_groups(solver: Solver, level: int, chain: int) -> tuple[list[Group], l
     """
     assert solver.model.rates
     common = chain == solver.model.rates.common
-    forces, motion = _forces(solver, level, common, chain), _advance(solver, level, common, chain)
-    if fast := None if chain else solver.fast:
-        forces = [Stage("element forces, contact", lambda s: fast.forces(s, level))]
-        motion = [stage for stage in motion if stage.name not in MERGED]
-        motion += [Stage("nodes", lambda s: fast.motion(s, level))]
-    return [forces], [motion, _follow(solver, common)]
+    return (
+        [_forces(solver, level, common, chain)],
+        [_advance(solver, level, common, chain), _follow(solver, common)],
+    )
 
 
 def _forces(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
@@ -50,7 +47,7 @@ def _forces(solver: Solver, level: int | None, common: bool, chain: int | None =
     active = [e for e in solver.elements if level is None or e.parts(level, chain)]
     found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level, chain)) for e in active]
     found += [
-        Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
+        Stage(CONTACT, lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
     ]
     return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
