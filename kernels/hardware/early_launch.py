@@ -15,11 +15,18 @@ wp.set_module_options({"enable_backward": False})
 MIN_ARCH = 90  # compute capability times ten of the first devices that support it
 
 EARLY: set[str] = set()  # keys of kernels that wait
+LEADING: set[str] = set()  # keys of others, whose end kernels that wait may await
 
 
 def begins_early(kernel: Any) -> Any:
     """The kernel, all of whose threads wait before they write, and before they read what such kernels write."""
     EARLY.add(kernel.key)
+    return kernel
+
+
+def lets_begin(kernel: Any) -> Any:
+    """The kernel, which begins when those before it have ended: its threads would take places for long."""
+    LEADING.add(kernel.key)
     return kernel
 
 

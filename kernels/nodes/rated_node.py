@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, lets_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.node import (
@@ -27,17 +27,22 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, each: bool, early: bool) -> Any:
+def integrate_kernel(
+    precision: str, contact: bool, fixed: bool, bound: bool, each: bool, early: bool, beside: bool = False
+) -> Any:
     """Kernel: as `node.integrate_kernel`, of listed nodes whose kick and drift are 2^level times those given.
 
     item: node + (level << LEVEL_BIT) of each, shape (active_count,), int32. first_slots, more_slots: slots of the
     elements that act on them in this substep, with the difference of their level and the node's from LEVEL_BIT on.
+    `beside`: of a chain that takes long, so that it begins when its elements have ended.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
     gather = gather_function(precision, True)
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    name = "integrate_beside" if beside else None
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, name=name)
     def integrate_rated(
         item: wp.array(dtype=wp.int32),
         inverse_mass: wp.array(dtype=wp.float64),
@@ -88,4 +93,4 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, ea
         u_out[i] = u_out[i] + (scale * drift) * v
         keep_speed(i, v, speed_square_out)
 
-    return begins_early(integrate_rated)
+    return lets_begin(integrate_rated) if beside else begins_early(integrate_rated)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.elements.stage import BLOCK_DIM, ElementStage, levels_of
 from warp_mca.elements.state import ElementState
@@ -34,6 +34,8 @@ class PatchStage(ElementStage):
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where no
             order of patches is kept.
         most: blocks of threads that the device holds.
+        chains: patches of elements up to a level and of one chain, by these two numbers, where there are any.
+        beside: blocks of threads of one chain beside that of the fastest nodes.
         blocks: of threads; each computes one patch after another.
     """
 
@@ -51,8 +53,9 @@ class PatchStage(ElementStage):
         super().__init__(block, precision, kernels, points, rows)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
-        ends, size = (*block.ends, *block.level_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
-        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size)
+        ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
+        halved = self._halved(size)
+        host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size, halved)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
         heads = host.heads(exponent)
@@ -64,19 +67,31 @@ class PatchStage(ElementStage):
         self.point = wp.array(point, dtype=patch.POINT[precision])
         self.patches.corner = wp.array(host.words(block.material), dtype=wp.uint32)
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
-        # patches up to each level, and the levels of their slots
-        self.level_patches = [int(np.searchsorted(host.start[:-1], end)) for end in block.level_ends]
-        self.slot_level = levels_of([int(host.slot_start[count]) for count in self.level_patches])
+        patches_of_levels = np.searchsorted(host.start[:-1], block.level_ends)
+        self.slot_level = levels_of(host.slot_start[patches_of_levels].tolist())
         self.scheduled = block.plastic and points > 1
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
-        self.first_patches = [self._first_patches(count) for count in self.level_patches]
+        levels = range(len(block.level_ends))
+        self.beside = wp.get_device().sm_count * patch.BESIDE[precision]
+        self.chains: dict[tuple[int, int], Any] = {}
+        for level, chain in ((k, c) for k in levels for c in range(k + 1)):
+            places = [np.arange(*np.searchsorted(host.start[:-1], [p.start, p.stop])) for p in self.parts(level, chain)]
+            if places:
+                self.chains[level, chain] = self._chosen(heads[np.concatenate(places)])
 
-    def _first_patches(self, count: int) -> Any:
-        """The first patches, which are those up to a level."""
+    def _halved(self, size: int) -> int:
+        """Elements of level 0 if they yield, and patches of half the size would still find places at once."""
+        if not self.block.level_ends or not self.block.plastic or self.points == 1:
+            return 0
+        count = self.block.level_ends[0]
+        return count if count <= patch.HALVED * wp.get_device().sm_count * (size // 2) else 0
+
+    def _chosen(self, heads: NDArray[np.int32]) -> Any:
+        """Some of the patches, in the order of these heads."""
         found = patch.Patches()
-        found.head, found.turn = self.patches.head[:count], self.patches.turn[:count]
+        found.head = found.turn = wp.array(heads, dtype=wp.vec4i)
         found.corner, found.places = self.patches.corner, self.patches.places
         return found
 
@@ -100,23 +115,28 @@ class PatchStage(ElementStage):
         self.blocks = min(len(self.patches.head), max(self.most // 2, self.most - room))
 
     def schedule(self) -> None:
-        """Patches of a level in which elements yield come before its others, because they take longer."""
+        """Patches in which elements yield come before the others, because they take longer."""
         if not self.scheduled or self.blocks >= len(self.patches.head):
             return
-        ends = sorted({0, *self.level_patches, len(self.patches.head)})
-        for part in (slice(a, b) for a, b in pairwise(ends)):
-            flowing, head, turn = self.flowing[part], self.patches.head[part], self.patches.turn[part]
-            for kernel, inputs, output in (
-                (patch.count_flowing, [flowing], self.flowing_of_run),
-                (patch.schedule, [flowing, self.flowing_of_run, head], turn),
-            ):
-                wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
+        for kernel, inputs, output in (
+            (patch.count_flowing, [self.flowing], self.flowing_of_run),
+            (patch.schedule, [self.flowing, self.flowing_of_run, self.patches.head], self.patches.turn),
+        ):
+            wp.launch(kernel, patch.SCHEDULERS, inputs=inputs, outputs=[output], block_dim=BLOCK_DIM)
 
-    def launch(self, work: Workspace, state: State, split: Split = whole, level: int | None = None) -> None:
+    def launch(
+        self,
+        work: Workspace,
+        state: State,
+        split: Split = whole,
+        level: int | None = None,
+        chain: int | None = None,
+    ) -> None:
         """Forces of each patch on its nodes [N], into the slots of this block; plastic flow."""
         own = state.elements[self.index]
-        patches = self.patches if level is None else self.first_patches[level]
-        blocks = min(self.blocks, len(patches.head))
+        patches = self.patches if level is None or chain is None else self.chains[level, chain]
+        most = min(self.blocks, self.beside) if chain else self.blocks
+        blocks = min(most, len(patches.head))
         inputs = [work.X, self.point, patches, work.law, state.u, self.slot, blocks]
         outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
         wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

@@ -124,10 +124,25 @@ class ElementStage:
         """Elements up to this level."""
         return self.block.level_ends[level] if self.block.level_ends else self.count
 
-    def launch(self, work: Workspace, state: State, split: Split = whole, level: int | None = None) -> None:
+    def parts(self, level: int, chain: int | None = None) -> list[slice]:
+        """Elements up to a level, of one chain or all, see `Model.rates`."""
+        ends = (0, *self.block.part_ends)
+        levels = len(self.block.level_ends)
+        chains = range(levels) if chain is None else [chain]
+        k = [levels * own + c for own in range(level + 1) for c in chains]
+        return [slice(ends[i], ends[i + 1]) for i in k if ends[i] < ends[i + 1]]
+
+    def launch(
+        self,
+        work: Workspace,
+        state: State,
+        split: Split = whole,
+        level: int | None = None,
+        chain: int | None = None,
+    ) -> None:
         """Forces of each element on its nodes [N], into the slots of this block; plastic flow.
 
-        Of elements up to a `level` of `Model.rates`; of all if None.
+        Of elements up to a `level` of `Model.rates`, of all if None; of one `chain` or all.
         """
         own = state.elements[self.index]
 
@@ -137,7 +152,12 @@ class ElementStage:
             outputs = [*self._history(own, part), own.extreme[:, part], work.force]
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
-        split(self.count if level is None else self.active(level), launch, ELEMENTS)
+        if chain is None:
+            split(self.count if level is None else self.active(level), launch, ELEMENTS)
+            return
+        assert level is not None
+        for part in self.parts(level, chain):
+            launch(part)
 
     def energies(self, work: Workspace, state: State, split: Split = whole) -> None:
         """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].

@@ -49,8 +49,15 @@ class Tet4Stage(ElementStage):
         """Pressure nodes of each element of a range, and the dilatation of all."""
         return [self.group[:, part], self.dilatation]
 
-    def launch(self, work: Workspace, state: State, split: Split = whole, level: int | None = None) -> None:
-        """Forces of each element on its nodes [N], after the dilatation at the pressure nodes; all have one level."""
+    def launch(
+        self,
+        work: Workspace,
+        state: State,
+        split: Split = whole,
+        level: int | None = None,
+        chain: int | None = None,
+    ) -> None:
+        """Forces of each element on its nodes [N], after the dilatation at the pressure nodes; of all alike."""
 
         def grow(part: slice) -> None:
             count, inputs = part.stop - part.start, [work.X, self.conn[:, part], state.u]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -36,7 +37,8 @@ class Block:
         material: row of `Model.law`, shape (element_count,), int32.
         first: index of the first element in the model.
         ends: where the elements of each scene of a batch end in the block; empty for one scene.
-        level_ends: where the elements of each level of `Model.rates` end in the block; empty with one rate.
+        part_ends: where elements end that have one level of `Model.rates` and one chain, the least level of their
+            nodes: levels one after the other, in each of them chains; empty with one rate.
     """
 
     element: str
@@ -46,7 +48,13 @@ class Block:
     material: Index
     first: int
     ends: tuple[int, ...] = ()
-    level_ends: tuple[int, ...] = ()
+    part_ends: tuple[int, ...] = ()
+
+    @property
+    def level_ends(self) -> tuple[int, ...]:
+        """Where the elements of each level of `Model.rates` end in the block; empty with one rate."""
+        levels = math.isqrt(len(self.part_ends))
+        return self.part_ends[levels - 1 :: levels] if levels else ()
 
     @property
     def plastic(self) -> bool:

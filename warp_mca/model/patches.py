@@ -173,6 +173,7 @@ def make_patches(
     slots: int = SLOTS["mixed"],
     X: Array | None = None,
     size: int = PATCH,
+    halved: int = 0,
 ) -> Patches:
     """Patches of elements that stand in a compact order; those with too many nodes are halved.
 
@@ -186,10 +187,12 @@ def make_patches(
         slots: that a patch may have.
         X: positions of the nodes [m], shape (node_count, 3), float64, where `grid_points` will be called.
         size: elements of a patch at most.
+        halved: first elements, of which patches hold half as many.
     """
     count = conn.shape[1]
     ends = sorted({0, *ends, count})
-    start = np.concatenate([*(np.arange(a, b, size) for a, b in pairwise(ends)), [count]])
+    sizes = [size // 2 if end <= halved else size for end in ends[1:]]
+    start = np.concatenate([*(np.arange(a, b, s) for (a, b), s in zip(pairwise(ends), sizes, strict=True)), [count]])
     lots = chunks(len(start) - 1, SORT_CHUNK // PATCH)
     made = []
     for lot in lots:

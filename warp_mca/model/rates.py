@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -85,20 +86,25 @@ def follow(model: Model, level: Levels) -> tuple[Levels, Rates]:
 
 
 def grouped(model: Model, level: Levels, rates: Rates) -> Model:
-    """The model with the elements of each block sorted by level, and these rates; arguments as `follow` returns."""
+    """The model with the elements of each block sorted by level and chain, and these rates; arguments of `follow`.
+
+    The chain of an element is the least level of its nodes. Few elements of a level have another chain than their own.
+    """
     blocks, order = [], []
+    chain = _uniform(model, _least_of_nodes(model, rates.node_level))
+    levels = range(rates.top + 1)
     for block in model.blocks:
-        own = level[_part(block)]
+        own, own_chain = level[_part(block)], chain[_part(block)]
         found: list[NDArray[np.intp]] = []
-        for k in range(rates.top + 1):
-            mine = np.flatnonzero(own == k)
+        for k, c in product(levels, levels):
+            mine = np.flatnonzero((own == k) & (own_chain == c))
             if len(mine) and ELEMENTS[block.element].patches:
                 mine = mine[compact_order(model.X, np.ascontiguousarray(block.conn[:, mine].T), PATCH)]
             found.append(mine)
         place = np.concatenate(found)
         ends = tuple(np.cumsum([len(part) for part in found]).tolist())
         conn = np.ascontiguousarray(block.conn[:, place])
-        blocks.append(replace(block, conn=conn, material=block.material[place], level_ends=ends))
+        blocks.append(replace(block, conn=conn, material=block.material[place], part_ends=ends))
         order.append(model.element_of[_part(block)][place])
     rest = model.element_of[model.element_count :]  # of rigid bodies
     return replace(model, blocks=tuple(blocks), element_of=np.concatenate([*order, rest]), rates=rates)
@@ -125,6 +131,12 @@ def _least(model: Model, level: Levels) -> Levels:
         for corner in block.conn:
             np.minimum.at(node, corner, level[_part(block)])
     return node
+
+
+def _least_of_nodes(model: Model, node_level: NDArray[np.uint8]) -> Levels:
+    """Least level of the nodes of each element, shape (element_count,)."""
+    parts = [node_level[block.conn].min(axis=0) for block in model.blocks]
+    return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)
 
 
 def _joined(parts: Sequence[Index]) -> Index:

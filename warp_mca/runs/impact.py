@@ -17,6 +17,7 @@ from warp_mca.results.paths import join_probes
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.scene_run import SceneRun
+from warp_mca.solve.contact_watch import contact_watch
 from warp_mca.solve.output import Output
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
@@ -171,6 +172,7 @@ class _Loop:
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
+        self.watch, self.contact = contact_watch(self.solver, self.state), True
         self.written = 0
 
     def run(self, until: int | None) -> None:
@@ -211,22 +213,24 @@ class _Loop:
     def _part(self, part: Part, first: int, end: int, row: int | None) -> None:
         """Steps that follow each other without a look from outside, from the present one to `end`."""
         if self.state.steps > first:  # interrupted in between
-            self.solver.step(self.state, end - self.state.steps)
+            self.solver.step(self.state, end - self.state.steps, self.contact)
             return
         if part.begins_check and self.written == ROWS:
             self._send()
-        if part.begins_search:
+        if part.begins_search and self.watch:
+            self.contact = self.watch.search()
+        elif part.begins_search:
             self.solver.search(self.state)
         if part.begins_check:
             self._record(end - first, row)
         else:
-            self.solver.step(self.state, end - first)
+            self.solver.step(self.state, end - first, self.contact)
 
     def _record(self, count: int, row: int | None) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
         recording = self.impact.recording
         needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
-        self.solver.record_and_step(self.state, count, needs, row is not None)
+        self.solver.record_and_step(self.state, count, needs, row is not None, self.contact)
         self.written += 1
         if recording and row is not None:
             recording.take(row, needs)

@@ -30,25 +30,30 @@ class StepCost:
     """What a step takes.
 
     Attributes:
-        step: whatever is in it, with contact [s].
+        step: whatever is in it [s].
         element: for each element that it computes, nodes included [s].
         least: elements of a model below which one rate is quicker whatever the others say [-]: a GPU takes many steps
             of a small model in one launch.
+        substep, element_beside: the same where elements take steps of their own; as with one rate if None.
     """
 
     step: float
     element: float
     least: int = 0
+    substep: float | None = None
+    element_beside: float | None = None
 
-    def of(self, steps: int, elements: int) -> float:
-        """Time that so many steps take, which compute so many elements together [s]."""
-        return self.step * steps + self.element * elements
+    def of(self, steps: int, elements: int, rated: bool = False) -> float:
+        """Time that so many steps take, which compute so many elements together [s]; substeps if `rated`."""
+        step = self.substep if rated and self.substep is not None else self.step
+        element = self.element_beside if rated and self.element_beside is not None else self.element
+        return step * steps + element * elements
 
 
 # By a word of the device's name; `cuda` and `cpu` (one core) stand for all others. docs/decisions.md has the source.
 COSTS = {
-    "H100": StepCost(13e-6, 0.135e-9, 20_000),
-    "H200": StepCost(13e-6, 0.135e-9, 20_000),
+    "H100": StepCost(12e-6, 0.15e-9, 20_000, 8.2e-6, 0.23e-9),
+    "H200": StepCost(12e-6, 0.15e-9, 20_000, 8.2e-6, 0.23e-9),
     "cuda": StepCost(13e-6, 0.3e-9, 20_000),
     "cpu": StepCost(40e-6, 1.4e-7),
 }
@@ -102,8 +107,8 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
         chosen = choices[-1]
         if multi_rate == "auto":
             cost, count = cost_of(device), divide(scene, model, span).count
-            chosen = min(choices, key=lambda choice: cost.of(choice.substeps, choice.elements))
-            if cost.of(count, count * model.element_count) <= cost.of(chosen.substeps, chosen.elements):
+            chosen = min(choices, key=lambda choice: cost.of(choice.substeps, choice.elements, True))
+            if cost.of(count, count * model.element_count) <= cost.of(chosen.substeps, chosen.elements, True):
                 return model
         return grouped(model, chosen.level, chosen.rates)
 

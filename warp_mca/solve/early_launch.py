@@ -15,7 +15,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
+from warp_mca.kernels.hardware.early_launch import EARLY, LEADING, MIN_ARCH
 from warp_mca.kernels.resident.meeting import TOGETHER
 
 MIN_DRIVER = (12, 3)
@@ -98,9 +98,9 @@ def launch_together(graph: Any) -> int:
 def launch_early(graph: Any) -> int:
     """Let a kernel that is registered by `begins_early` begin while the registered kernel before it ends.
 
-    Edges to and from other kernels stay as they are, because what these write may be read ahead of a wait. So do edges
-    between two kernels of one kind, such as elements of two blocks: the second would spread unevenly over
-    multiprocessors that are partly full.
+    That may be one that is registered by `lets_begin` alone. Edges to and from other kernels stay as they are, because
+    what these write may be read ahead of a wait. So do edges between two kernels of one kind, such as elements of two
+    blocks: the second would spread unevenly over multiprocessors that are partly full.
 
     Args:
         graph: captured by Warp, not launched yet.
@@ -126,7 +126,7 @@ def launch_early(graph: Any) -> int:
     _call("cuGraphGetEdges_v2", graph.graph, begin, end, data, ctypes.byref(count))
     keys = {node: _key(node) for node in {*begin, *end}}
     pairs = [(keys[a], keys[b]) for a, b in zip(begin, end, strict=True)]
-    chosen = [k for k, (a, b) in enumerate(pairs) if a in EARLY and b in EARLY and a != b]
+    chosen = [k for k, (a, b) in enumerate(pairs) if a in EARLY | LEADING and b in EARLY and a != b]
     if not chosen:
         return 0
     edges = [_Edge(from_port=_PROGRAMMATIC, type=_PROGRAMMATIC) for _ in chosen]

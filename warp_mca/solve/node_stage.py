@@ -69,13 +69,13 @@ class NodeStage:
         """Those of a step."""
         return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
 
-    def advance(self, step: Step, level: int | None = None) -> None:
-        """Free nodes, those up to a `level` of `Model.rates` or all.
+    def advance(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
+        """Free nodes, those up to a `level` of `Model.rates` or all; of one `chain` or all.
 
         Where the step records, `work.v_before` takes the velocities before it.
         """
         before = self.work.v_before if step.records else None
-        self.integrate(step.state, self.base, self.base, self.constraints.role, step.split, before, level)
+        self.integrate(step.state, self.base, self.base, self.constraints.role, step.split, before, level, chain)
 
     def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
         """`first_slots` and `more_slots` of elements up to a level, or of all."""
@@ -117,6 +117,7 @@ class NodeStage:
         split: Split = whole,
         before: wp.array | None = None,
         level: int | None = None,
+        chain: int | None = None,
     ) -> None:
         """v += kick a, u += drift v of nodes whose `role` leaves them free; `before` takes the old velocities."""
         work, squares = self.work, state.speed_square

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.elements.stage import BLOCK_DIM, list_slots
-from warp_mca.kernels.nodes import node
+from warp_mca.kernels.nodes import node, rated_node
 from warp_mca.solve.node_stage import NodeStage
 from warp_mca.solve.threads import NODES, Split, whole
 
@@ -63,8 +64,25 @@ class RatedNodeStage(NodeStage):
         self.rates: Rates = model.rates
         self.base = dt / (1 << self.rates.common)
         self.active = self._lists(elements)
+        self.chains = [self._items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
         self.u_record = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
+
+    def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
+        """As `NodeStage._choose`, and the kernel of chains beside that of the fastest nodes."""
+        super()._choose(precision, kind)
+        contact, fixed, early = kind
+        beside = rated_node.integrate_kernel(precision, contact, fixed, self.constraints.bound, self.each, early, True)
+        self.beside_kernel = beside
+
+    def kernels(self) -> list[Any]:
+        """As `NodeStage.kernels`."""
+        return [*super().kernels(), *([self.beside_kernel] if wp.get_device().is_cuda else [])]
+
+    def _items(self, nodes: NDArray[np.intp]) -> wp.array:
+        """Nodes with their levels, as the kernel takes them."""
+        level = self.rates.node_level[nodes].astype(np.int32)
+        return wp.array(nodes.astype(np.int32) + (level << node.LEVEL_BIT), dtype=wp.int32)
 
     def _lists(self, elements: Sequence[ElementStage]) -> list[_Active]:
         """Nodes and slots of each level."""
@@ -78,10 +96,9 @@ class RatedNodeStage(NodeStage):
         entry += (level - node_level[node_of]) << node.LEVEL_BIT
         found = []
         for k in range(self.rates.top + 1):
-            nodes = np.flatnonzero(node_level <= k).astype(np.int32)
             slots = level <= k
             first, more = list_slots(entry[slots], node_of[slots], self.node_count)
-            item = wp.array(nodes + (node_level[nodes] << node.LEVEL_BIT), dtype=wp.int32)
+            item = self._items(np.flatnonzero(node_level <= k))
             found.append(_Active(item, wp.array(first, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)))
         return found
 
@@ -94,21 +111,28 @@ class RatedNodeStage(NodeStage):
         split: Split = whole,
         before: wp.array | None = None,
         level: int | None = None,
+        chain: int | None = None,
     ) -> None:
-        """As `NodeStage.integrate`, for the nodes up to a level, all if None; kick and drift are those of level 0."""
+        """As `NodeStage.integrate`, for the nodes up to a level, all if None, of one level where a chain is given.
+
+        kick and drift are those of level 0.
+        """
         work, squares = self.work, state.speed_square
         level = self.rates.top if level is None else level
-        active, pressed = self.active[level], self.touched and level >= self.rates.common
+        active, common = self.active[level], self.rates.common
+        items = active.item if chain is None else self.chains[chain]
+        pressed = self.touched and (level >= common if chain is None else chain == common)
+        kernel = self.beside_kernel if chain else self.integrate_kernel
 
         def launch(part: slice) -> None:
-            item, keepers = active.item[part], node.KEEPERS if pressed and part.start == 0 else 0
+            item, keepers = items[part], node.KEEPERS if pressed and part.start == 0 else 0
             inputs = [item, work.inverse_mass, active.first_slots, active.more_slots, role, work.force]
             inputs += [self.scene, self.gravity, kick, drift]
             outputs = [work.contact_force, state.u, state.v, before, squares, state.normal_force if keepers else None]
             threads = part.stop - part.start + keepers
-            wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+            wp.launch(kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
-        split(len(active.item), launch, NODES)
+        split(len(items), launch, NODES)
 
     def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
         """As `NodeStage.slots`."""

@@ -16,7 +16,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
-from warp_mca.kernels.contact import contact
+from warp_mca.kernels.contact import contact, watch
 from warp_mca.kernels.contact.search import FLAGS
 from warp_mca.kernels.hardware import subnormals
 from warp_mca.kernels.nodes import slide
@@ -30,6 +30,7 @@ from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.load_stage import LoadStage
+from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
@@ -108,8 +109,11 @@ class Solver:
         self.ties = TieStage(model, self.nodes, self.precision)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = step_groups(self)
-        self.subgroups = [step_groups(self, level) for level in range(model.rates.top if model.rates else 0)]
-        self._streams = Streams(wp.get_device().is_cuda)
+        cuda = wp.get_device().is_cuda
+        self.chains = Chains(self) if model.rates and cuda else None
+        levels = range(model.rates.top) if model.rates and not cuda else ()
+        self.subgroups = [step_groups(self, level) for level in levels]
+        self._streams = Streams(cuda)
         self.resident = resident(self)
 
     @property
@@ -159,6 +163,7 @@ class Solver:
         sums += self.couplings.kernels() + self.rigid.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
+        sums += [watch.watch_nodes] if self.chains and self.contacts else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if stress]
@@ -204,15 +209,20 @@ class Solver:
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
 
-    def _step(self, step: Step) -> None:
+    def _step(self, step: Step, contact: bool = True) -> None:
         self._streams.run(self.groups, step)
+        if self.chains:
+            self.chains.run(Step(step.state, contact=contact), 1, self.chains.substeps)
+            return
         for j in range(1, 1 << len(self.subgroups)):
             level = (j & -j).bit_length() - 1
             self._streams.run(self.subgroups[level], Step(step.state, step.split))
 
-    def _steps(self, state: State, count: int) -> None:
+    def _steps(self, state: State, count: int, contact: bool) -> None:
         if self.resident and count:
             return self.resident.launch(state, count)
+        if self.chains and count:
+            return self.chains.run(Step(state, contact=contact), 0, count * self.chains.substeps)
         for _ in range(count):
             self._step(Step(state))
 
@@ -221,11 +231,11 @@ class Solver:
             stage.schedule()
 
     def record_and_step(
-        self, state: State, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True
+        self, state: State, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True, contact: bool = True
     ) -> None:
         """Record the state, as a row of the history or as a check between two, then advance `count` steps.
 
-        A row may come with a frame of `needs`.
+        A row may come with a frame of `needs`. Arguments else as of `step`.
 
         Raises:
             Exception: what a thread raised.
@@ -233,7 +243,7 @@ class Solver:
         name = f"{'record' if is_row else 'check'} {sorted(needs)}"
 
         def record(split: Split = whole) -> None:
-            self._step(Step(state, split, True, is_row, needs))
+            self._step(Step(state, split, True, is_row, needs), contact)
 
         if self._replay.pool:
             self._replay.stages(state, name, record)
@@ -244,13 +254,13 @@ class Solver:
         def interval() -> None:
             self._schedule()
             record()
-            self._steps(state, count - 1)
+            self._steps(state, count - 1, contact)
 
-        self._replay.graph(state, f"{name} {count}", interval)
+        self._replay.graph(state, f"{name} {count}{'' if contact else ' clear'}", interval)
         state.steps += count
 
-    def step(self, state: State, count: int) -> None:
-        """Advance `count` steps.
+    def step(self, state: State, count: int, contact: bool = True) -> None:
+        """Advance `count` steps; without `contact` where a `ContactWatch` says that nothing can touch.
 
         Raises:
             Exception: what a thread raised.
@@ -261,9 +271,9 @@ class Solver:
 
             def steps() -> None:
                 self._schedule()
-                self._steps(state, count)
+                self._steps(state, count, contact)
 
-            self._replay.graph(state, f"step {count}", steps)
+            self._replay.graph(state, f"step {count}{'' if contact else ' clear'}", steps)
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:

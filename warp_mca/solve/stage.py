@@ -13,6 +13,7 @@ from warp_mca.solve.threads import Split, whole
 if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
+CONTACT = "contact"  # stage that may be left out
 MAIN, BESIDE, SUMS = "main", "beside", "sums"  # streams of a GPU; on a CPU stages run one after the other
 
 
@@ -26,6 +27,7 @@ class Step:
         records: whether the step also records the state at its start.
         is_row: whether the record is a row of the history, and not a check between two.
         needs: of recorders, that a frame of this step must hold.
+        contact: whether anything may touch; where not, contact is left out of steps that do not record.
     """
 
     state: State
@@ -33,6 +35,7 @@ class Step:
     records: bool = False
     is_row: bool = False
     needs: frozenset[str] = frozenset()
+    contact: bool = True
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,11 @@ class Streams:
         summing = False
         for group in groups:
             stages = [stage for stage in group if step.records or not stage.only_records]
-            summing = summing or any(stage.stream == SUMS for stage in stages)
-            self._run_group(stages, step)
+            if not step.contact:
+                stages = [stage for stage in stages if stage.name != CONTACT]
+            if stages:
+                summing = summing or any(stage.stream == SUMS for stage in stages)
+                self._run_group(stages, step)
         if summing and self.streams[SUMS]:
             wp.wait_stream(self.streams[SUMS])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step
+from warp_mca.solve.stage import BESIDE, CONTACT, SUMS, Group, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -24,17 +24,30 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
     ]
 
 
-def _forces(solver: Solver, level: int | None, common: bool) -> Group:
+def chain_groups(solver: Solver, level: int, chain: int) -> tuple[list[Group], list[Group]]:
+    """Stages of one chain in a substep that computes elements up to a level: (its forces; what moves its nodes).
+
+    They record nothing.
+    """
+    assert solver.model.rates
+    common = chain == solver.model.rates.common
+    return (
+        [_forces(solver, level, common, chain)],
+        [_advance(solver, level, common, chain), _follow(solver, common)],
+    )
+
+
+def _forces(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
     """Forces on nodes.
 
     Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want it,
     and patches want another division than contact.
     """
     work, nodes = solver.work, solver.nodes
-    active = [e for e in solver.elements if level is None or e.active(level)]
-    found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
+    active = [e for e in solver.elements if level is None or e.parts(level, chain)]
+    found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level, chain)) for e in active]
     found += [
-        Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
+        Stage(CONTACT, lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
     ]
     return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
@@ -64,7 +77,7 @@ def _sums(solver: Solver) -> Group:
     return [*springs, Stage("element sums", records.sum_elements, SUMS, only_records=True)]
 
 
-def _advance(solver: Solver, level: int | None, common: bool) -> Group:
+def _advance(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
     """Stages that move nodes, those up to a level or all; with `common` also those that other things act on."""
     nodes, found = solver.nodes, []
     if common and solver.constraints.count:
@@ -81,7 +94,7 @@ def _advance(solver: Solver, level: int | None, common: bool) -> Group:
         found.append(Stage("rigid bodies", lambda s: solver.rigid.advance(s, level), BESIDE))
     if common and solver.ties.count:
         found.append(Stage("masters of ties", lambda s: solver.ties.advance(s, level), BESIDE))
-    return [*found, Stage("free nodes", lambda s: nodes.advance(s, level))]
+    return [*found, Stage("free nodes", lambda s: nodes.advance(s, level, chain))]
 
 
 def _follow(solver: Solver, common: bool) -> Group:
