@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from warp_mca.runs.sweep_job import Row
     from warp_mca.runs.sweep_plan import Plan
 
-SHOWN = 40  # rows that the terminal shows at most; the table has all
+SHOWN, WARNINGS = 40, 10  # rows and warnings that the terminal shows at most; the table has all
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -139,14 +139,16 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
             cells = [f"{row['F_n_first_peak'] or 0.0:.5g}", f"{row['F_t_min']:.5g} to {row['F_t_max']:.5g}"]
             cells += [f"{1e3 * row['contact_duration']:.4g}", f"{100.0 * row['energy_error']:.2g} %"]
             cells += [f"wrote {folder}" if folder else ""]
-        table.add_row(
-            *(f"{value:.10g}" if isinstance(value, float) else str(value) for value in chosen.values()), *cells
-        )
+        values = (f"{value:.10g}" if isinstance(value, float) else str(value) for value in chosen.values())
+        table.add_row(*values, *cells)
     out.print(table)
     if len(rows) > SHOWN:
         out.print(f"and {len(rows) - SHOWN} more")
-    for warning in dict.fromkeys(text for row in rows for text in (row.get("warnings") or "").split(BETWEEN) if text):
+    said = dict.fromkeys(text for row in rows for text in (row.get("warnings") or "").split(BETWEEN) if text)
+    for warning in list(said)[:WARNINGS]:
         out.print(f"warning: {warning}", soft_wrap=True)
+    if len(said) > WARNINGS:
+        out.print(f"and {len(said) - WARNINGS} more warnings, in the column warnings of {CSV}")
     wall = sum({row["wall"] for row in rows if row.get("wall")})  # runs of a batch have the same
     out.print(f"wall time of all runs {wall:.1f} s, on {plan.options.device}, {plan.options.precision}")
     for name in (CSV, PARQUET):

@@ -35,6 +35,7 @@ from warp_mca.scene.options import with_options
 from warp_mca.solve.threads import thread_count
 
 TRIES = 5  # of a run whose worker ends before it
+GO_ON = "if out names a folder, the others can be run by the same call"
 OWN = ("index", "status", "reason", "warnings", "wall")  # columns that no parameter may take
 
 
@@ -235,10 +236,7 @@ class _Driver:
         try:
             return self.pool.submit(run_job, job)
         except (BrokenExecutor, RuntimeError) as error:
-            what = (
-                "a new executor goes on with the rest, if out is given" if self.plan.out else "name a folder with out"
-            )
-            raise McaError(f"the executor takes no more runs ({error}): the same call with {what}") from error
+            raise McaError(f"the executor takes no more runs ({error}); {GO_ON} with a new executor") from error
 
     def _outcomes(self, future: Future[list[Row]], job: Job) -> list[Row] | None:
         """What came of each run of a job; None if it is to be tried again."""
@@ -247,9 +245,7 @@ class _Driver:
         except McaError:
             raise
         except CancelledError as error:
-            raise McaError(
-                "the executor has cancelled runs; the same call goes on with them, if out is given"
-            ) from error
+            raise McaError(f"the executor has cancelled runs; {GO_ON}") from error
         except Exception as error:
             if not lost_worker(error):
                 return [failure(f"{type(error).__name__}: {error}")] * len(job.numbers)

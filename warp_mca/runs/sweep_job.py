@@ -1,4 +1,4 @@
-"""Owns what one worker of a sweep does: it runs the scenes of a batch, keeps their files, and answers with their rows."""
+"""Owns what one worker of a sweep does: it runs the scenes of a batch, keeps their files, answers with their rows."""
 
 from __future__ import annotations
 

@@ -126,8 +126,8 @@ def differing(scenes: Sequence[Scene]) -> tuple[dict[str, object], ...]:
 def batches(plan: Plan, meshes: Mapping[str, Mesh] | None = None) -> list[list[int]]:
     """Numbers of the runs that are computed in one model, in the order in which they begin.
 
-    They depend on the sweep alone, never on what is left of it or on the number of workers: the scenes of a batch share
-    their time step, so that rows of a sweep that was interrupted equal those of one that was not. Scenes of a batch have
+    They depend on the sweep alone, never on what is left of it or on the number of workers: scenes of a batch share
+    their time step, and so rows of a sweep that was interrupted equal those of one that was not. Scenes of a batch have
     the same meshes, stiffness and density, and so nearly the same step by themselves.
 
     Args:
@@ -208,7 +208,7 @@ def _distinct(values: Iterable[object]) -> list[object]:
 
 
 def _feed(digest: hashlib._Hash, value: object) -> None:
-    """Add a value to a digest: dataclasses by their fields, arrays by their bytes, other objects by their attributes."""
+    """Add a value to a digest: dataclasses by their fields, arrays by their bytes, others by their attributes."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         parts: Iterable[object] = (part for f in dataclasses.fields(value) for part in (f.name, getattr(value, f.name)))
     elif isinstance(value, np.ndarray):

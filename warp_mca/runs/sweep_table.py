@@ -68,7 +68,7 @@ class SweepTable:
             with _writing(self.folder), (self.folder / CSV).open("ab", buffering=0) as file:
                 file.write(lines.encode())  # one call: the lines are in the file whole, or not at all
         else:
-            self._columns = _columns([{name: None for name in self._columns}, *rows])
+            self._columns = _columns([dict.fromkeys(self._columns), *rows])
             self._rewrite()
         if time.monotonic() - self._stored > PARQUET_INTERVAL:
             self._write_parquet()
