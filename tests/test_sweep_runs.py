@@ -184,6 +184,14 @@ def test_small_scenes_share_a_model_on_a_gpu_as_far_as_they_fill_it():
     assert planned(fine, device="cuda:0") == [[0], [1, 2]]
 
 
+@pytest.mark.gpu
+def test_rows_from_a_gpu_are_those_of_a_batch():
+    rows = mca.sweep(blocks(*SPEEDS), device="cuda", out="all", folders=True)
+    batch = mca.run_batch(blocks(*SPEEDS), device="cuda:0")
+    assert [row["F_n_max"] for row in rows] == [result.summary["F_n_max"] for result in batch]
+    assert [mca.load(f"all/{k}").summary["batch"]["scenes"] for k in range(5)] == [5] * 5
+
+
 def test_scenes_of_other_steps_durations_and_contacts_run_apart():
     scene = blocks(1.0)[0]
     body, contact = scene.bodies[0], scene.contacts[0]

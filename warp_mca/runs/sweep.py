@@ -24,11 +24,11 @@ from warp_mca.runs.sweep_workers import (
     Prepare,
     check_executor,
     connected,
-    device_of_each,
     devices_named,
     lost_worker,
     opened_executor,
     own_workers,
+    worker_count,
 )
 from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
@@ -66,7 +66,8 @@ def sweep(
     Args:
         scenes: what to run.
         executor: who runs them: any `concurrent.futures.Executor`; "dask://HOST:PORT", a Dask cluster; "process",
-            processes on this machine. If None these too, or this process if one worker is enough.
+            processes on this machine. If None these too, or this process where there is one worker on a CPU, or
+            `workers` is 1.
         workers: number of processes; one for each core, or each GPU, if None.
         batch: number of scenes at most that are computed in one model; None for as many as fill a GPU, one on a CPU.
         device: "cpu", a CUDA device as "cuda:0", or "cuda" for all GPUs.
@@ -124,9 +125,11 @@ def carry_out(
     groups = batches(plan, meshes)
     with connected(executor) as given, _opened(plan, force) as table:
         left = [group for group in groups if not table.rows.keys() >= set(group)]
-        devices = device_of_each(plan.options, workers, len(left)) if own_workers(executor) else []
-        jobs = [_job(plan, group, devices) for group in left]
-        with opened_executor(given, devices, prepare) as (pool, limit):
+        count = min(worker_count(plan.options, workers), len(groups)) if own_workers(executor) else 0
+        jobs = [_job(plan, group, count) for group in left]
+        if executor is None and (count > 1 or (plan.options.device != "cpu" and workers != 1)):
+            given = "process"  # that a run of it ends badly is then not the end of the sweep
+        with opened_executor(given, plan.options.device, count, prepare) as (pool, limit):
             _Driver(plan, pool, limit or len(jobs), table, tell).go_through(jobs)
     return [table.rows[k] for k in range(len(plan.scenes))]
 
@@ -185,12 +188,12 @@ def _opened(plan: Plan, force: bool) -> Iterator[SweepTable]:
             table.close()
 
 
-def _job(plan: Plan, group: Sequence[int], devices: Sequence[str]) -> Job:
-    """What a worker needs to know of a batch of runs."""
+def _job(plan: Plan, group: Sequence[int], count: int) -> Job:
+    """What one of `count` workers of our own, or of others if 0, needs to know of a batch of runs."""
     options = plan.options
     if options.threads is None:
-        options = replace(options, threads=max(1, thread_count(None) // len(devices)) if devices else 1)
-    device = devices[0] if devices else "cuda:0" if options.device == "cuda" else options.device
+        options = replace(options, threads=max(1, thread_count(None) // count) if count else 1)
+    device = "cuda:0" if options.device == "cuda" else options.device
     return Job(
         tuple(group),
         tuple(plan.scenes[k] for k in group),

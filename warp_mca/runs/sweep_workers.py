@@ -21,7 +21,7 @@ from warp_mca.runs.sweep_job import Job, Row
 from warp_mca.runs.sweep_plan import RunOptions
 
 DASK = "dask://"
-STARTS = 5  # of a worker in turn that end before it is ready, after which a sweep gives up
+STARTS = 5  # of a worker in turn that is killed before it is ready, after which a sweep gives up
 CONNECTING = "10s"  # at most, to a Dask scheduler
 REMEDY = "give process, dask://HOST:PORT, or in Python a concurrent.futures.Executor"
 
@@ -120,7 +120,7 @@ class _Worker:
         """The pipe to a new process that is ready.
 
         Raises:
-            McaError: several in turn end before they are.
+            McaError: it ends before it is, or several in turn are killed before.
         """
         context = multiprocessing.get_context("spawn")  # a copy of this process would share its threads and its GPU
         why = ""
@@ -138,6 +138,8 @@ class _Worker:
                 ours.recv()
             except (EOFError, OSError):
                 why = self._how_it_ended()
+                if process.exitcode >= 0:  # not killed: the next one would end the same way
+                    break
                 continue
             self._pipe = ours
             return ours
@@ -183,22 +185,24 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def opened_executor(
-    executor: Executor | str | None, devices: Sequence[str], prepare: Prepare | None
+    executor: Executor | str | None, device: str, count: int, prepare: Prepare | None
 ) -> Iterator[tuple[Executor, int | None]]:
     """An executor, and how many jobs it should have at a time (None for all).
 
     Args:
-        executor: as `connected` gives it.
-        devices: of each worker of our own.
+        executor: as `connected` gives it; None for this process.
+        device: of our own workers.
+        count: their number.
         prepare: as in `Workers`.
     """
     if isinstance(executor, Executor):
         yield executor, None
-    elif executor is None and len(devices) == 1:
+    elif executor is None:
         yield Here(), 1
     else:
-        with Workers(devices, prepare) as workers:
-            yield workers, 2 * len(devices)
+        devices = devices_named(device)
+        with Workers([devices[k % len(devices)] for k in range(count)], prepare) as workers:
+            yield workers, 2 * count
 
 
 def check_executor(executor: object) -> None:
@@ -247,13 +251,8 @@ def lost_worker(error: BaseException) -> bool:
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
-def device_of_each(options: RunOptions, workers: int | None, jobs: int) -> list[str]:
-    """The device of each worker: on a CPU as many as there are cores, on GPUs one for each.
-
-    Args:
-        options: of the runs.
-        workers: their number, or None for the usual one.
-        jobs: that are left; there are no more workers than jobs.
+def worker_count(options: RunOptions, workers: int | None) -> int:
+    """The number of workers: as asked for, or one for each GPU of the device, or as many as the cores have threads for.
 
     Raises:
         RequestError: there is no such device.
@@ -262,7 +261,7 @@ def device_of_each(options: RunOptions, workers: int | None, jobs: int) -> list[
 
     devices = devices_named(options.device)
     usual = len(devices) if devices != ["cpu"] else max(1, thread_count(None) // (options.threads or 1))
-    return [devices[k % len(devices)] for k in range(max(1, min(workers or usual, jobs)))]
+    return workers or usual
 
 
 def devices_named(name: str) -> list[str]:
