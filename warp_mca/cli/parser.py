@@ -84,7 +84,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE,…",
-        help="run a scene for each value, all at once, to folders 0, 1, … in DIR; several times: all combinations",
+        help="as warp-mca sweep --grid, with the files of each run in folders 0, 1, … in DIR",
     )
     parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")

@@ -138,7 +138,7 @@ class _Worker:
                 ours.recv()
             except (EOFError, OSError):
                 why = self._how_it_ended()
-                if process.exitcode >= 0:  # not killed: the next one would end the same way
+                if (process.exitcode or 0) >= 0:  # not killed: the next one would end the same way
                     break
                 continue
             self._pipe = ours
