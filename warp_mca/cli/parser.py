@@ -97,6 +97,7 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
     _add_options(parser)
     sweep.add_options(parser)
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the table (default: SCENE-PRESET-sweep)")
 
 
 def _build(parser: argparse.ArgumentParser) -> None:

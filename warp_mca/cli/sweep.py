@@ -34,13 +34,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="who carries out the runs: processes on this machine (default), or the workers of a Dask cluster",
     )
     parser.add_argument(
-        "--workers", type=int, metavar="N", help="processes (default: one for each core, or for each GPU of --device)"
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes (default: one for each core, or with --device cuda for each GPU)",
     )
     parser.add_argument(
         "--batch", type=int, metavar="N", help="runs computed in one model (default: as many as fill a GPU, 1 on a CPU)"
     )
     parser.add_argument("--folders", action="store_true", help="keep the files of each run too, in DIR/0, DIR/1, …")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the table (default: SCENE-PRESET-sweep)")
     parser.add_argument("--force", action="store_true", help="start again, in place of going on with what DIR holds")
     parser.set_defaults(command=_carry_out)
 
