@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from sweeping import SCENE, figures
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.runs.sweep import TRIES
+from warp_mca.runs.sweep_job import Job
 from warp_mca.runs.sweep_job import figures as summary_figures
 from warp_mca.runs.sweep_plan import FULL, Plan, RunOptions, batches, differing
 from warp_mca.runs.sweep_table import read_rows
@@ -170,6 +172,25 @@ def test_killed_workers_and_a_killed_sweep_lose_no_run(here: Path):
     rows = read_rows(here / "all/sweep.csv")
     assert [row["index"] for row in rows] == list(range(6))
     assert figures(rows) == figures(read_rows(here / "whole/sweep.csv"))
+
+
+def test_scenes_with_classes_of_their_file_travel_to_processes_that_have_not_read_it(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A scene file that was read for each scene gave classes that pickle took for others."""
+    scenes = blocks(1.0, kills="worker") + blocks(2.0, kills="worker")
+    sent = pickle.dumps(Job((0, 1), tuple(scenes), (None, None), RunOptions()))
+    monkeypatch.delitem(sys.modules, type(scenes[0].bodies[0].geometry).__module__)  # as in a new process
+    received = pickle.loads(sent)
+    assert [vars(scene.bodies[0].geometry) for scene in received.scenes] == [
+        {"whom": "worker", "flag": str(here / f"worker-{v}")} for v in (1, 2)
+    ]
+
+
+def test_a_scene_file_that_was_changed_is_read_again(here: Path):
+    before = blocks(1.0)[0].contacts[0].mu
+    (here / "block.py").write_text(SCENE.replace('Param("friction")] = 0.2', 'Param("friction")] = 0.3'))
+    assert (before, blocks(1.0)[0].contacts[0].mu) == (0.2, 0.3)
 
 
 def test_small_scenes_share_a_model_on_a_gpu_as_far_as_they_fill_it():

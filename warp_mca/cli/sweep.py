@@ -95,8 +95,8 @@ def sweep(
     )
     out = args.out or Path(f"{requests[0].label}-sweep")
     options = RunOptions(args.device, args.precision, args.threads, check_multi_rate(args.multi_rate), args.duration)
-    source = Path(args.scene).resolve() if Path(args.scene).suffix else None
-    plan = Plan(scenes, parameters, options, source, out, folders, batch)
+    model = Path(args.scene).resolve() if requests[0].meshes else None
+    plan = Plan(scenes, parameters, options, model, out, folders, batch)
     start_warp()
     with progress_bar() as progress:
         rows = carry_out(

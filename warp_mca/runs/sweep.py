@@ -113,7 +113,7 @@ def carry_out(
     Args:
         plan: of the sweep.
         executor, workers, force, progress: as in `sweep`.
-        meshes: of the model file that is the plan's source.
+        meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
 
     Raises:
@@ -199,7 +199,7 @@ def _job(plan: Plan, group: Sequence[int], count: int) -> Job:
         tuple(plan.scenes[k] for k in group),
         tuple(plan.run_folder(k) for k in group),
         replace(options, device=device),
-        plan.source,
+        plan.model,
     )
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 import pickle
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -40,38 +40,36 @@ class Job:
         scenes: one for each.
         folders: of their files, None where these are not kept.
         options: how they are run, on one device.
-        source: scene file or model file that is needed for the scenes, or None.
+        model: model file that has the meshes of the scenes, or None.
     """
 
     numbers: tuple[int, ...]
     scenes: tuple[Scene, ...]
     folders: tuple[Path | None, ...]
     options: RunOptions
-    source: Path | None = None
+    model: Path | None = None
 
     def __reduce__(self) -> tuple[Callable[..., Job], tuple[object, ...]]:
-        """Scenes travel as bytes, which can be read once the scene file with their classes has been."""
-        rest = self.numbers, self.folders, self.options, self.source
-        return _received, (*rest, pickle.dumps(self.scenes))
+        """Scenes travel as bytes, which can be read once the scene files with their classes have been."""
+        scenes = pickle.dumps(self.scenes)
+        return _received, (catalogue.files_of(scenes), self.numbers, scenes, self.folders, self.options, self.model)
 
 
-def _received(
-    numbers: tuple[int, ...], folders: tuple[Path | None, ...], options: RunOptions, source: Path | None, scenes: bytes
-) -> Job:
-    if source and source.suffix == ".py":
-        _read_scene_file(source)
-    return Job(numbers, pickle.loads(scenes), folders, options, source)
+def _received(files: Iterable[Path], numbers: tuple[int, ...], scenes: bytes, *rest: Any) -> Job:
+    for file in files:
+        catalogue.load_source(file)
+    return Job(numbers, pickle.loads(scenes), *rest)
 
 
-@cache
-def _read_scene_file(path: Path) -> None:
-    catalogue.load_source(path)
+def _meshes(job: Job) -> Mapping[str, Mesh] | None:
+    """The meshes of a job's model file, if it has one."""
+    return _stored_meshes(job.model, job.model.stat().st_mtime_ns) if job.model else None
 
 
-@cache
-def _meshes(source: Path | None) -> Mapping[str, Mesh] | None:
-    """The meshes of a model file, None for other sources."""
-    return model_file.load(source).meshes if source and source.suffix == model_file.SUFFIX else None
+@lru_cache(maxsize=1)
+def _stored_meshes(path: Path, changed: int) -> Mapping[str, Mesh]:
+    """The meshes of the model file at `path`, `changed` at that time [ns]."""
+    return model_file.load(path).meshes
 
 
 def run_job(job: Job) -> list[Row]:
@@ -99,7 +97,7 @@ def failure(reason: str) -> Row:
 
 
 def _batch(job: Job) -> list[Result]:
-    options, meshes = job.options, _meshes(job.source)
+    options, meshes = job.options, _meshes(job)
     return run_batch(
         job.scenes,
         device=options.device,
@@ -121,7 +119,7 @@ def _alone(job: Job, k: int) -> Row:
         duration=options.duration,
         out=job.folders[k],
         force=True,
-        meshes=_meshes(job.source),
+        meshes=_meshes(job),
     )
     return _outcome(result)
 

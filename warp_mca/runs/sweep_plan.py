@@ -48,7 +48,7 @@ class Plan:
         scenes: one for each run.
         parameters: what is listed of each run beside its figures: the values that its scene was made from.
         options: how each is run.
-        source: scene file or model file that workers need to have the scenes, or None.
+        model: model file that has the meshes of the scenes, or None.
         out: folder of the table, or None.
         folders: whether each run's files are kept in a folder of its own in `out`.
         batch: number of runs at most that are computed in one model; None for as many as fill a GPU, one on a CPU.
@@ -57,7 +57,7 @@ class Plan:
     scenes: tuple[Scene, ...]
     parameters: tuple[Mapping[str, object], ...]
     options: RunOptions
-    source: Path | None = None
+    model: Path | None = None
     out: Path | None = None
     folders: bool = False
     batch: int | None = None
