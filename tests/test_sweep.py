@@ -1,51 +1,28 @@
 """Sweeps from the command line: combinations, folders, exit status, and requests that are refused."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeping import SCENE
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.runs.sweep import parse_sweep
-
-SCENE = '''
-"""A block falls on a rough plane."""
-from typing import Annotated
-
-import warp_mca as mca
-from warp_mca import Param
-
-
-def build(
-    *,
-    v: Annotated[float, Param("speed", unit="m/s")] = 1.0,
-    mu: Annotated[float, Param("friction")] = 0.2,
-    tolerance: Annotated[float, Param("of the energy")] = 0.01,
-    duration: Annotated[float, Param("of the run", unit="s")] = 4e-6,
-) -> mca.Scene:
-    """A block with two elements."""
-    block = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 1, 1))
-    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
-    return mca.Scene(
-        name="block",
-        bodies=(mca.Body(name="block", geometry=block, material=steel, velocity=(v, -v, 0.0)),),
-        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), mu=mu),),
-        impact=mca.ImpactPhase(duration=duration, energy_tolerance=tolerance),
-    )
-'''
+from warp_mca.runs.sweep_plan import parse_grid
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0})  # one worker on a CPU, which is this process
     (tmp_path / "block.py").write_text(SCENE, encoding="utf-8")
     return tmp_path
 
 
 def test_every_combination_the_last_key_fastest():
-    found = parse_sweep(["mu=0.1,0.2", "v=1,2,3"])
+    found = parse_grid("--sweep", ["mu=0.1,0.2", "v=1,2,3"])
     assert [(item["mu"], item["v"]) for item in found] == [
         ("0.1", "1"), ("0.1", "2"), ("0.1", "3"), ("0.2", "1"), ("0.2", "2"), ("0.2", "3")
     ]  # fmt: skip
@@ -75,7 +52,7 @@ def test_each_scene_of_a_sweep_has_its_folder(here: Path, capsys: pytest.Capture
             assert np.array_equal(one[name], swept[name], equal_nan=True), name
 
 
-def test_scenes_of_several_durations_run_one_batch_after_another(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_scenes_may_have_several_durations(here: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["run", "block.py", "--sweep", "duration=2e-6,4e-6", "--sweep", "v=1,2", "--out", "all"]) == 0
     found = [mca.load(here / "all" / str(k)) for k in range(4)]
     assert [(run.time[-1], run.summary["parameters"]["v"]) for run in found] == [
@@ -89,9 +66,9 @@ def test_scenes_of_several_durations_run_one_batch_after_another(here: Path, cap
 def test_a_scene_that_is_stopped_gives_exit_status_1(here: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["run", "block.py", "--sweep", "tolerance=1,1e-12"]) == 1
     captured = capsys.readouterr()
-    assert captured.err == "warp-mca: error: guards stopped 1 of 2 scenes\n"
+    assert captured.err == "warp-mca: error: guards stopped 1 of 2 runs\n"
     assert "energy" in captured.out and "imbalance" in captured.out
-    assert [folder.name for folder in (here / "block-sweep").iterdir()] == ["0"]
+    assert [path.name for path in (here / "block-sweep").iterdir() if path.is_dir()] == ["0"]
 
 
 def test_a_built_model_is_swept(here: Path):

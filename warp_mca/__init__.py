@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from warp_mca.results.storage import load
     from warp_mca.runs.batch import run_batch
     from warp_mca.runs.simulation import mesh, run
+    from warp_mca.runs.sweep import sweep
     from warp_mca.scene.catalogue import make_scene
     from warp_mca.scene.parameters import Param
 
@@ -66,6 +67,7 @@ _LAZY = {
     "mesh": "warp_mca.runs.simulation",
     "run": "warp_mca.runs.simulation",
     "run_batch": "warp_mca.runs.batch",
+    "sweep": "warp_mca.runs.sweep",
 }
 
 __all__ = [
@@ -109,6 +111,7 @@ __all__ = [
     "quality_table",
     "run",
     "run_batch",
+    "sweep",
     "load",
     "Result",
     "McaError",

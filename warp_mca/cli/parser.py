@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, run
+from warp_mca.cli import commands, run, sweep
 from warp_mca.elements import ELEMENTS
 
 WELCOME = """\
@@ -18,6 +18,7 @@ elastoplastic finite elements with frictional contact take over.
   warp-mca run two_link                            falling two-link manipulator strikes a rough plate (Table 1)
   warp-mca run two_link --preset paper --device cuda:0
   warp-mca run two_link --set mu=0.3 --set v_plate=0.8 --out slippery
+  warp-mca sweep two_link --grid mu=0.1,0.3 --grid v_plate=0.4,0.8,1.6 --out slip
   warp-mca run my_scene.py                         a scene of your own, in Python
   warp-mca build two_link --preset paper -o paper.mca && warp-mca run paper.mca
   warp-mca scenes                                  scenes, presets and parameters
@@ -39,6 +40,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.set_defaults(command=lambda args: print(WELCOME))
     add = partial(parser.add_subparsers(metavar="COMMAND").add_parser, allow_abbrev=False)
     _run(add("run", help="run a scene or a built model"))
+    _sweep(add("sweep", help="run a scene for each combination of values, and collect a row of figures a run"))
     _build(add("build", help="make the meshes of a scene and store them with it"))
     _scenes(add("scenes", help="list scenes, presets and parameters"))
     _view(add("view", help="open a recording in the rerun viewer"))
@@ -49,6 +51,11 @@ def make_parser() -> argparse.ArgumentParser:
 def _run(parser: argparse.ArgumentParser) -> None:
     _add_scene(parser)
     _add_device(parser)
+    _add_options(parser)
+    _add_results(parser)
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
     parser.add_argument(
         "--multi-rate",
@@ -68,18 +75,29 @@ def _run(parser: argparse.ArgumentParser) -> None:
         metavar="F",
         help="stable step F times as long, or as 2e-8s, by mass that the smallest elements gain (default: the scene's)",
     )
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sweep",
         dest="sweeps",
         action="append",
         default=[],
         metavar="KEY=VALUE,…",
-        help="run a scene for each value, all at once, to folders 0, 1, … in DIR; several times: all combinations",
+        help="as warp-mca sweep --grid, with the files of each run in folders 0, 1, … in DIR",
     )
     parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(parser)
     parser.set_defaults(command=run.run)
+
+
+def _sweep(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    _add_device(parser)
+    _add_options(parser)
+    sweep.add_options(parser)
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the table (default: SCENE-PRESET-sweep)")
 
 
 def _build(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,24 +36,38 @@ class Request:
     meshes: dict[str, mca.Mesh] | None = None
 
 
-def read_request(args: argparse.Namespace, more: Mapping[str, str] | None = None) -> Request:
-    """Build the scene that the arguments ask for, with `more` parameters changed."""
-    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **(more or {})}
-    scale = getattr(args, SCALE, None)
+def read_request(args: argparse.Namespace) -> Request:
+    """Build the scene that the arguments ask for."""
+    return read_requests(args, [{}])[0]
+
+
+def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]]) -> list[Request]:
+    """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
     if Path(args.scene).suffix != SUFFIX:
         source = catalogue.load_source(args.scene)
-        scale = _where_no_parameter(scale, source.parameters, overrides)
-        values = source.resolve(args.preset, overrides)
-        preset = args.preset or source.default_preset
-        origin = Origin(source.name, preset, values) if source.builtin else None
-        label = f"{source.name}-{preset}" if preset else source.name
-        return Request(_with(source.build(values), args, scale), label, source, origin)
+        return [_of_source(args, source, more) for more in settings]
     if args.preset is not None:
         raise bad_value("--preset", args.preset, "a model file has its preset built in; leave it out or build again")
     if args.refine is not None:
         raise bad_value("--refine", args.refine, "a model file holds finished meshes; give it when building")
     stored = model_file.load(args.scene)
-    scale = _where_no_parameter(scale, stored.origin.parameters if stored.origin else (), overrides)
+    return [_of_model(args, stored, more) for more in settings]
+
+
+def _of_source(args: argparse.Namespace, source: catalogue.SceneSource, more: Mapping[str, str]) -> Request:
+    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **more}
+    scale = _where_no_parameter(getattr(args, SCALE, None), source.parameters, overrides)
+    values = source.resolve(args.preset, overrides)
+    preset = args.preset or source.default_preset
+    origin = Origin(source.name, preset, values) if source.builtin else None
+    label = f"{source.name}-{preset}" if preset else source.name
+    return Request(_with(source.build(values), args, scale), label, source, origin)
+
+
+def _of_model(args: argparse.Namespace, stored: model_file.StoredModel, more: Mapping[str, str]) -> Request:
+    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **more}
+    names = stored.origin.parameters if stored.origin else ()
+    scale = _where_no_parameter(getattr(args, SCALE, None), names, overrides)
     stored = model_file.changed(stored, overrides)
     scene = _with(stored.scene, args, scale)
     return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)

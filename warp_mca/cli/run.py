@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import warp_mca as mca
-from warp_mca.base.errors import GuardError, McaError, bad_value
-from warp_mca.cli.request import parameters_given, read_request
+from warp_mca.base.errors import McaError, bad_value
+from warp_mca.cli import sweep
+from warp_mca.cli.request import read_request
 from warp_mca.cli.warp_start import start_warp
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
-    from warp_mca.results.result import Result
 
 
 def run(args: argparse.Namespace) -> None:
@@ -86,37 +86,7 @@ def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
 
 
 def _sweep(args: argparse.Namespace) -> None:
-    from warp_mca.report.console import progress_bar
-    from warp_mca.runs.batch import hold_scenes, save_scenes
-    from warp_mca.runs.sweep import batches, parse_sweep, print_sweep
-
-    if args.multi_rate is not None:
-        raise bad_value("--multi-rate", args.multi_rate, "scenes of a sweep take the same steps; leave it out")
-    settings = parse_sweep(args.sweeps, parameters_given(args))
-    requests = [read_request(args, more) for more in settings]
-    out = args.out or Path(f"{requests[0].label}-sweep")
-    if _recorders(args, out):
+    """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
+    if _recorders(args, Path()):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
-    meshes, scenes = requests[0].meshes, [request.scene for request in requests]
-    groups = batches(scenes, args.duration)
-    found: dict[int, Result] = {}
-    with hold_scenes(out, len(scenes), args.force) as folders:
-        start_warp()
-        with progress_bar() as progress:
-            for group in groups:
-                done = mca.run_batch(
-                    [scenes[k] for k in group],
-                    device=args.device,
-                    precision=args.precision,
-                    threads=args.threads,
-                    duration=args.duration,
-                    meshes=[meshes] * len(group) if meshes else None,
-                    progress=progress,
-                )
-                found |= zip(group, done, strict=True)
-        # only now is it sure that no scene is refused
-        results = save_scenes([found[k] for k in range(len(scenes))], folders, args.force)
-    print_sweep(settings, results, groups)
-    stopped = sum(result.stopped is not None for result in results)
-    if stopped:
-        raise GuardError(f"guards stopped {stopped} of {len(results)} scenes")
+    sweep.sweep(args, "--sweep", args.sweeps, folders=True)

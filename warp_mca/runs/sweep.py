@@ -1,92 +1,268 @@
-"""Owns sweeps from the command line: which scenes `--sweep` asks for, and what is told of them."""
+"""Owns sweeps: many runs, a row a run in a table that grows as they end and from which an interrupted sweep goes on."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+import os
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import contextmanager
+from dataclasses import replace
 
-from warp_mca.base.errors import bad_value
+from warp_mca.base import validate
+from warp_mca.base.errors import McaError, bad_value
+from warp_mca.base.files import check_folder
+from warp_mca.base.folder import held
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.results.storage import check_output, folder_path
+from warp_mca.runs.arguments import Progress, check_scene, span_of, teller
+from warp_mca.runs.rate_groups import check_multi_rate
+from warp_mca.runs.sweep_job import Job, Row, failure, run_job
+from warp_mca.runs.sweep_plan import Plan, RunOptions, batches, differing
+from warp_mca.runs.sweep_table import IDENTITY, SweepTable, check_identity, remove_sweep, write_identity
+from warp_mca.runs.sweep_workers import (
+    Prepare,
+    check_executor,
+    connected,
+    devices_named,
+    lost_worker,
+    opened_executor,
+    own_workers,
+    worker_count,
+)
+from warp_mca.scene import Scene
+from warp_mca.scene.options import with_options
+from warp_mca.solve.threads import thread_count
 
-if TYPE_CHECKING:
-    from warp_mca.results.result import Result
-    from warp_mca.scene import Scene
+TRIES = 5  # of a run whose worker ends before it
+GO_ON = "if out names a folder, the others can be run by the same call"
+OWN = ("index", "status", "reason", "warnings", "wall")  # columns that no parameter may take
 
 
-def parse_sweep(texts: Iterable[str], given: Collection[str] = ()) -> list[dict[str, str]]:
-    """Settings of each scene, from texts `KEY=VALUE,VALUE,…`: every combination, the last key's values fastest.
+def sweep(
+    scenes: Iterable[Scene],
+    *,
+    executor: Executor | str | None = None,
+    workers: int | None = None,
+    batch: int | None = None,
+    device: str = "cpu",
+    precision: str = "mixed",
+    threads: int | None = None,
+    multi_rate: int | str | None = None,
+    duration: float | None = None,
+    out: str | os.PathLike[str] | None = None,
+    folders: bool = False,
+    force: bool = False,
+    refine: float | None = None,
+    mass_scaling: float | str | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Run scenes on several workers, and collect a row of figures of each.
+
+    The same call goes on with what `out` holds: rows that are there stay, and runs that failed are tried again. A run
+    whose worker is killed starts again on another one, 5 times at most. A script that calls this with workers of its
+    own must do so under `if __name__ == "__main__"`, as for `concurrent.futures.ProcessPoolExecutor`.
 
     Args:
-        texts: as the command line has them.
-        given: keys that are set for all scenes.
+        scenes: what to run.
+        executor: who runs them: any `concurrent.futures.Executor`; "dask://HOST:PORT", a Dask cluster; "process",
+            processes on this machine. If None these too, or this process where there is one worker on a CPU, or
+            `workers` is 1.
+        workers: number of processes; one for each core, or each GPU, if None.
+        batch: number of scenes at most that are computed in one model; None for as many as fill a GPU, one on a CPU.
+        device: "cpu", a CUDA device as "cuda:0", or "cuda" for all GPUs.
+        threads: of each run on the CPU; None shares the cores among the workers, and is one for an `executor`.
+        precision, multi_rate, duration, refine, mass_scaling: as in `warp_mca.run`, for all scenes.
+        out: folder for sweep.csv and sweep.parquet; nothing is written if None.
+        folders: keep the files of each run in a folder of its own in `out`, named by its number from 0.
+        force: start again, in place of what `out` holds.
+        progress: called with a stage and the share of runs that have ended.
+
+    Returns:
+        A row for each scene: index, the parameters that differ, status (done, stopped, failed), reason, all single
+        values of its summary, warnings, wall time [s]. Stopped and failed runs have no figures.
 
     Raises:
-        RequestError: a text is not of that form, or a key occurs twice.
+        RequestError: the request cannot be carried out; nothing was written.
+        McaError: the table cannot be written, or the executor has broken.
     """
-    values: dict[str, list[str]] = {}
-    for text in texts:
-        key, equals, listed = (part.strip() for part in text.partition("="))
-        found = [value.strip() for value in listed.split(",")]
-        if not (key and equals and all(found)):
-            raise bad_value("--sweep", text, "write it as KEY=VALUE,VALUE,… without spaces")
-        if key in given:
-            raise bad_value("--sweep", text, f"{key} is set for all scenes as well; leave one of the two out")
-        if key in values:
-            raise bad_value("--sweep", text, f"list all values of {key} at once")
-        values[key] = found
-    return [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
-
-
-def batches(scenes: Sequence[Scene], duration: float | None) -> list[list[int]]:
-    """Numbers of scenes that can take their steps together: those of one duration and output interval [s].
-
-    Args:
-        scenes: of the sweep.
-        duration: that all of them run, or None for their own.
-    """
-    found: dict[tuple[str, str], list[int]] = {}
+    if isinstance(scenes, str | Mapping) or not isinstance(scenes, Iterable):
+        raise bad_value("scenes", validate.brief(scenes), "give a list of scenes; mca.run runs a single one")
+    scenes = list(scenes)
     for k, scene in enumerate(scenes):
-        span = scene.impact.duration if duration is None else duration
-        # computed from other parameters, equal ones differ by rounding
-        found.setdefault((f"{span:.9e}", f"{scene.impact.output_interval:.9e}"), []).append(k)
-    return list(found.values())
+        check_scene(f"scenes[{k}]", scene)
+    changed = tuple(with_options(scene, refine, mass_scaling, None) for scene in scenes)
+    path = None if out is None else folder_path("out", out)
+    options = RunOptions(device, precision, threads, check_multi_rate(multi_rate), duration)
+    plan = Plan(changed, differing(changed), options, None, path, folders, batch)
+    return carry_out(plan, executor=executor, workers=workers, force=force, progress=progress)
 
 
-def print_sweep(
-    settings: Sequence[Mapping[str, str]], results: Sequence[Result], groups: Sequence[Sequence[int]]
-) -> None:
-    """A line for each scene: what was set, the figures that one looks at first, and its folder or why it stopped.
-
-    Below them, each warning once, and the time of all.
+def carry_out(
+    plan: Plan,
+    *,
+    executor: Executor | str | None = None,
+    workers: int | None = None,
+    force: bool = False,
+    meshes: Mapping[str, Mesh] | None = None,
+    prepare: Prepare | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """As `sweep`, of a sweep that is planned.
 
     Args:
-        settings: of each scene.
-        results: of each scene.
-        groups: numbers of the scenes that ran at once.
+        plan: of the sweep.
+        executor, workers, force, progress: as in `sweep`.
+        meshes: of the plan's model file.
+        prepare: called by each worker process before its first run.
+
+    Raises:
+        RequestError, McaError: as in `sweep`.
     """
-    from rich.table import Table
+    tell = teller(progress)
+    check_executor(executor)
+    _check(plan, workers, local=own_workers(executor))
+    groups = batches(plan, meshes)
+    with connected(executor) as given, _opened(plan, force) as table:
+        left = [group for group in groups if not table.rows.keys() >= set(group)]
+        count = min(worker_count(plan.options, workers), len(groups)) if own_workers(executor) else 0
+        jobs = [_job(plan, group, count) for group in left]
+        if executor is None and (count > 1 or (plan.options.device != "cpu" and workers != 1)):
+            given = "process"  # that a run of it ends badly is then not the end of the sweep
+        with opened_executor(given, plan.options.device, count, prepare) as (pool, limit):
+            _Driver(plan, pool, limit or len(jobs), table, tell).go_through(jobs)
+    return [table.rows[k] for k in range(len(plan.scenes))]
 
-    from warp_mca.report.console import console
 
-    out = console()
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for key in settings[0]:
-        table.add_column(key)
-    for heading in ("first peak F_n [N]", "F_t [N]", "contact [ms]", "energy error"):
-        table.add_column(heading, justify="right")
-    table.add_column("")
-    for chosen, result in zip(settings, results, strict=True):
-        s = result.summary
-        cells = [f"{s['F_n_first_peak'] or 0.0:.5g}", f"{s['F_t_min']:.5g} to {s['F_t_max']:.5g}"]
-        cells += [f"{1e3 * s['contact_duration']:.4g}", f"{100.0 * s['energy_error']:.2g} %"]
-        if result.stopped:
-            table.add_row(*chosen.values(), "", "", "", "", result.stopped)
-        else:
-            table.add_row(*chosen.values(), *cells, f"wrote {result.path}")
-    out.print(table)
-    for warning in dict.fromkeys(warning for result in results for warning in result.warnings):
-        out.print(f"warning: {warning}", soft_wrap=True)
-    shared, first = results[0].summary, [results[group[0]].summary["wall"] for group in groups]
-    total = {stage: sum(wall[stage] for wall in first) for stage in shared["wall"] if stage != "output"}
-    walls = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in total.items())
-    out.print(f"wall time of all: {walls}, on {shared['device']}, {shared['precision']}")
+def _check(plan: Plan, workers: object, local: bool) -> None:
+    """Refuse what no run of the sweep could be carried out with.
+
+    Raises:
+        RequestError: there is no such device, precision, number of threads, of workers or of scenes in a batch.
+    """
+    options = plan.options
+    if not plan.scenes:
+        raise bad_value("scenes", [], "give at least one scene")
+    for name, value in (("workers", workers), ("batch", plan.batch)):
+        if not (value is None or (isinstance(value, int) and not isinstance(value, bool) and value > 0)):
+            raise bad_value(name, validate.brief(value), "give a whole number above 0, or leave it out")
+    for scene in plan.scenes:
+        span_of(scene, options.duration)
+    thread_count(options.threads)
+    if options.precision not in ("mixed", "float64"):
+        raise bad_value("precision", validate.brief(options.precision), "give mixed or float64")
+    if local:
+        devices_named(options.device)
+    if plan.folders and plan.out is None:
+        raise bad_value("folders", True, "name the folder for the files of the runs with out as well")
+
+
+@contextmanager
+def _opened(plan: Plan, force: bool) -> Iterator[SweepTable]:
+    """The table of the sweep, in its folder, which no other run can write to meanwhile.
+
+    Raises:
+        RequestError: the folder holds something else, or another run holds it.
+    """
+    if plan.out is None:
+        yield SweepTable(None)
+        return
+    check_folder("out", plan.out)
+    with held(plan.out):
+        identity = plan.identity()
+        if force:
+            remove_sweep(plan.out)
+        check_identity(plan.out, identity)
+        table = SweepTable(plan.out)
+        for k in range(len(plan.scenes)):
+            if plan.folders and not (plan.out / IDENTITY).exists():
+                check_output(plan.run_folder(k) or plan.out, force=force)
+        write_identity(plan.out, identity)
+        try:
+            yield table
+        except KeyboardInterrupt as stop:
+            done = f"{len(table.rows)} of {len(plan.scenes)} runs are in {plan.out}"
+            stop.add_note(f"{done}: the same command goes on with the others")
+            raise
+        finally:
+            table.close()
+
+
+def _job(plan: Plan, group: Sequence[int], count: int) -> Job:
+    """What one of `count` workers of our own, or of others if 0, needs to know of a batch of runs."""
+    options = plan.options
+    if options.threads is None:
+        options = replace(options, threads=max(1, thread_count(None) // count) if count else 1)
+    device = "cuda:0" if options.device == "cuda" else options.device
+    return Job(
+        tuple(group),
+        tuple(plan.scenes[k] for k in group),
+        tuple(plan.run_folder(k) for k in group),
+        replace(options, device=device),
+        plan.model,
+    )
+
+
+class _Driver:
+    """Hands jobs to an executor, and rows to the table as jobs end."""
+
+    def __init__(self, plan: Plan, pool: Executor, limit: int, table: SweepTable, tell: Progress) -> None:
+        self.plan, self.pool, self.limit, self.table, self.tell = plan, pool, limit, table, tell
+        self.tries: Counter[tuple[int, ...]] = Counter()
+
+    def go_through(self, jobs: Sequence[Job]) -> None:
+        """Return when all jobs have ended.
+
+        Raises:
+            McaError: the executor takes no more, or rows cannot be written.
+        """
+        waiting = deque(jobs)
+        running: dict[Future[list[Row]], Job] = {}
+        try:
+            while waiting or running:
+                self.tell("sweep", len(self.table.rows) / len(self.plan.scenes))
+                while waiting and len(running) < self.limit:
+                    job = waiting.popleft()
+                    running[self._submit(job)] = job
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    job = running.pop(future)
+                    outcomes = self._outcomes(future, job)
+                    if outcomes is None:
+                        waiting.append(job)
+                    else:
+                        self._add(job, outcomes)
+        finally:
+            for future in running:
+                future.cancel()
+
+    def _submit(self, job: Job) -> Future[list[Row]]:
+        try:
+            return self.pool.submit(run_job, job)
+        except (BrokenExecutor, RuntimeError) as error:
+            raise McaError(f"the executor takes no more runs ({error}); {GO_ON} with a new executor") from error
+
+    def _outcomes(self, future: Future[list[Row]], job: Job) -> list[Row] | None:
+        """What came of each run of a job; None if it is to be tried again."""
+        try:
+            return future.result()
+        except McaError:
+            raise
+        except CancelledError as error:
+            raise McaError(f"the executor has cancelled runs; {GO_ON}") from error
+        except Exception as error:
+            if not lost_worker(error):
+                return [failure(f"{type(error).__name__}: {error}")] * len(job.numbers)
+            self.tries[job.numbers] += 1
+            if self.tries[job.numbers] < TRIES:
+                return None
+            return [failure(f"its worker ended before it in each of {TRIES} tries: {error}")] * len(job.numbers)
+
+    def _add(self, job: Job, outcomes: Sequence[Row]) -> None:
+        """Put into the table what it does not have yet."""
+        rows = []
+        for number, outcome in zip(job.numbers, outcomes, strict=True):
+            if number not in self.table.rows:
+                parameters = self.plan.parameters[number].items()
+                own = {"index": number, **{f"parameters.{key}" if key in OWN else key: v for key, v in parameters}}
+                rows.append(own | {key: value for key, value in outcome.items() if key not in own})
+        self.table.add(rows)

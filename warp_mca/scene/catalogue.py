@@ -150,10 +150,25 @@ def parse_overrides(settings: Iterable[str]) -> dict[str, str]:
     return overrides
 
 
+def files_of(pickled: bytes) -> list[Path]:
+    """Scene files that define classes of pickled objects: whoever unpickles them must call `load_source` of each."""
+    return [path for name, (path, *_) in _STAMPS.items() if name.encode() in pickled]
+
+
+_STAMPS: dict[str, tuple[Path, int, int]] = {}  # path, time and size of the scene file that each module is read from
+
+
 def _imported(path: Path) -> ModuleType:
     if not path.is_file():
         raise bad_value("scene", str(path), "there is no such file")
-    spec = util.spec_from_file_location(f"warp_mca_scene_file_{path.stem}", path)
+    name = f"warp_mca_scene_file_{path.stem}"
+    stamp = path.resolve(), path.stat().st_mtime_ns, path.stat().st_size
+    if (
+        _STAMPS.get(name) == stamp and name in sys.modules
+    ):  # objects of its classes are known by the classes that the module has
+        return sys.modules[name]
+    _STAMPS.pop(name, None)
+    spec = util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None  # true of every name that ends in .py
     module = util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses in the file look themselves up there
@@ -166,6 +181,7 @@ def _imported(path: Path) -> ModuleType:
     except (Exception, SystemExit) as error:
         words = " ".join(str(error).split())
         raise bad_value("scene", str(path), f"reading the file failed: {type(error).__name__}: {words}") from error
+    _STAMPS[name] = stamp
     return module
 
 

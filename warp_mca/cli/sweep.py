@@ -1,0 +1,158 @@
+"""Owns the command `sweep`: a scene for each combination of parameter values, a row of figures a run."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warp_mca.base.errors import GuardError
+from warp_mca.cli.request import parameters_given, read_requests
+from warp_mca.cli.warp_start import start_warp
+
+if TYPE_CHECKING:
+    from warp_mca.runs.sweep_job import Row
+    from warp_mca.runs.sweep_plan import Plan
+
+SHOWN, WARNINGS = 40, 10  # rows and warnings that the terminal shows at most; the table has all
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those that a sweep has beside those of a run."""
+    parser.add_argument(
+        "--grid",
+        dest="grids",
+        action="append",
+        required=True,
+        metavar="KEY=VALUE,…",
+        help="run the scene for each of these values of a parameter; several times: all combinations",
+    )
+    parser.add_argument(
+        "--executor",
+        metavar="process|dask://HOST:PORT",
+        help="who carries out the runs: processes on this machine (default), or the workers of a Dask cluster",
+    )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes (default: one for each core, or with --device cuda for each GPU)",
+    )
+    parser.add_argument(
+        "--batch", type=int, metavar="N", help="runs computed in one model (default: as many as fill a GPU, 1 on a CPU)"
+    )
+    parser.add_argument("--folders", action="store_true", help="keep the files of each run too, in DIR/0, DIR/1, …")
+    parser.add_argument("--force", action="store_true", help="start again, in place of going on with what DIR holds")
+    parser.set_defaults(command=_carry_out)
+
+
+def _carry_out(args: argparse.Namespace) -> None:
+    sweep(
+        args,
+        "--grid",
+        args.grids,
+        folders=args.folders,
+        executor=args.executor,
+        workers=args.workers,
+        batch=args.batch,
+    )
+
+
+def sweep(
+    args: argparse.Namespace,
+    option: str,
+    grids: Sequence[str],
+    *,
+    folders: bool,
+    executor: str | None = None,
+    workers: int | None = None,
+    batch: int | None = None,
+) -> None:
+    """Carry out a sweep, and print its table.
+
+    Args:
+        args: that the commands `run` and `sweep` share.
+        option: of the command line that has the grid.
+        grids: its texts `KEY=VALUE,VALUE,…`.
+        folders, executor, workers, batch: as in `warp_mca.sweep`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: not all runs are done; the table has them all.
+    """
+    from warp_mca.report.console import progress_bar
+    from warp_mca.runs.rate_groups import check_multi_rate
+    from warp_mca.runs.sweep import carry_out
+    from warp_mca.runs.sweep_plan import Plan, RunOptions, parse_grid, plain
+
+    settings = parse_grid(option, grids, parameters_given(args))
+    requests = read_requests(args, settings)
+    scenes = tuple(request.scene for request in requests)
+    parameters = tuple(
+        {key: plain(scene.parameters.get(key, text)) for key, text in chosen.items()}
+        for scene, chosen in zip(scenes, settings, strict=True)
+    )
+    out = args.out or Path(f"{requests[0].label}-sweep")
+    options = RunOptions(args.device, args.precision, args.threads, check_multi_rate(args.multi_rate), args.duration)
+    model = Path(args.scene).resolve() if requests[0].meshes else None
+    plan = Plan(scenes, parameters, options, model, out, folders, batch)
+    start_warp()
+    with progress_bar() as progress:
+        rows = carry_out(
+            plan,
+            executor=executor,
+            workers=workers,
+            force=args.force,
+            meshes=requests[0].meshes,
+            prepare=start_warp,
+            progress=progress,
+        )
+    _print(plan, rows)
+    count = {status: sum(row["status"] == status for row in rows) for status in ("stopped", "failed")}
+    if any(count.values()):
+        said = [f"guards stopped {count['stopped']}"] if count["stopped"] else []
+        said += [f"{count['failed']} failed"] if count["failed"] else []
+        raise GuardError(f"{', '.join(said)} of {len(rows)} runs")
+
+
+def _print(plan: Plan, rows: Sequence[Row]) -> None:
+    """A line for each run: what was set, the figures that one looks at first, and why it has none.
+
+    Below them, each warning once, the wall time of all runs together, and the files.
+    """
+    from rich.table import Table
+
+    from warp_mca.report.console import console
+    from warp_mca.runs.sweep_job import BETWEEN, DONE
+    from warp_mca.runs.sweep_table import CSV, PARQUET
+
+    out = console()
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for key in plan.parameters[0]:
+        table.add_column(key)
+    for heading in ("first peak F_n [N]", "F_t [N]", "contact [ms]", "energy error"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    for row, chosen in list(zip(rows, plan.parameters, strict=True))[:SHOWN]:
+        cells = ["", "", "", "", row["reason"] or ""]
+        if row["status"] == DONE:
+            folder = plan.run_folder(row["index"])
+            cells = [f"{row['F_n_first_peak'] or 0.0:.5g}", f"{row['F_t_min']:.5g} to {row['F_t_max']:.5g}"]
+            cells += [f"{1e3 * row['contact_duration']:.4g}", f"{100.0 * row['energy_error']:.2g} %"]
+            cells += [f"wrote {folder}" if folder else ""]
+        values = (f"{value:.10g}" if isinstance(value, float) else str(value) for value in chosen.values())
+        table.add_row(*values, *cells)
+    out.print(table)
+    if len(rows) > SHOWN:
+        out.print(f"and {len(rows) - SHOWN} more")
+    said = dict.fromkeys(text for row in rows for text in (row.get("warnings") or "").split(BETWEEN) if text)
+    for warning in list(said)[:WARNINGS]:
+        out.print(f"warning: {warning}", soft_wrap=True)
+    if len(said) > WARNINGS:
+        out.print(f"and {len(said) - WARNINGS} more warnings, in the column warnings of {CSV}")
+    wall = sum({row["wall"] for row in rows if row.get("wall")})  # runs of a batch have the same
+    out.print(f"wall time of all runs {wall:.1f} s, on {plan.options.device}, {plan.options.precision}")
+    for name in (CSV, PARQUET):
+        if plan.out and (plan.out / name).exists():
+            out.print(f"wrote {plan.out / name}", soft_wrap=True)
