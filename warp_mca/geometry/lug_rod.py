@@ -9,7 +9,7 @@ import numpy as np
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import HEXAHEDRON
-from warp_mca.geometry.lug import ROOT, WELD, lug
+from warp_mca.geometry.lug import HOLE, ROOT, WELD, lug
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.rod import Rod
 
@@ -18,8 +18,8 @@ from warp_mca.geometry.rod import Rod
 class LugRod(Rod):
     """A rod with a fork or an eye at its start, and at its end where its tip is flat; symmetric about z = 0.
 
-    Lugs are cut out of the round rod. They begin 1.45 radii before the hinge axis and end in a ball of one radius around
-    it, with a shaft hole of 0.3 radii along z: at the origin, and at x = length. The eye is 0.72 radii thick, the
+    Lugs are cut out of the round rod. They begin 1.45 radii before the hinge axis and end in a ball of one radius
+    around it, with a shaft hole of 0.3 radii along z: at the origin, and at x = length. The eye is 0.72 radii thick, the
     fork's slot 0.76 wide, so that fork and eye of two rods of equal radius turn freely around each other.
 
     Node sets: hole and end_hole (surfaces of the shaft holes, where there are such), side, tip, contact; start and end
@@ -46,7 +46,13 @@ class LugRod(Rod):
             least = self.length - self._between_lugs
             raise bad_value("LugRod.length", self.length, f"lugs and tip need more than {least:.4g} m")
         if self._ends and self.section < 4:
-            raise bad_value("LugRod.section", self.section, "fork and eye share the layers of the section; give 4 or more")
+            remedy = "fork and eye share the layers of cells across the section; give 4 or more"
+            raise bad_value("LugRod.section", self.section, remedy)
+
+    @property
+    def hole_radius(self) -> float:
+        """Radius of the shaft holes [m]."""
+        return HOLE * self.radius
 
     @property
     def _ends(self) -> list[str]:
@@ -81,7 +87,7 @@ class LugRod(Rod):
 
 
 def _moved(mesh: Mesh, way: float) -> Mesh:
-    return Mesh(mesh.points + [way, 0.0, 0.0], mesh.hexahedra, mesh.node_sets, mesh.cell_sets)
+    return Mesh(mesh.points + np.array([way, 0.0, 0.0]), mesh.hexahedra, mesh.node_sets, mesh.cell_sets)
 
 
 def _joined(rod: Mesh, shape: Mesh, face: str, hole: str) -> Mesh:
