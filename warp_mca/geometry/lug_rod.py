@@ -19,8 +19,9 @@ class LugRod(Rod):
     """A rod with a fork or an eye at its start, and at its end where its tip is flat; symmetric about z = 0.
 
     Lugs are cut out of the round rod. They begin 1.45 radii before the hinge axis and end in a ball of one radius
-    around it, with a shaft hole of 0.3 radii along z: at the origin, and at x = length. The eye is 0.72 radii thick, the
-    fork's slot 0.76 wide, so that fork and eye of two rods of equal radius turn freely around each other.
+    around it, with a shaft hole of 0.3 radii along z: at the origin, and at x = length. The eye is 0.72 radii thick,
+    the fork's slot 0.76 wide, so that fork and eye of two rods of equal radius turn freely around each other. `axial`
+    counts the cells along a cylinder without lugs, of which the part between the lugs gets its share.
 
     Node sets: hole and end_hole (surfaces of the shaft holes, where there are such), side, tip, contact; start and end
     where the rod is flat. Cell sets: body (with the lugs), and tip.
@@ -28,7 +29,6 @@ class LugRod(Rod):
     Attributes:
         start: shape of the rod at the origin.
         end: shape of the rod at x = length; a hemispherical tip has none.
-        axial: number of cells along a cylinder without lugs, of which the part between the lugs gets its share.
     """
 
     start: Literal["flat", "fork", "eye"] = "eye"

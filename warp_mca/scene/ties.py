@@ -125,7 +125,7 @@ class Pin:
     hole: bool = False
 
     def weights(self, points: Array, at: Vec3, axis: Vec3) -> Array:
-        """Weights of points at the distance r from an axis through `at`, shape (count,); 0 for those that are not taken.
+        """Weights of points at the distance r from an axis through `at`, shape (count,); 0 where they are not taken.
 
         Within a radius (1 - (r / radius)^2)^2: the weight and its slope are 0 there, so that sums over the nodes, which
         lumped masses make quadratures, change smoothly with the mesh. On the surface of a hole 1: masses are
