@@ -1,4 +1,4 @@
-"""What the choices that the paper leaves open do to its figures: `python -m benchmarks.paper_choices [--device cuda:0]`.
+"""What the choices that the paper leaves open do to its figures: `python -m benchmarks.paper_choices --help`.
 
 Runs `two_link` with other hinges, meshes, penalty factors, contact sides, elements and materials, and prints tables of
 the first and the second peak of F_n, impulse, duration, F_t, and what of the waves passes the middle hinge.
