@@ -27,7 +27,8 @@ def rods(hinge: str, section: int, axis: str, pulse: float, duration: float) -> 
     """Rods OA and AB along x, at rest, the far end of AB driven by half a sine of `pulse` [s]."""
     cells: dict[str, Any] = {"radius": RADIUS, "tip": "flat", "section": section, "ring": section // 2}
     cells |= {"axial": 7 * section, "length": LENGTH}
-    inner, outer, tied = mca.Rod(**cells), mca.Rod(**cells), {"nodes": hinge}
+    inner, outer = mca.Rod(**cells), mca.Rod(**cells)
+    tied: dict[str, Any] = {"nodes": hinge}
     if hinge == "none":
         inner = mca.Rod(**cells | {"length": 2.0 * LENGTH, "axial": 14 * section})
     elif hinge == "pin":
@@ -79,7 +80,7 @@ def passed(scene: mca.Scene) -> float:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.hinge_pulse", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.hinge_pulse", description="Pulses through hinges.")
     parser.add_argument("--section", type=int, default=6)
     args = parser.parse_args()
     print(f"| hinge | {' | '.join(f'{name}, {1e6 * pulse:.0f} us' for name, _, pulse, _ in PULSES)} |")
