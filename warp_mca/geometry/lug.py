@@ -241,7 +241,7 @@ def _hexahedra(block: Array, first: int) -> NDArray[np.int32]:
     return cells
 
 
-def welded(points: Array, cells: NDArray[np.int32]) -> Mesh:
+def _welded(points: Array, cells: NDArray[np.int32]) -> Mesh:
     """The mesh in which nodes of neighbouring blocks that coincide are one, the first of them."""
     from scipy.spatial import KDTree
 
@@ -259,7 +259,7 @@ def lug(kind: Literal["fork", "eye"], section: int, ring: int) -> Mesh:
     first = np.cumsum([0, *(block[..., 0].size for block in blocks)])
     points = np.concatenate([block.reshape(-1, 3) for block in blocks])
     cells = np.concatenate([_hexahedra(block, start) for block, start in zip(blocks, first, strict=False)])
-    mesh = mirror(welded(points, cells), 2)
+    mesh = mirror(_welded(points, cells), 2)
     x, y = mesh.points[:, 0], mesh.points[:, 1]
     sets = {"root": x > ROOT - WELD, "hole": np.hypot(x, y) < HOLE + WELD}
     return Mesh(mesh.points, mesh.hexahedra, {name: np.flatnonzero(it).astype(np.int32) for name, it in sets.items()})
