@@ -37,7 +37,7 @@ from warp_mca.scene import (
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
-    from warp_mca.geometry import Box, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
+    from warp_mca.geometry import Box, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -51,6 +51,7 @@ __version__ = "0.1.0"
 
 _LAZY = {
     "Box": "warp_mca.geometry",
+    "LugRod": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
     "NestedPlate": "warp_mca.geometry",
@@ -98,6 +99,7 @@ __all__ = [
     "ImpactPhase",
     "Box",
     "Rod",
+    "LugRod",
     "Sphere",
     "Plate",
     "MeshFile",
