@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, run
+from warp_mca.cli import commands, run, tradeoff
 from warp_mca.elements import ELEMENTS
 
 WELCOME = """\
@@ -39,6 +39,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.set_defaults(command=lambda args: print(WELCOME))
     add = partial(parser.add_subparsers(metavar="COMMAND").add_parser, allow_abbrev=False)
     _run(add("run", help="run a scene or a built model"))
+    _tradeoff(add("tradeoff", help="measure what choices of the model cost in error and in time"))
     _build(add("build", help="make the meshes of a scene and store them with it"))
     _scenes(add("scenes", help="list scenes, presets and parameters"))
     _view(add("view", help="open a recording in the rerun viewer"))
@@ -80,6 +81,19 @@ def _run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(parser)
     parser.set_defaults(command=run.run)
+
+
+def _tradeoff(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    parser.add_argument("--budget", type=float, metavar="SECONDS", help="time for all runs (default: all variants)")
+    parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
+    parser.add_argument(
+        "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
+    )
+    parser.add_argument("--out", type=_folder, metavar="DIR", required=True, help="folder for the results")
+    parser.add_argument("--force", action="store_true", help="replace a trade-off that the folder holds already")
+    parser.set_defaults(command=tradeoff.tradeoff)
 
 
 def _build(parser: argparse.ArgumentParser) -> None:
