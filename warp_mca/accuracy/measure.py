@@ -56,11 +56,13 @@ class Bench:
     Attributes:
         scene, device, threads, duration: as in `warp_mca.run`.
         base: the scene as written, once it was run.
+        beside: least time that a run took beside its steps and compiling, for each element [s].
     """
 
     def __init__(self, scene: Scene, device: str, threads: int | None, duration: float | None) -> None:
         self.scene, self.device, self.threads, self.duration = scene, device, threads, duration
         self.base: Measured | None = None
+        self.beside = math.inf
         self._made: dict[object, Mesh] = {}
 
     @property
@@ -100,6 +102,7 @@ class Bench:
             element_steps=element_steps(result),
             wall=wall,
         )
+        self.beside = min(self.beside, (whole - wall["fe"]) / found.elements)
         if trial is BASE:
             self.base = found
         return found
@@ -126,8 +129,7 @@ class Bench:
         share = (MULTI_RATE if variant.multi_rate is not None else 1.0) * self._share(variant)
         fixed = FIXED if self.device != "cpu" else 0.0
         work = steps * (fixed + share * finer**3 * base.elements) / (fixed + base.elements)
-        beside = base.wall["whole"] - base.wall["fe"]
-        return base.wall["fe"] * work + beside * max(1.0, finer**3)
+        return base.wall["fe"] * work + self.beside * base.elements * max(1.0, finer**3)
 
     def _share(self, variant: Variant) -> float:
         """Time of an element over that of the scene as written [-]."""

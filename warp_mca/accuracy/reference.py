@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from warp_mca.accuracy.convergence import Limit, limits
+from warp_mca.accuracy.convergence import NO_RUN, Limit, limits
 from warp_mca.accuracy.figures import BOUND, NAMES
 from warp_mca.accuracy.knobs import BASE, Trial, penalty_of
 from warp_mca.accuracy.measure import Bench, Measured
@@ -119,7 +119,7 @@ def find_reference(
     different = [k for k, size in enumerate(sizes) if k == 0 or size < sizes[k - 1]]  # counts of cells are rounded
     levels, sizes = [levels[k] for k in different], [sizes[k] for k in different]
     found = limits(sizes, [level.figures for level in levels], _resolution(bench.scene))
-    if all(limit.why == "no run has this figure" for limit in found.values()):
+    if all(limit.why == NO_RUN for limit in found.values()):
         remedy = f"a run of it has none of the figures {', '.join(NAMES)}; give a scene with a contact, paths or yield"
         raise bad_value("scene", bench.scene.name, remedy)
     return Reference(limits=found, levels=levels, penalty=penalty, springs=springs)

@@ -173,8 +173,7 @@ class _Study:
         floor = max((reference.limits[name].left or 0.0 for name in BOUND), default=0.0)
         base = self.runs[_key(BASE)]
         for trial, cost in combinations(self.bench, runs, reference.figures, floor, COMBINED):
-            beside = base.wall["whole"] - base.wall["fe"]
-            self.try_(trial, cost * base.wall["fe"] + beside, 0.0)
+            self.try_(trial, cost * base.wall["fe"] + self.bench.beside * base.elements, 0.0)
 
     def note(self, trial: Trial) -> Measured:
         """What a variant gave; each is run once."""

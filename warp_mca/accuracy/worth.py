@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from warp_mca.accuracy.convergence import NO_RUN
 from warp_mca.accuracy.figures import BOUND, NAMES, errors
 
 if TYPE_CHECKING:
@@ -30,9 +31,14 @@ UNITS = {
 
 
 def worth_of(found: TradeOff, run: Measured) -> dict[str, Any]:
-    """How many times faster a variant is than the scene as written, and the share by which it changes each figure."""
+    """What a variant is worth beside the scene as written.
+
+    `times_faster` by the clock, `times_less_work` by counts of element steps, and `change`, the share by which it
+    changes each figure [-].
+    """
     return {
         "times_faster": found.time_of(found.base) / found.time_of(run),
+        "times_less_work": found.base.element_steps / run.element_steps,
         "change": errors(run.figures, found.base.figures),
     }
 
@@ -56,7 +62,8 @@ def reference_lines(contents: Mapping[str, Any]) -> list[str]:
     for name in NAMES:
         value, unit = reference["figures"][name], UNITS[name]
         if value is None:
-            lines.append(f"  {HEADINGS[name]}: no limit: {reference['why'][name]}")
+            why = reference["why"][name]
+            lines.append(f"  {HEADINGS[name]}: {why}" if why == NO_RUN else f"  {HEADINGS[name]}: no limit, {why}")
             continue
         left, order = reference["left"][name], reference["order"][name]
         known = "" if left is None else f" ± {100.0 * left:.2g} %"
@@ -65,40 +72,37 @@ def reference_lines(contents: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def present(contents: Mapping[str, Any]) -> list[str]:
+    """Figures that runs have."""
+    return [name for name in NAMES if contents["reference"]["why"].get(name) != NO_RUN]
+
+
 def knob_rows(contents: Mapping[str, Any]) -> list[list[str]]:
-    """Cells of the table of knobs, one at a time: how many times faster, and what that changes."""
-    rows = [row for row in contents["variants"] if row["knob"] not in ("combined", "reference")]
+    """The table of knobs, one at a time: how many times faster and less work, and what that changes. Headings first."""
+    names = present(contents)
+    found = [["knob", "times faster", "less work", *(HEADINGS[name] for name in names), "value"]]
+    rows = [row for row in contents["variants"] if row["knob"] not in ("combined", "reference", "as written")]
     order = list(dict.fromkeys(row["knob"] for row in rows))
-    cells = []
     for row in sorted(rows, key=lambda row: order.index(row["knob"])):
         if row["stopped"]:
-            cells.append([row["knob"], words(row["knobs"]), "", "", *[""] * len(NAMES), row["stopped"]])
+            found.append([row["knob"], *[""] * (2 + len(names)), f"{words(row['knobs'])}: {row['stopped']}"])
             continue
-        faster = f"{row['times_faster']:.2f}"
-        changes = [share(row["change"][name]) for name in NAMES]
-        cells.append([row["knob"], words(row["knobs"]), f"{row['elements']:,}", faster, *changes, ""])
-    return cells
+        ratios = [f"{row[key]:.2f}" for key in ("times_faster", "times_less_work")]
+        found.append([row["knob"], *ratios, *(share(row["change"][name]) for name in names), words(row["knobs"])])
+    return found
 
 
 def frontier_rows(contents: Mapping[str, Any]) -> list[list[str]]:
-    """Cells of the table of the frontier: variants that no other beats in time and in the greatest bound error."""
-    clock = contents["time"]
-    front = [row for row in contents["variants"] if "bound" in row.get("frontier", [])]
-    return [
-        [
-            words(row["knobs"]),
-            f"{row['elements']:,}",
-            f"{row['steps']:,}",
-            f"{row['wall'][clock]:.3g}",
-            f"{row['wall']['whole']:.3g}",
-            *(share(row["errors"][name]) for name in NAMES),
-        ]
-        for row in sorted(front, key=lambda row: row["wall"][clock])
-    ]
-
-
-KNOB_HEAD = ["knob", "value", "elements", "times faster", *HEADINGS.values(), ""]
-FRONTIER_HEAD = ["variant", "elements", "steps", "steps [s]", "whole [s]", *HEADINGS.values()]
+    """The table of variants that no other beats in both time and greatest bound error. Headings first."""
+    clock, names = contents["time"], [n for n in present(contents) if contents["reference"]["figures"][n] is not None]
+    front = [row for row in contents["variants"] if "bound" in row.get("frontier", []) or row["knob"] == "as written"]
+    found = [["steps [s]", "whole [s]", "elements", "steps", *(HEADINGS[name] for name in names), "variant"]]
+    for row in sorted(front, key=lambda row: row["wall"][clock]):
+        times = [f"{row['wall'][clock]:.3g}", f"{row['wall']['whole']:.3g}"]
+        counts = [f"{row['elements']:,}", f"{row['steps']:,}"]
+        mark = "" if "bound" in row["frontier"] else " (not on the frontier)"
+        found.append([*times, *counts, *(share(row["errors"][name]) for name in names), words(row["knobs"]) + mark])
+    return found
 
 
 def print_tradeoff(contents: Mapping[str, Any]) -> None:
@@ -107,23 +111,26 @@ def print_tradeoff(contents: Mapping[str, Any]) -> None:
 
     out = console()
     bound = ", ".join(HEADINGS[name] for name in BOUND)
-    out.print("\n".join(reference_lines(contents)))
+    out.print("\n" + "\n".join(reference_lines(contents)))
     out.print("\nOne knob at a time: times faster than the scene as written, and what that changes in its figures")
-    out.print(_table(KNOB_HEAD, knob_rows(contents), left=(0, 1, len(KNOB_HEAD) - 1)))
+    out.print(_table(knob_rows(contents)))
     out.print(f"\nFrontier: no other variant is both faster and closer to the reference in {bound}; errors")
-    out.print(_table(FRONTIER_HEAD, frontier_rows(contents), left=(0,)))
+    out.print(_table(frontier_rows(contents)))
     if contents["left_out"]:
         names = "; ".join(words(row["knobs"]) for row in contents["left_out"])
         out.print(f"\nleft out, for the budget: {names}")
 
 
-def _table(head: list[str], rows: list[list[str]], left: tuple[int, ...]) -> Table:
+def _table(rows: list[list[str]]) -> Table:
+    """The first row is that of headings; texts in the last column are wrapped."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for k, heading in enumerate(head):
-        table.add_column(heading, justify="left" if k in left else "right")
-    for row in rows:
+    last = len(rows[0]) - 1
+    for k, heading in enumerate(rows[0]):
+        text = k in (0, last) and not heading.endswith("]")
+        table.add_column(heading, justify="left" if text else "right", no_wrap=k < last)
+    for row in rows[1:]:
         table.add_row(*row)
     return table
 
