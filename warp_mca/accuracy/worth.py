@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from warp_mca.accuracy.convergence import NO_RUN
+from warp_mca.accuracy.convergence import LEAST_ORDER, NO_RUN
 from warp_mca.accuracy.figures import BOUND, NAMES, errors
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def reference_lines(contents: Mapping[str, Any]) -> list[str]:
             continue
         left, order = reference["left"][name], reference["order"][name]
         known = "" if left is None else f" ± {100.0 * left:.2g} %"
-        observed = "" if order is None else f", observed order {order:.1f}"
+        observed = "" if order is None or order < LEAST_ORDER else f", observed order {order:.1f}"
         lines.append(f"  {HEADINGS[name]}: {value:.5g}{' ' * bool(unit)}{unit}{known}{observed}")
     return lines
 
