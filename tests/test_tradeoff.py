@@ -67,7 +67,8 @@ def study(*runs: Measured) -> TradeOff:
     truth = {name: Limit(None, why="made up") for name in NAMES}
     truth |= {"F_n_first_peak": Limit(100.0, 0.001), "contact_duration": Limit(2.0, 0.001)}
     reference = Reference(limits=truth, levels=[], penalty=None, springs={})
-    return TradeOff(scene="made up", device="cpu", threads=1, clock="cpu", reference=reference, variants=runs)
+    told = {"scene": "made up", "device": "cpu", "threads": 1, "duration": 1e-3, "budget": None, "clock": "cpu"}
+    return TradeOff(**told, reference=reference, variants=runs)
 
 
 def test_errors_against_the_limit_and_the_frontier():

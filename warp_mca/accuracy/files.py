@@ -80,6 +80,8 @@ def as_json(found: TradeOff) -> dict[str, Any]:
         "scene": found.scene,
         "device": found.device,
         "threads": found.threads,
+        "duration": found.duration,
+        "budget": found.budget,
         "version": __version__,
         "time": found.clock,
         "spent": found.spent,

@@ -56,12 +56,14 @@ class Bench:
     Attributes:
         scene, device, threads, duration: as in `warp_mca.run`.
         base: the scene as written, once it was run.
+        name: of the device, once that was run.
         beside: least time that a run took beside its steps and compiling, for each element [s].
     """
 
     def __init__(self, scene: Scene, device: str, threads: int | None, duration: float | None) -> None:
         self.scene, self.device, self.threads, self.duration = scene, device, threads, duration
         self.base: Measured | None = None
+        self.name = device
         self.beside = math.inf
         self._made: dict[object, Mesh] = {}
 
@@ -104,7 +106,7 @@ class Bench:
         )
         self.beside = min(self.beside, (whole - wall["fe"]) / found.elements)
         if trial is BASE:
-            self.base = found
+            self.base, self.name = found, str(summary["device"])
         return found
 
     def time_of(self, found: Measured) -> float:

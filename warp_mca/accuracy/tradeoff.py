@@ -33,7 +33,9 @@ class TradeOff:
 
     Attributes:
         scene: its name.
-        device, threads: that variants ran on.
+        device, threads: that variants ran on, the device with its name.
+        duration: of the impact phase [s].
+        budget: that was asked for [s], or None.
         clock: of `Measured.wall`, that variants are compared by, see `Bench.clock`.
         reference: what they are compared with.
         variants: as measured, in the order of the runs; the first is the scene as written.
@@ -44,6 +46,8 @@ class TradeOff:
     scene: str
     device: str
     threads: int | None
+    duration: float
+    budget: float | None
     clock: str
     reference: Reference
     variants: Sequence[Measured]
@@ -158,8 +162,10 @@ class _Study:
         self.combine(single, reference)
         return TradeOff(
             scene=self.bench.scene.name,
-            device=self.bench.device,
+            device=self.bench.name,
             threads=self.bench.threads,
+            duration=span_of(self.bench.scene, self.bench.duration),
+            budget=self.budget,
             clock=self.bench.clock,
             reference=reference,
             variants=list(self.runs.values()),
