@@ -134,6 +134,9 @@ def test_parameters_are_varied_only_where_the_catalogue_builds_the_scene():
     scene = mca.make_scene("two_link")
     changed = replace(scene, gravity=(0.0, -1.6, 0.0))
     assert not any(trial.variant.parameters for trial in one_at_a_time(changed))
+    coarse = replace(scene, refine=0.5)
+    found = [trial.variant.applied(coarse) for trial in one_at_a_time(coarse) if trial.variant.parameters]
+    assert len(found) == 6 and all(item.refine == 0.5 for item in found)
 
 
 def test_the_softest_penalty_is_taken_whose_springs_hold_next_to_nothing():

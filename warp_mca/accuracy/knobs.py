@@ -104,14 +104,14 @@ def _elements(scene: Scene) -> list[str]:
 
 
 def _modelling(scene: Scene) -> dict[str, Parameters]:
-    """Values of modelling parameters by knob; none where the scene is not just what the catalogue builds of them."""
+    """Values of modelling parameters by knob; none where the scene is not what the catalogue builds, but for its cells."""
     if scene.name not in MODELLING or scene.name not in scene_names():
         return {}
     try:
         built = load_source(scene.name).build(scene.parameters)
     except RequestError:
         return {}
-    if replace(built, parameters={}) != replace(scene, parameters={}):
+    if replace(built, parameters={}, refine=scene.refine) != replace(scene, parameters={}):
         return {}
     made = {knob: change(scene.parameters) for knob, change in MODELLING[scene.name].items()}
     return {
