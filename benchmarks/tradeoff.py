@@ -26,13 +26,18 @@ CASES = (
     ),
     (
         "quick",
-        "`two_link`, `quick`, on one CPU core",
-        "warp-mca tradeoff two_link --duration 5e-4 --threads 1 --budget 3300 --out DIR",
+        "`two_link`, `quick`, on 12 CPU cores",
+        "warp-mca tradeoff two_link --threads 12 --budget 210 --out DIR",
     ),
     (
         "standard",
-        "`two_link`, `standard`, on one CPU core: the first 0.2 ms",
-        "warp-mca tradeoff two_link --preset standard --duration 2e-4 --threads 1 --budget 1800 --out DIR",
+        "`two_link`, `standard`, on 12 CPU cores",
+        "warp-mca tradeoff two_link --preset standard --threads 12 --budget 500 --out DIR",
+    ),
+    (
+        "coarse",
+        "`two_link`, `quick` with cells 1.4 times larger, on one CPU core",
+        "warp-mca tradeoff two_link --refine 0.7 --duration 5e-4 --threads 1 --budget 2400 --out DIR",
     ),
     ("hertz_sphere", "`hertz_sphere` on one CPU core", "warp-mca tradeoff hertz_sphere --threads 1 --out DIR"),
     (
@@ -102,7 +107,9 @@ def main() -> None:
     from warp_mca.accuracy.picture import plot_tradeoff
     from warp_mca.report.style import save_png
 
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.tradeoff", description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.tradeoff", description=(__doc__ or "").partition("\n")[0]
+    )
     parser.add_argument("name", nargs="?", choices=[name for name, _, _ in CASES])
     parser.add_argument("folder", nargs="?", type=Path, help="that holds a tradeoff.json")
     args = parser.parse_args()

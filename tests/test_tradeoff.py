@@ -12,10 +12,10 @@ import warp_mca as mca
 from warp_mca.accuracy.combine import combinations, merged
 from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import NAMES
+from warp_mca.accuracy.findings import TradeOff
 from warp_mca.accuracy.knobs import BASE, Trial, one_at_a_time
 from warp_mca.accuracy.measure import Bench, Measured, element_steps
 from warp_mca.accuracy.reference import Reference, choose_penalty
-from warp_mca.accuracy.tradeoff import TradeOff
 from warp_mca.accuracy.variant import Variant
 from warp_mca.cli.main import main
 from warp_mca.results.result import Result

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from warp_mca.accuracy.figures import BOUND, NAMES
+from warp_mca.accuracy.findings import TradeOff
 from warp_mca.accuracy.measure import Measured
-from warp_mca.accuracy.tradeoff import TradeOff
 from warp_mca.accuracy.worth import worth_of
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import check_folder, given_path

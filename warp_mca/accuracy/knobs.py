@@ -104,7 +104,10 @@ def _elements(scene: Scene) -> list[str]:
 
 
 def _modelling(scene: Scene) -> dict[str, Parameters]:
-    """Values of modelling parameters by knob; none where the scene is not what the catalogue builds, but for its cells."""
+    """Values of modelling parameters by knob; none where the scene is not what the catalogue builds.
+
+    Its cells may be finer or coarser.
+    """
     if scene.name not in MODELLING or scene.name not in scene_names():
         return {}
     try:

@@ -89,10 +89,10 @@ class Bench:
             with quiet(trial is not BASE):
                 meshes = mesh(scene, self._made)
                 result = run(scene, device=self.device, meshes=meshes, progress=watch, **options)
-        except McaError as error:
+        except (McaError, MemoryError, RuntimeError) as error:  # Warp raises RuntimeError where a GPU has no room
             if trial is BASE:
                 raise
-            return Measured(trial=trial, stopped=str(error))
+            return Measured(trial=trial, stopped=str(error) or type(error).__name__)
         summary = result.summary
         whole = time.perf_counter() - begun - summary["wall"]["compile"]
         wall = {"fe": summary["wall"]["fe"], "whole": whole, "cpu": watch.processor or summary["wall"]["fe"]}

@@ -11,8 +11,8 @@ from warp_mca.accuracy.figures import BOUND, NAMES, errors
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from warp_mca.accuracy.findings import TradeOff
     from warp_mca.accuracy.measure import Measured
-    from warp_mca.accuracy.tradeoff import TradeOff
 
 HEADINGS = {
     "F_n_first_peak": "first peak",

@@ -20,6 +20,7 @@ elastoplastic finite elements with frictional contact take over.
   warp-mca run two_link --set mu=0.3 --set v_plate=0.8 --out slippery
   warp-mca run my_scene.py                         a scene of your own, in Python
   warp-mca build two_link --preset paper -o paper.mca && warp-mca run paper.mca
+  warp-mca tradeoff two_link --out trade           what each choice of the model costs in error, and in time
   warp-mca scenes                                  scenes, presets and parameters
 
 warp-mca COMMAND --help lists the options; README.md has an example in Python."""
