@@ -41,6 +41,8 @@ def test_a_series_that_swings_has_a_limit_only_if_it_settles():
     assert settling.value == 1.06 and settling.left == pytest.approx(0.04 / 1.06)
     assert settling.order is None and settling.ratio == pytest.approx(-0.4)
     assert limit_of(SIZES, (1.0, 1.1, 1.01)).value is None
+    late = limit_of(SIZES, (1.0, 1.0, 1.1))
+    assert late.value is None and late.ratio is None
 
 
 def test_changes_within_two_percent_or_the_resolution_are_a_limit():

@@ -115,7 +115,8 @@ class _Study:
     def combine(self, single: Sequence[Trial], reference: Reference) -> None:
         """Run promising combinations."""
         runs = [self.runs[_key(trial)] for trial in single[1:] if _key(trial) in self.runs]
-        floor = max((reference.limits[name].left or 0.0 for name in BOUND), default=0.0)
+        known = [reference.limits[name].left for name in BOUND]
+        floor = min((left for left in known if left is not None), default=0.0)
         base = self.runs[_key(BASE)]
         for trial, cost in combinations(self.bench, runs, reference.figures, floor, COMBINED):
             self.try_(trial, cost * base.wall["fe"] + self.bench.beside * base.elements, 0.0)
