@@ -29,7 +29,7 @@ MODELLING: dict[str, dict[str, Callable[[Parameters], Parameters]]] = {
         "far link coarser": lambda p: {"axial_OA": max(p["axial_OA"] // 2, 1)},
         "short plate, absorbing ends": lambda p: {
             "plate_absorbs": "ends",
-            "plate_length": 7.7 * p["radius"],
+            "plate_length": p["plate_width"],
             "plate_extension": 3,
         },
         "coarse rods, tied": lambda p: {"fine_length": 2.1 * p["radius"], "rod_section": 4, "rod_ring": 2},
