@@ -106,11 +106,11 @@ def _of_three(h: Sequence[float], f: Sequence[float], resolution: float) -> Limi
     if order is not None and order >= LEAST_ORDER:
         found = _extrapolated(h, f, min(max(order, ORDERS[0]), ORDERS[1]), resolution)
         return Limit(found.value, found.left, order, ratio)
+    if ratio is not None and -0.5 <= ratio <= 0.0:  # values swing around a limit
+        return Limit(f[-1], (abs(last) + resolution) / abs(f[-1]), None, ratio)
     irregular = order is None or order < SINGULAR  # as of coarse meshes, whose first change is small by chance
     if irregular and spread + resolution <= SETTLING * abs(f[-1]):
         return Limit(f[-1], (spread + resolution) / abs(f[-1]), None, ratio)
-    if ratio is not None and -0.5 <= ratio <= 0.0:  # values swing around a limit
-        return Limit(f[-1], (abs(last) + resolution) / abs(f[-1]), None, ratio)
     moves = f"the last two are {_share(first, f)} and {_share(last, f)}"
     what = "its changes swing" if ratio is not None and ratio < 0.0 else "its changes keep one sign"
     return Limit(None, None, order, ratio, f"{what} and do not shrink as they must: {moves}")
