@@ -36,7 +36,7 @@ def build(*, t_end: float | None = None, apart: bool = False) -> mca.Scene:
         contacts=(
             mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), penalty=1.0),
         ),
-        impact=mca.ImpactPhase(duration=8e-6, output_interval=2e-7),
+        impact=mca.ImpactPhase(duration=8e-6, output_interval=2e-7, energy_tolerance=0.1),
     )
 '''
 
@@ -150,7 +150,7 @@ def block() -> mca.Scene:
         name="block",
         bodies=(mca.Body(name="block", geometry=box, material=STEEL, velocity=(0.0, -1.0, 0.0)),),
         contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), penalty=1.0),),
-        impact=mca.ImpactPhase(duration=8e-6, output_interval=2e-7),
+        impact=mca.ImpactPhase(duration=8e-6, output_interval=2e-7, energy_tolerance=0.1),
     )
 
 
