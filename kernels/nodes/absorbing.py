@@ -46,17 +46,19 @@ def dampen(before: wp.vec3d, free: wp.vec3d, own: wp.vec3d, share: wp.mat33d):
 
 
 @cache
-def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = False, rated: bool = False) -> Any:
+def absorbing_kernel(
+    precision: str, contact: bool, springs: bool, each: bool = False, rated: bool = False, turned: bool = False
+) -> Any:
     """Kernel: advance the nodes that dashpots act on; arguments as in `node.integrate_kernel`.
 
     impulse_out [N s] is what each node has given to what lies beyond the boundary up to t(n), absorbed_out [J] the
     energy that it gave in the frame of the body. As the force at t(n) acts for half a step on either side of
     it, the arrays with `after` hold the same half a step later. With `springs`, stretch_out [m] is u(n) less the way of
-    the body. `rated` as in `gather_function`.
+    the body. `rated`, `turned` as in `gather_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated)
+    gather = gather_function(precision, rated, turned)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_absorbing(
@@ -66,6 +68,8 @@ def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = 
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frame: wp.array(dtype=wp.int32),
+        rotation: wp.array(dtype=wp.quatd),
         scene: Index,
         gravity: Vector,
         dt: wp.float64,
@@ -85,7 +89,7 @@ def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = 
         k = wp.tid()
         i = dashpots.node[k]
         own = dashpots.velocity[k]
-        total = gather(first_slots[i], more_slots, force)
+        total = gather(i, first_slots[i], more_slots, force, frame, rotation)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import turn_function
 from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -39,16 +40,23 @@ def force_function(precision: str, rated: bool) -> Any:
 
 
 @cache
-def gather_function(precision: str, rated: bool = False) -> Any:
+def gather_function(precision: str, rated: bool = False, turned: bool = False) -> Any:
     """The function that sums the forces of elements on a node, in the slots that `first_slots` and `more_slots` list.
 
     Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`. `rated`:
-    slots come with levels, and a node may have none.
+    slots come with levels, and a node may have none. `turned`: forces are those in floating frames.
     """
-    vec3, force_at = scalars(precision).vec3, force_function(precision, rated)
+    vec3, force_at, to_world = scalars(precision).vec3, force_function(precision, rated), turn_function(turned)
 
     @wp.func
-    def gather(pair: wp.vec2i, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
+    def gather(
+        i: int,
+        pair: wp.vec2i,
+        more_slots: wp.array(dtype=wp.vec4i),
+        force: wp.array(dtype=vec3),
+        frame: wp.array(dtype=wp.int32),
+        rotation: wp.array(dtype=wp.quatd),
+    ):
         if wp.static(rated):
             if pair[0] < 0:
                 return wp.vec3d()
@@ -68,7 +76,7 @@ def gather_function(precision: str, rated: bool = False) -> Any:
             if r[2] >= 0:
                 total += force_at(r[2], force)
             row += 1
-        return total
+        return to_world(i, total, frame, rotation)
 
     return gather
 
@@ -99,6 +107,7 @@ def integrate_kernel(
     bound: bool = False,
     each: bool = False,
     early: bool = False,
+    turned: bool = False,
 ) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
@@ -107,11 +116,11 @@ def integrate_kernel(
     threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
     some nodes are left to `constraint.bound_kernel` or `absorbing.absorbing_kernel`. With `each`, gravity differs
     between the scenes of a batch, and nodes know their scene. `early`: the next kernel takes its places as soon as
-    nodes leave some.
+    nodes leave some. `turned` as in `gather_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision)
+    gather = gather_function(precision, turned=turned)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
@@ -120,6 +129,8 @@ def integrate_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frame: wp.array(dtype=wp.int32),
+        rotation: wp.array(dtype=wp.quatd),
         scene: Index,
         gravity: Vector,
         kick: wp.float64,
@@ -147,7 +158,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(pair, more_slots, force)
+        total = gather(i, pair, more_slots, force, frame, rotation)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -27,7 +27,9 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, each: bool, early: bool) -> Any:
+def integrate_kernel(
+    precision: str, contact: bool, fixed: bool, bound: bool, each: bool, early: bool, turned: bool
+) -> Any:
     """Kernel: as `node.integrate_kernel`, of listed nodes whose kick and drift are 2^level times those given.
 
     item: node + (level << LEVEL_BIT) of each, shape (active_count,), int32. first_slots, more_slots: slots of the
@@ -35,7 +37,7 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, ea
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, True)
+    gather = gather_function(precision, True, turned)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate_rated(
@@ -45,6 +47,8 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, ea
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frame: wp.array(dtype=wp.int32),
+        rotation: wp.array(dtype=wp.quatd),
         scene: Index,
         gravity: Vector,
         kick: wp.float64,
@@ -74,7 +78,7 @@ def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, ea
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(pair, more_slots, force)
+        total = gather(i, pair, more_slots, force, frame, rotation)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -117,7 +117,7 @@ class PatchStage(ElementStage):
         own = state.elements[self.index]
         patches = self.patches if level is None else self.first_patches[level]
         blocks = min(self.blocks, len(patches.head))
-        inputs = [work.X, self.point, patches, work.law, state.u, self.slot, blocks]
+        inputs = [work.X, self.point, patches, work.law, work.displacements(state), self.slot, blocks]
         outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
         wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 

@@ -29,6 +29,7 @@ from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
+from warp_mca.solve.floating_stage import FloatingStage
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
@@ -63,6 +64,7 @@ class Solver:
         couplings: joints between clusters of nodes.
         loads: what acts in the joints of chains, and moves their bases.
         rigid: rigid bodies.
+        floating: frames that elements compute in.
         output: what is read off the state for paths and recorders, or None.
     """
 
@@ -106,6 +108,7 @@ class Solver:
         self.rigid = RigidStage(model, self.nodes, self.precision)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
         self.ties = TieStage(model, self.nodes, self.precision)
+        self.floating = FloatingStage(model, self.work)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = step_groups(self)
         self.subgroups = [step_groups(self, level) for level in range(model.rates.top if model.rates else 0)]
@@ -137,6 +140,7 @@ class Solver:
                 loads=self.loads.new_state(),
                 absorbing=self.absorbing.new_state(),
                 rigid=self.rigid.new_state(),
+                floating=self.floating.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
@@ -164,7 +168,14 @@ class Solver:
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + self.absorbing.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
+            (
+                self.nodes.kernels()
+                + self.absorbing.kernels()
+                + self.ties.kernels()
+                + self.floating.kernels()
+                + elements,
+                ELEMENT_BLOCK,
+            ),
             *([self.resident.kernels()] if self.resident else []),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]

@@ -31,8 +31,12 @@ def _forces(solver: Solver, level: int | None, common: bool) -> Group:
     and patches want another division than contact.
     """
     work, nodes = solver.work, solver.nodes
+    found = []
+    if solver.floating.count:
+        found += [Stage("floating frames", solver.floating.follow, only_records=True)]
+        found += [Stage("nodes in floating frames", solver.floating.see)]
     active = [e for e in solver.elements if level is None or e.active(level)]
-    found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
+    found += [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
     found += [
         Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
