@@ -47,6 +47,12 @@ def follow_bodies(
     rotation_out[f] = wp.normalize(q * wp.quatd(half[0], half[1], half[2], wp.float64(1.0)))
 
 
+@wp.func
+def seen(place: wp.vec3d, u: wp.vec3d, q: wp.quatd):
+    """Displacement of a node in a frame that has turned by q, from its reference position and displacement [m]."""
+    return wp.quat_rotate_inv(q, place + u) - place
+
+
 @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
 def see_nodes(
     X: wp.array(dtype=wp.vec3d),
@@ -61,7 +67,7 @@ def see_nodes(
     f = frame[i]
     wait_for_previous()
     let_next_begin()
-    u_out[i] = wp.quat_rotate_inv(rotation[f], place + u[i]) - place
+    u_out[i] = seen(place, u[i], rotation[f])
 
 
 begins_early(see_nodes)

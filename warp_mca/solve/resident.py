@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
     from warp_mca.solve.state import State
 
-STAGES = {"element forces", "contact", "joints, driven nodes", "free nodes"}  # that the kernel knows
+# that the kernel knows
+STAGES = {"nodes in floating frames", "element forces", "contact", "joints, driven nodes", "free nodes"}
 MOST_FREE = 4  # nodes that a thread moves in turn at most
 
 
@@ -93,6 +94,7 @@ class Resident:
             stress_free,
             contact.law if contact else LINEAR,
             solver.constraints.partial,
+            solver.nodes.turned,
         )
         self.count = wp.zeros(COUNTS, dtype=wp.int32)
         self.nodes = _nodes(solver)
@@ -106,6 +108,7 @@ class Resident:
         solver, work, elements = self.solver, self.solver.work, self.solver.elements[0]
         own, bonds = state.elements[0], state.constraints
         slaves, master, faces, spring = _contact(solver, state)
+        self.nodes.rotation = state.floating.rotation
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]
@@ -152,6 +155,8 @@ def _nodes(solver: Solver) -> Any:
     found.first_slots, found.more_slots = work.first_slots, work.more_slots
     found.free = wp.array(free, dtype=wp.int32)
     found.gravity = wp.vec3d(*solver.model.gravity[0])
+    if work.frame is not None:
+        found.frame = work.frame
     return found
 
 

@@ -164,18 +164,13 @@ class Solver:
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
+        movers = (self.nodes, self.absorbing, self.ties, self.floating)
+        nodes = [kernel for stage in movers for kernel in stage.kernels()]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (
-                self.nodes.kernels()
-                + self.absorbing.kernels()
-                + self.ties.kernels()
-                + self.floating.kernels()
-                + elements,
-                ELEMENT_BLOCK,
-            ),
+            (nodes + elements, ELEMENT_BLOCK),
             *([self.resident.kernels()] if self.resident else []),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]

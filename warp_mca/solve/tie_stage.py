@@ -29,9 +29,8 @@ class TieStage:
         if not self.count:
             return
         ties, self.lanes = model.ties, tied.LANES if wp.get_device().is_cuda else 1
-        self.masters_kernel = tied.masters_kernel(
-            precision, nodes.touched, nodes.each, nodes.rated, self.lanes, nodes.turned
-        )
+        kind = (nodes.touched, nodes.each, nodes.rated, self.lanes, nodes.turned)
+        self.masters_kernel = tied.masters_kernel(precision, *kind)
         self.follow_kernel = tied.follow_kernel(nodes.touched)
         entry, corner = np.nonzero(ties.weight)
         master = ties.master[entry, corner]
