@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import TOUCHABLE, gather_function, hold, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
@@ -68,8 +69,7 @@ def absorbing_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         dt: wp.float64,
@@ -89,7 +89,7 @@ def absorbing_kernel(
         k = wp.tid()
         i = dashpots.node[k]
         own = dashpots.velocity[k]
-        total = gather(i, first_slots[i], more_slots, force, frame, rotation)
+        total = gather(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

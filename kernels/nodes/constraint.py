@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
@@ -150,11 +151,10 @@ def bound_kernel(
         first_slots: wp.array(dtype=wp.vec2i),
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         contact_force_out: wp.array(dtype=wp.vec3d),
     ):
-        total = gather(i, first_slots[i], more_slots, force, frame, rotation)
+        total = gather(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         return total
@@ -167,8 +167,7 @@ def bound_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         bonds: Bonds,
@@ -189,9 +188,8 @@ def bound_kernel(
         i = bound_node(k, bonds)
         if wp.static(skips) and i < 0:
             return
-        total = total_force(i, first_slots, more_slots, force, frame, rotation, contact_force_out)
-        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
-        free = v_out[i] + dt * a
+        total = total_force(i, first_slots, more_slots, force, frames, contact_force_out)
+        free = v_out[i] + dt * hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         u_free = u_out[i] + dt * free
         if v_before_out.shape[0] > 0:
             v_before_out[i] = v_out[i]
@@ -202,7 +200,7 @@ def bound_kernel(
             if j >= 0:
                 if v_before_out.shape[0] > 0:
                     v_before_out[j] = v_out[j]
-                total = total_force(j, first_slots, more_slots, force, frame, rotation, contact_force_out)
+                total = total_force(j, first_slots, more_slots, force, frames, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
                 u_j = u_out[j] + dt * v_j
                 u = weighted_mean(mass[i], u_free, mass[j], u_j)

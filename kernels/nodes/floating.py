@@ -16,6 +16,19 @@ from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin,
 wp.set_module_options({"enable_backward": False})
 
 
+@wp.struct
+class Frames:
+    """Floating frames; empty where elements compute in the world frame.
+
+    Attributes:
+        of_node: frame of each node, shape (node_count,), int32.
+        rotation: of each frame since the start of the phase, a unit quaternion [-], shape (frame_count,), quatd.
+    """
+
+    of_node: wp.array(dtype=wp.int32)
+    rotation: wp.array(dtype=wp.quatd)
+
+
 @wp.kernel(enable_backward=False)
 def follow_bodies(
     X: wp.array(dtype=wp.vec3d),
@@ -56,18 +69,17 @@ def seen(place: wp.vec3d, u: wp.vec3d, q: wp.quatd):
 @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
 def see_nodes(
     X: wp.array(dtype=wp.vec3d),
-    frame: wp.array(dtype=wp.int32),
-    rotation: wp.array(dtype=wp.quatd),
+    frames: Frames,
     u: wp.array(dtype=wp.vec3d),
     u_out: wp.array(dtype=wp.vec3d),
 ):
     """Displacement u_R [m] of each node in its frame."""
     i = wp.tid()
     place = X[i]
-    f = frame[i]
+    f = frames.of_node[i]
     wait_for_previous()
     let_next_begin()
-    u_out[i] = seen(place, u[i], rotation[f])
+    u_out[i] = seen(place, u[i], frames.rotation[f])
 
 
 begins_early(see_nodes)
@@ -78,9 +90,9 @@ def turn_function(turned: bool) -> Any:
     """The function that turns a force on a node from its frame to the world's; without `turned`, they are one."""
 
     @wp.func
-    def to_world(i: int, f: wp.vec3d, frame: wp.array(dtype=wp.int32), rotation: wp.array(dtype=wp.quatd)):
+    def to_world(i: int, f: wp.vec3d, frames: Frames):
         if wp.static(turned):
-            return wp.quat_rotate(rotation[frame[i]], f)
+            return wp.quat_rotate(frames.rotation[frames.of_node[i]], f)
         return f
 
     return to_world

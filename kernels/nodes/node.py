@@ -8,7 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.floating import turn_function
+from warp_mca.kernels.nodes.floating import Frames, turn_function
 from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -54,8 +54,7 @@ def gather_function(precision: str, rated: bool = False, turned: bool = False) -
         pair: wp.vec2i,
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
     ):
         if wp.static(rated):
             if pair[0] < 0:
@@ -76,7 +75,7 @@ def gather_function(precision: str, rated: bool = False, turned: bool = False) -
             if r[2] >= 0:
                 total += force_at(r[2], force)
             row += 1
-        return to_world(i, total, frame, rotation)
+        return to_world(i, total, frames)
 
     return gather
 
@@ -129,8 +128,7 @@ def integrate_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         kick: wp.float64,
@@ -158,7 +156,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(i, pair, more_slots, force, frame, rotation)
+        total = gather(i, pair, more_slots, force, frames)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -12,6 +12,7 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import (
     BOUND,
     KEEPERS,
@@ -47,8 +48,7 @@ def integrate_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         kick: wp.float64,
@@ -78,7 +78,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(i, pair, more_slots, force, frame, rotation)
+        total = gather(i, pair, more_slots, force, frames)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -12,6 +12,7 @@ import warp as wp
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.coupling import turned
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.joint_torque import wait_for_block
 from warp_mca.kernels.nodes.node import gather_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
@@ -41,8 +42,7 @@ def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any
         first_slots: wp.array(dtype=wp.vec2i),
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        frame_rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         contact_force_out: wp.array(dtype=wp.vec3d),
         momentum_out: wp.array(dtype=wp.vec3d),
         spin_out: wp.array(dtype=wp.vec3d),
@@ -52,7 +52,7 @@ def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any
         total = Wrench()
         for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
             i = bodies.node[e]
-            f = gather(i, first_slots[i], more_slots, force, frame, frame_rotation)
+            f = gather(i, first_slots[i], more_slots, force, frames)
             if wp.static(contact):
                 f += take_contact(i, contact_force_out)
             work_out[e] = f
@@ -129,9 +129,8 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: boo
     def advance_rigid(
         bodies: RigidBodies, rows: RigidRows, clusters: Clusters, X: wp.array(dtype=wp.vec3d),
         mass: wp.array(dtype=wp.float64), first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), frame: wp.array(dtype=wp.int32),
-        frame_rotation: wp.array(dtype=wp.quatd), kick: wp.float64, span: wp.float64, moves: bool,
-        contact_force_out: wp.array(dtype=wp.vec3d), u_out: wp.array(dtype=wp.vec3d),
+        more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), frames: Frames, kick: wp.float64,
+        span: wp.float64, moves: bool, contact_force_out: wp.array(dtype=wp.vec3d), u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d), speed_square_out: wp.array(dtype=wp.float32),
         centre_out: wp.array(dtype=wp.vec3d), rotation_out: wp.array(dtype=wp.quatd),
         momentum_out: wp.array(dtype=wp.vec3d), spin_out: wp.array(dtype=wp.vec3d),
@@ -150,7 +149,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: boo
         size = rows.begin[k + 1] - begin
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
-            load(b, lane, kick, bodies, rotation_out, first_slots, more_slots, force, frame, frame_rotation,
+            load(b, lane, kick, bodies, rotation_out, first_slots, more_slots, force, frames,
                  contact_force_out, momentum_out, spin_out, force_out)
             if lane == 0:
                 find_motion(b, bodies, span, rotation_out, momentum_out, spin_out, turn_out, velocity_out, rate_out)

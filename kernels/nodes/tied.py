@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import shared_functions
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
@@ -61,8 +62,7 @@ def masters_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
-        frame: wp.array(dtype=wp.int32),
-        rotation: wp.array(dtype=wp.quatd),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         tied: Tied,
@@ -79,7 +79,7 @@ def masters_kernel(
         total = wp.vec3d()
         for e in range(tied.first[k] + lane, tied.first[k + 1], wp.static(lanes)):
             s = tied.carried[e]
-            f = gather(s, first_slots[s], more_slots, force, frame, rotation)
+            f = gather(s, first_slots[s], more_slots, force, frames)
             if wp.static(contact):
                 f += contact_force_out[s]
             total += tied.share[e] * f
@@ -89,7 +89,7 @@ def masters_kernel(
                     total[c] += exchange(total[c], 1 << step)
         if lane > 0:
             return
-        total += gather(i, first_slots[i], more_slots, force, frame, rotation)
+        total += gather(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import TOUCHABLE, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
@@ -27,8 +28,7 @@ class Nodes:
         first_slots, more_slots: slots of the forces on each node, see `elements.stage.gather_lists`.
         free: nodes that neither belong to a master nor are bound, shape (free_count,), int32.
         gravity: [m/s^2].
-        frame: floating frame of each node, shape (node_count,), int32; empty where elements compute in the world frame.
-        rotation: of each frame, shape (frame_count,), quatd.
+        frames: floating ones.
     """
 
     mass: wp.array(dtype=wp.float64)
@@ -38,8 +38,7 @@ class Nodes:
     more_slots: wp.array(dtype=wp.vec4i)
     free: wp.array(dtype=wp.int32)
     gravity: wp.vec3d
-    frame: wp.array(dtype=wp.int32)
-    rotation: wp.array(dtype=wp.quatd)
+    frames: Frames
 
 
 @wp.struct
@@ -77,8 +76,8 @@ def hold_node(i: int, nodes: Nodes):
     if nodes.role.shape[0] > 0:
         held.role = int(nodes.role[i])
     held.inverse = nodes.inverse_mass[i]
-    if nodes.frame.shape[0] > 0:
-        held.turn = nodes.rotation[nodes.frame[i]]
+    if nodes.frames.of_node.shape[0] > 0:
+        held.turn = nodes.frames.rotation[nodes.frames.of_node[i]]
     held.pair = nodes.first_slots[i]
     none = wp.vec4i(-1, -1, -1, 0)
     held.row0 = none

@@ -60,7 +60,7 @@ class FloatingStage:
         work, state = self.work, step.state
 
         def launch(part: slice) -> None:
-            inputs = [work.X[part], work.frame[part], state.floating.rotation, state.u[part]]
+            inputs = [work.X[part], work.frames(state, part), state.u[part]]
             threads, outputs = part.stop - part.start, [work.u_seen[part]]
             wp.launch(floating.see_nodes, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 

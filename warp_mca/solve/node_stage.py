@@ -100,7 +100,7 @@ class NodeStage:
         """Nodes in joints and driven ones, with forces of elements up to a level, or of all."""
         work, state, own = self.work, step.state, step.state.constraints
         inputs = [work.mass, work.inverse_mass, *self.slots(level), self.constraints.role, work.force]
-        inputs += [*work.frames(state), self.scene, self.gravity, self.constraints.bonds, self.dt]
+        inputs += [work.frames(state), self.scene, self.gravity, self.constraints.bonds, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
         wp.launch(self.bound_kernel, self.constraints.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
@@ -129,7 +129,7 @@ class NodeStage:
             scene = 0 if isinstance(self.scene, int) else self.scene[part]
             contact_force = work.contact_force[part] if self.touched else work.contact_force
             inputs = [work.inverse_mass[part], work.first_slots[part], work.more_slots]
-            inputs += [role[part] if len(role) else role, work.force, *work.frames(state, part)]
+            inputs += [role[part] if len(role) else role, work.force, work.frames(state, part)]
             inputs += [scene, self.gravity, kick, drift]
             outputs = [contact_force, state.u[part], state.v[part], None if before is None else before[part]]
             keepers = node.KEEPERS if self.touched and part.start == 0 else 0

@@ -108,7 +108,7 @@ class Resident:
         solver, work, elements = self.solver, self.solver.work, self.solver.elements[0]
         own, bonds = state.elements[0], state.constraints
         slaves, master, faces, spring = _contact(solver, state)
-        self.nodes.rotation = state.floating.rotation
+        self.nodes.frames = work.frames(state)
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]
@@ -155,8 +155,6 @@ def _nodes(solver: Solver) -> Any:
     found.first_slots, found.more_slots = work.first_slots, work.more_slots
     found.free = wp.array(free, dtype=wp.int32)
     found.gravity = wp.vec3d(*solver.model.gravity[0])
-    if work.frame is not None:
-        found.frame = work.frame
     return found
 
 

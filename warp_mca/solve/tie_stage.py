@@ -54,7 +54,7 @@ class TieStage:
         """Masters, with the forces on their slaves of elements up to a level, or of all."""
         nodes, work, state = self.nodes, self.nodes.work, step.state
         inputs = [work.inverse_mass, *nodes.slots(level), nodes.constraints.role, work.force]
-        inputs += [*work.frames(state), nodes.scene, nodes.gravity, self.tied, nodes.dt]
+        inputs += [work.frames(state), nodes.scene, nodes.gravity, self.tied, nodes.dt]
         before = work.v_before if step.records else None
         outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
         threads = self.lanes * len(self.tied.master)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.records.columns import JACOBIAN, column_count
 from warp_mca.kernels.records.ledger import SUM_WIDTH
 from warp_mca.model.layout import Layout
@@ -75,6 +76,9 @@ class Workspace:
         """What elements compute with: displacements in the world frame or, with floating frames, in these [m]."""
         return state.u if self.frame is None else self.u_seen
 
-    def frames(self, state: State, part: slice = ALL) -> list[wp.array | None]:
-        """Frames of a range of nodes and their rotations, as kernels that gather forces take them."""
-        return [None, None] if self.frame is None else [self.frame[part], state.floating.rotation]
+    def frames(self, state: State, part: slice = ALL) -> Any:
+        """Frames of a range of nodes, as kernels that gather forces take them."""
+        found = Frames()
+        if self.frame is not None:
+            found.of_node, found.rotation = self.frame[part], state.floating.rotation
+        return found
