@@ -1,4 +1,4 @@
-"""Floating frames: they change no force but for rounding, keep the energy of bodies that turn, and are chosen by need."""
+"""Floating frames: they change forces by rounding alone, keep the energy of what turns, and are chosen by need."""
 
 from dataclasses import replace
 
@@ -102,3 +102,55 @@ def test_frames_that_turn_as_they_like_change_no_motion(make, multi_rate, device
         solver.step(state, 1)
         seen.append(state.v.numpy() - before)
     assert 0.0 < np.abs(seen[1] - seen[0]).max() < 1e-3 * np.abs(seen[0]).max()
+
+
+def hinged() -> mca.Scene:
+    """Two bars that turn about the hinge between them."""
+    geometry = mca.Box(size=(0.01, 0.1, 0.01), divisions=(3, 9, 3), origin=(-0.005, 0.0, -0.005))
+    spin = {"geometry": geometry, "material": STEEL, "angular_velocity": (0.0, 0.0, SPIN)}
+    hinge = mca.Revolute(name="A", body="low", at=(-0.005, 0.1, 0.0), other="high", other_at=(-0.005, 0.0, 0.0))
+    return mca.Scene(
+        name="hinged",
+        bodies=(
+            mca.Body(name="low", position=(0.0, -0.1, 0.0), velocity=(0.1 * SPIN, 0.0, 0.0), **spin),
+            mca.Body(name="high", **spin),
+        ),
+        joints=(hinge,),
+        impact=mca.ImpactPhase(duration=LONG),
+    )
+
+
+def test_runs_repeat_bit_for_bit(monkeypatch, tmp_path):
+    """By two threads, in a batch, and by a state that is read back; frames have turned with their bodies then."""
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)
+    whole, first, rest = (begun(hinged()) for _ in range(3))
+    threads, batch = begun(hinged(), threads=2), begun(hinged(), hinged())
+    assert threads.solver.threads == 2
+    first.advance(300)
+    first.save(tmp_path / "state")
+    rest.load(tmp_path / "state")
+    for impact in (whole, threads, rest, batch):
+        impact.advance(500)
+    assert whole.state.differences(threads.state) == whole.state.differences(rest.state) == []
+    u, rotation = whole.state.u.numpy(), whole.state.floating.rotation.numpy()
+    assert np.array_equal(batch.state.u.numpy(), np.concatenate([u, u]))
+    assert np.array_equal(batch.state.floating.rotation.numpy(), np.concatenate([rotation, rotation]))
+    turned = np.tile([0.0, 0.0, SPIN * whole.solver.dt * 500], (2, 1))
+    assert Rotation.from_quat(rotation).as_rotvec() == pytest.approx(turned, rel=0.02, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("scene", "span", "precision", "chosen"),
+    [
+        (bar(), LONG, "mixed", True),
+        (bar(), LONG, "float64", False),
+        (bar(), 5e-3, "mixed", False),
+        (bar(fixed="ymin"), LONG, "mixed", False),
+        (bar(rigid=True), LONG, "mixed", False),
+        (hinged(), LONG, "mixed", True),
+    ],
+)
+def test_frames_are_chosen_where_rounding_would_heat(scene, span, precision, chosen):
+    model = with_floating_frames(prepared(scene, duration=span).model, [scene], span, precision)
+    assert (model.floating is not None) == chosen

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 GAIN = 3.0  # measured with `hex8`
-ALLOWED = 5e-5  # growth of the kinetic energy that needs no frames [-]
+ALLOWED = 1e-4  # growth of the kinetic energy that needs no frames [-]
 EPSILON = 2.0**-24  # by which float32 rounds
 
 

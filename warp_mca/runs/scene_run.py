@@ -60,7 +60,8 @@ class SceneRun:
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         tolerance = ready.scene.impact.energy_tolerance
-        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index])
+        framed = solver.floating.count > 0
+        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of the solver's records, and hold them to the guards.
@@ -112,6 +113,8 @@ class SceneRun:
         }
         if scene.rigid_names:
             more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
+        if ledger.framed:
+            more["floating_frames"] = True
         if model.rates:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
