@@ -108,13 +108,11 @@ class SceneRun:
             "energy_error_exchanged": ledger.exchange_error,
             "stable_dt": model.stable.dt,
             "joint_impulse": joint_impulses(self.solver, self.state, self.index),
-            "threads": self.solver.threads,
+            **self._solver_facts(),
             "refine": scene.refine,
         }
         if scene.rigid_names:
             more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
-        if ledger.framed:
-            more["floating_frames"] = True
         if model.rates:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
@@ -153,6 +151,10 @@ class SceneRun:
             theta_dot=tuple(float(x) for x in start.theta_dot),
             more=more,
         )
+
+    def _solver_facts(self) -> dict[str, object]:
+        """Threads that compute, and whether they do so in floating frames."""
+        return {"threads": self.solver.threads} | ({"floating_frames": True} if self.ledger.framed else {})
 
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""

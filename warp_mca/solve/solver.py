@@ -147,7 +147,7 @@ class Solver:
     def forces(self, state: State) -> None:
         """Forces of elements and contacts at the state's displacements, in `work`."""
         with wp.ScopedDevice(self.device):
-            self._streams.run(self.groups[:1], Step(state))
+            self._streams.run(self.groups[:2], Step(state))
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""

@@ -15,12 +15,26 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
     rates = solver.model.rates
     common = level is None or rates is None or level >= rates.common
     return [
+        _frames(solver, level),
         _forces(solver, level, common),
         _energies(solver),
         _sums(solver),
         _advance(solver, level, common),
         _follow(solver, common),
         _motion(solver),
+    ]
+
+
+def _frames(solver: Solver, level: int | None) -> Group:
+    """Displacements in floating frames, which follow their bodies.
+
+    They do not go with the forces, because contact would begin before the elements.
+    """
+    if not solver.floating.count:
+        return []
+    return [
+        Stage("floating frames", solver.floating.follow, only_records=True),
+        Stage("nodes in floating frames", lambda s: solver.floating.see(s, level)),
     ]
 
 
@@ -31,12 +45,8 @@ def _forces(solver: Solver, level: int | None, common: bool) -> Group:
     and patches want another division than contact.
     """
     work, nodes = solver.work, solver.nodes
-    found = []
-    if solver.floating.count:
-        found += [Stage("floating frames", solver.floating.follow, only_records=True)]
-        found += [Stage("nodes in floating frames", solver.floating.see)]
     active = [e for e in solver.elements if level is None or e.active(level)]
-    found += [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
+    found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level)) for e in active]
     found += [
         Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
