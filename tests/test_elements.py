@@ -18,7 +18,6 @@ from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import cell_names, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
-from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import gather_function
 from warp_mca.model.build import build_model
 from warp_mca.solve.solver import Solver
@@ -241,11 +240,10 @@ def gather_all(
     first_slots: wp.array(dtype=wp.vec2i),
     more_slots: wp.array(dtype=wp.vec4i),
     force: wp.array(dtype=wp.vec3d),
-    frames: Frames,
     total_out: wp.array(dtype=wp.vec3d),
 ):
     i = wp.tid()
-    total_out[i] = gather(i, first_slots[i], more_slots, force, frames)
+    total_out[i] = gather(first_slots[i], more_slots, force)
 
 
 def test_nodes_gather_each_of_their_slots_in_rising_order():
@@ -260,7 +258,7 @@ def test_nodes_gather_each_of_their_slots_in_rising_order():
     inputs = [
         wp.array(array, dtype=kind, device="cpu") for array, kind in ((first_slots, wp.vec2i), (more_slots, wp.vec4i))
     ]
-    inputs += [wp.array(force, dtype=wp.vec3d, device="cpu"), Frames()]
+    inputs.append(wp.array(force, dtype=wp.vec3d, device="cpu"))
     wp.launch(gather_all, 66, inputs=inputs, outputs=[out], device="cpu")
     expected = np.zeros((66, 3))
     for slot, n in enumerate(node):

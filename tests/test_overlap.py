@@ -22,10 +22,10 @@ TWO = (("mixed", False), ("float64", True))
 LAWS = {False: Elastic.law, True: J2Bilinear.law}
 VARIANTS = {
     "integrate": [node.integrate_kernel(p, not m, True, m, m, m, not m) for p, m in TWO],
-    "integrate_rated": [rated_node.integrate_kernel(p, not m, True, m, m, m, not m) for p, m in TWO],
+    "integrate_rated": [rated_node.integrate_kernel(p, not m, True, m, m, m) for p, m in TWO],
     "advance_absorbing": [absorbing.absorbing_kernel(p, m, m, m) for p, m in TWO],
     "advance_bound": [constraint.bound_kernel(p, m, m, m) for p, m in TWO],
-    "see_nodes": [floating.see_kernel(m) for _, m in TWO],
+    "see_nodes": [floating.see_nodes],
     "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
     "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
@@ -38,7 +38,7 @@ VARIANTS = {
 }
 # Reads ahead of the wait: the first two slots and the mass of a node, or its place and frame; head, corners and points
 # of patches.
-READS = {"integrate": 3, "integrate_rated": 4, "see_nodes": 5, "hex8_patch_force": 15, "hex8r_patch_force": 15}
+READS = {"integrate": 3, "integrate_rated": 4, "see_nodes": 4, "hex8_patch_force": 15, "hex8r_patch_force": 15}
 WAIT = "griddepcontrol.wait"
 READ = re.compile(r"\b(?:ld\.(?!param|shared|local|const)|cp\.async\.c)")
 WRITE = re.compile(r"\b(?:st\.(?!param|shared|local)|red\.|atom\.(?!shared))")

@@ -9,7 +9,7 @@ from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin,
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
+from warp_mca.kernels.nodes.node import hold, nodal_force_function, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -139,11 +139,11 @@ def bound_kernel(
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
-    rigid bodies, which `rigid_body.advance_kernel` advances. `rated`, `turned` as in `gather_function`.
+    rigid bodies, which `rigid_body.advance_kernel` advances. `rated`, `turned` as in `nodal_force_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated, turned)
+    nodal_force = nodal_force_function(precision, rated, turned)
 
     @wp.func
     def total_force(
@@ -154,7 +154,7 @@ def bound_kernel(
         frames: Frames,
         contact_force_out: wp.array(dtype=wp.vec3d),
     ):
-        total = gather(i, first_slots[i], more_slots, force, frames)
+        total = nodal_force(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         return total

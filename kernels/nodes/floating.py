@@ -66,28 +66,23 @@ def seen(place: wp.vec3d, u: wp.vec3d, q: wp.quatd):
     return wp.quat_rotate_inv(q, place + u) - place
 
 
-@cache
-def see_kernel(listed: bool) -> Any:
-    """Kernel: displacement u_R [m] of each node in its frame; of those in `item` if only some are `listed`."""
+@wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+def see_nodes(
+    X: wp.array(dtype=wp.vec3d),
+    frames: Frames,
+    u: wp.array(dtype=wp.vec3d),
+    u_out: wp.array(dtype=wp.vec3d),
+):
+    """Displacement u_R [m] of each node in its frame."""
+    i = wp.tid()
+    place = X[i]
+    f = frames.of_node[i]
+    wait_for_previous()
+    let_next_begin()
+    u_out[i] = seen(place, u[i], frames.rotation[f])
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
-    def see_nodes(
-        item: wp.array(dtype=wp.int32),
-        X: wp.array(dtype=wp.vec3d),
-        frames: Frames,
-        u: wp.array(dtype=wp.vec3d),
-        u_out: wp.array(dtype=wp.vec3d),
-    ):
-        i = wp.tid()
-        if wp.static(listed):
-            i = item[i]
-        place = X[i]
-        f = frames.of_node[i]
-        wait_for_previous()
-        let_next_begin()
-        u_out[i] = seen(place, u[i], frames.rotation[f])
 
-    return begins_early(see_nodes)
+begins_early(see_nodes)
 
 
 @cache

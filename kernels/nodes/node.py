@@ -40,22 +40,16 @@ def force_function(precision: str, rated: bool) -> Any:
 
 
 @cache
-def gather_function(precision: str, rated: bool = False, turned: bool = False) -> Any:
+def gather_function(precision: str, rated: bool = False) -> Any:
     """The function that sums the forces of elements on a node, in the slots that `first_slots` and `more_slots` list.
 
     Most nodes have one or two, whose forces a thread has under way at once; see `elements.stage.gather_lists`. `rated`:
-    slots come with levels, and a node may have none. `turned`: forces are those in floating frames.
+    slots come with levels, and a node may have none.
     """
-    vec3, force_at, to_world = scalars(precision).vec3, force_function(precision, rated), turn_function(turned)
+    vec3, force_at = scalars(precision).vec3, force_function(precision, rated)
 
     @wp.func
-    def gather(
-        i: int,
-        pair: wp.vec2i,
-        more_slots: wp.array(dtype=wp.vec4i),
-        force: wp.array(dtype=vec3),
-        frames: Frames,
-    ):
+    def gather(pair: wp.vec2i, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
         if wp.static(rated):
             if pair[0] < 0:
                 return wp.vec3d()
@@ -75,9 +69,26 @@ def gather_function(precision: str, rated: bool = False, turned: bool = False) -
             if r[2] >= 0:
                 total += force_at(r[2], force)
             row += 1
-        return to_world(i, total, frames)
+        return total
 
     return gather
+
+
+@cache
+def nodal_force_function(precision: str, rated: bool = False, turned: bool = False) -> Any:
+    """The function that sums the forces of elements on node i as `gather_function` does.
+
+    `turned`: they are those in its floating frame, from which their sum turns to the world's.
+    """
+    vec3, gather, to_world = scalars(precision).vec3, gather_function(precision, rated), turn_function(turned)
+
+    @wp.func
+    def nodal_force(
+        i: int, pair: wp.vec2i, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), frames: Frames
+    ):
+        return to_world(i, gather(pair, more_slots, force), frames)
+
+    return nodal_force
 
 
 @wp.func
@@ -115,11 +126,11 @@ def integrate_kernel(
     threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
     some nodes are left to `constraint.bound_kernel` or `absorbing.absorbing_kernel`. With `each`, gravity differs
     between the scenes of a batch, and nodes know their scene. `early`: the next kernel takes its places as soon as
-    nodes leave some. `turned` as in `gather_function`.
+    nodes leave some. `turned` as in `nodal_force_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, turned=turned)
+    nodal_force = nodal_force_function(precision, False, turned)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
@@ -156,7 +167,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(i, pair, more_slots, force, frames)
+        total = nodal_force(i, pair, more_slots, force, frames)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -12,7 +12,6 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import (
     BOUND,
     KEEPERS,
@@ -28,9 +27,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def integrate_kernel(
-    precision: str, contact: bool, fixed: bool, bound: bool, each: bool, early: bool, turned: bool
-) -> Any:
+def integrate_kernel(precision: str, contact: bool, fixed: bool, bound: bool, each: bool, early: bool) -> Any:
     """Kernel: as `node.integrate_kernel`, of listed nodes whose kick and drift are 2^level times those given.
 
     item: node + (level << LEVEL_BIT) of each, shape (active_count,), int32. first_slots, more_slots: slots of the
@@ -38,7 +35,7 @@ def integrate_kernel(
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, True, turned)
+    gather = gather_function(precision, True)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate_rated(
@@ -48,7 +45,6 @@ def integrate_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
-        frames: Frames,
         scene: Index,
         gravity: Vector,
         kick: wp.float64,
@@ -78,7 +74,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(i, pair, more_slots, force, frames)
+        total = gather(pair, more_slots, force)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -14,7 +14,7 @@ from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.joint_torque import wait_for_block
-from warp_mca.kernels.nodes.node import gather_function, take_contact
+from warp_mca.kernels.nodes.node import nodal_force_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster, spin_of
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
@@ -30,7 +30,7 @@ Wrench = wp.types.vector(length=6, dtype=wp.float64)  # force and moment
 def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any:
     """The function that lets the forces on its nodes act on a body."""
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated, seen)
+    nodal_force = nodal_force_function(precision, rated, seen)
 
     @wp.func
     def load(
@@ -52,7 +52,7 @@ def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any
         total = Wrench()
         for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
             i = bodies.node[e]
-            f = gather(i, first_slots[i], more_slots, force, frames)
+            f = nodal_force(i, first_slots[i], more_slots, force, frames)
             if wp.static(contact):
                 f += take_contact(i, contact_force_out)
             work_out[e] = f
@@ -119,7 +119,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: boo
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
     Q - I after the step, the other outputs from force_out on are as in `find_motion`, `rigid_rows` and `rigid_pins`.
-    `rated` and, as `seen`, its `turned` as in `gather_function`.
+    `rated` and, as `seen`, its `turned` as in `nodal_force_function`.
     """
     vec3 = scalars(precision).vec3
     load = load_function(precision, contact, rated, seen)

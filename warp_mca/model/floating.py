@@ -41,8 +41,11 @@ class FloatingFrames:
 
 
 def with_floating_frames(model: Model, scenes: Sequence[Scene], span: float, precision: str) -> Model:
-    """The model with floating frames, if a body may turn and would be heated in a phase of `span` seconds."""
-    if precision != "mixed":
+    """The model with floating frames, if a body may turn and would be heated in a phase of `span` seconds.
+
+    Elements with steps of their own have none.
+    """
+    if precision != "mixed" or model.rates:
         return model
     bodies = [body for scene in scenes for body in scene.bodies]  # as their nodes follow each other
     start = np.array(list(model.node_start.values()), dtype=np.int64)

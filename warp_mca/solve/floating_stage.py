@@ -41,11 +41,6 @@ class FloatingStage:
         marker = model.floating.marker if model.floating else np.zeros((0, 4), np.int32)
         self.work, self.count, self.node_count = work, len(marker), model.node_count
         self.marker = wp.array(marker, dtype=wp.int32)
-        self.see_kernel = floating.see_kernel(False)
-        rates = model.rates if self.count else None
-        levels = [np.flatnonzero(rates.node_level <= k) for k in range(rates.top)] if rates else []
-        self.active = [wp.array(nodes, dtype=wp.int32) for nodes in levels]
-        self.see_active_kernel = floating.see_kernel(True)
 
     def new_state(self) -> FloatingState:
         """Frames that have not turned, on the current device."""
@@ -53,27 +48,20 @@ class FloatingStage:
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        if not self.count:
-            return []
-        return [floating.follow_bodies, self.see_kernel, *([self.see_active_kernel] if self.active else [])]
+        return [floating.follow_bodies, floating.see_nodes] if self.count else []
 
     def follow(self, step: Step) -> None:
         """Turn the frames with their bodies."""
         outputs = [step.state.floating.rotation]
         wp.launch(floating.follow_bodies, self.count, inputs=[self.work.X, self.marker, step.state.u], outputs=outputs)
 
-    def see(self, step: Step, level: int | None = None) -> None:
-        """Displacements in their frames of the nodes up to a `level` of `Model.rates`, or of all."""
+    def see(self, step: Step) -> None:
+        """Displacements of all nodes in their frames."""
         work, state = self.work, step.state
-        active = None if level is None else self.active[level]
 
         def launch(part: slice) -> None:
-            if active is None:
-                kernel, arrays = self.see_kernel, [None, work.X[part], work.frames(state, part), state.u[part]]
-                seen = work.u_seen[part]
-            else:
-                kernel, arrays = self.see_active_kernel, [active[part], work.X, work.frames(state), state.u]
-                seen = work.u_seen
-            wp.launch(kernel, part.stop - part.start, inputs=arrays, outputs=[seen], block_dim=BLOCK_DIM)
+            inputs = [work.X[part], work.frames(state, part), state.u[part]]
+            threads, outputs = part.stop - part.start, [work.u_seen[part]]
+            wp.launch(floating.see_nodes, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
-        step.split(self.node_count if active is None else len(active), launch, NODES)
+        step.split(self.node_count, launch, NODES)

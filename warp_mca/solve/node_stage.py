@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,8 +62,8 @@ class NodeStage:
     def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
         """The kernels of a `kind`: contact, fixed, early as `node.integrate_kernel` has them."""
         (contact, fixed, early), own, each = kind, self.constraints, self.each
-        make = rated_node.integrate_kernel if self.rated else node.integrate_kernel
-        self.integrate_kernel = make(precision, contact, fixed, own.bound, each, early, self.turned)
+        make = rated_node.integrate_kernel if self.rated else partial(node.integrate_kernel, turned=self.turned)
+        self.integrate_kernel = make(precision, contact, fixed, own.bound, each, early)
         self.bound_kernel = (
             constraint.bound_kernel(precision, contact, each, own.partial, own.skips, self.rated, self.turned)
             if own.count

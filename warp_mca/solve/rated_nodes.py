@@ -103,7 +103,7 @@ class RatedNodeStage(NodeStage):
         def launch(part: slice) -> None:
             item, keepers = active.item[part], node.KEEPERS if pressed and part.start == 0 else 0
             inputs = [item, work.inverse_mass, active.first_slots, active.more_slots, role, work.force]
-            inputs += [work.frames(state), self.scene, self.gravity, kick, drift]
+            inputs += [self.scene, self.gravity, kick, drift]
             outputs = [work.contact_force, state.u, state.v, before, squares, state.normal_force if keepers else None]
             threads = part.stop - part.start + keepers
             wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

@@ -15,7 +15,7 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
     rates = solver.model.rates
     common = level is None or rates is None or level >= rates.common
     return [
-        _frames(solver, level),
+        _frames(solver),
         _forces(solver, level, common),
         _energies(solver),
         _sums(solver),
@@ -25,7 +25,7 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
     ]
 
 
-def _frames(solver: Solver, level: int | None) -> Group:
+def _frames(solver: Solver) -> Group:
     """Displacements in floating frames, which follow their bodies.
 
     They do not go with the forces, because contact would begin before the elements.
@@ -34,7 +34,7 @@ def _frames(solver: Solver, level: int | None) -> Group:
         return []
     return [
         Stage("floating frames", solver.floating.follow, only_records=True),
-        Stage("nodes in floating frames", lambda s: solver.floating.see(s, level)),
+        Stage("nodes in floating frames", solver.floating.see),
     ]
 
 
