@@ -154,7 +154,8 @@ class SceneRun:
 
     def _solver_facts(self) -> dict[str, object]:
         """Threads that compute, and whether they do so in floating frames."""
-        return {"threads": self.solver.threads} | ({"floating_frames": True} if self.ledger.framed else {})
+        framed: dict[str, object] = {"floating_frames": True} if self.ledger.framed else {}
+        return {"threads": self.solver.threads, **framed}
 
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
