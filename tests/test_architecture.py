@@ -140,7 +140,7 @@ def test_stages_of_a_step_are_those_of_the_page_in_this_order():
         solver = Solver(model, device="cpu", precision="mixed", dt=1e-8)
         found = [
             [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
-            for number, group in enumerate(solver.groups, 1)
+            for number, group in enumerate(solver.groups)
             for stage in group
         ]
         assert [cells for cells in page if cells in found] == found

@@ -25,20 +25,20 @@ class Nodes:
     Attributes:
         mass, inverse_mass: [kg], [1/kg], shape (node_count,), float64.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
+        frames: floating frames.
         first_slots, more_slots: slots of the forces on each node, see `elements.stage.gather_lists`.
         free: nodes that neither belong to a master nor are bound, shape (free_count,), int32.
         gravity: [m/s^2].
-        frames: floating ones.
     """
 
     mass: wp.array(dtype=wp.float64)
     inverse_mass: wp.array(dtype=wp.float64)
     role: wp.array(dtype=wp.uint8)
+    frames: Frames
     first_slots: wp.array(dtype=wp.vec2i)
     more_slots: wp.array(dtype=wp.vec4i)
     free: wp.array(dtype=wp.int32)
     gravity: wp.vec3d
-    frames: Frames
 
 
 @wp.struct

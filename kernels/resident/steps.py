@@ -48,12 +48,12 @@ class Roles:
 def resident_kernel(
     precision: str,
     law_name: str,
+    turned: bool,
     contact: bool,
     friction: bool,
     stress_free: bool,
     contact_law: str,
     partial: bool,
-    turned: bool = False,
 ) -> Any:
     """Kernel: `steps` steps of a model of one block of `hex8`, with a contact pass if `contact`.
 

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
     from warp_mca.solve.state import State
 
-# that the kernel knows
-STAGES = {"nodes in floating frames", "element forces", "contact", "joints, driven nodes", "free nodes"}
+STAGES = {"element forces", "contact", "joints, driven nodes", "free nodes"}  # that the kernel knows
 MOST_FREE = 4  # nodes that a thread moves in turn at most
 
 
@@ -48,7 +47,8 @@ def surface_of(solver: Solver) -> ContactStage | None:
 
 def is_known(solver: Solver) -> bool:
     """Whether the kernel knows all that a model has."""
-    stages = {stage.name for group in solver.groups for stage in group if not stage.only_records}
+    _frames, *groups = solver.groups  # frames it knows
+    stages = {stage.name for group in groups for stage in group if not stage.only_records}
     if solver.model.rates or solver.model.scaling:
         return False
     if not stages <= STAGES or solver.layout.count > 1 or len(solver.elements) > 1 or len(solver.contacts) > 1:
@@ -89,12 +89,12 @@ class Resident:
         self.kernel = resident_kernel(
             solver.precision,
             block.law,
+            solver.nodes.turned,
             contact is not None,
             friction,
             stress_free,
             contact.law if contact else LINEAR,
             solver.constraints.partial,
-            solver.nodes.turned,
         )
         self.count = wp.zeros(COUNTS, dtype=wp.int32)
         self.nodes = _nodes(solver)
