@@ -266,7 +266,7 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
         monkeypatch.setattr(replay, "launch_early", change)
         held = Held(model, case, "cuda:0", precision)
         if name == "elastic":
-            early = node.integrate_kernel(precision, False, False, False, False, True)
+            early = node.integrate_kernel(precision, False, False, False, False, True, turned=False)
             assert held.solver.nodes.integrate_kernel is early
         for _ in range(10):
             held.advance(20)

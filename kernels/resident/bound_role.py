@@ -90,10 +90,10 @@ def tie_function(partial: bool) -> Any:
 
 
 @cache
-def bound_role(precision: str, partial: bool) -> Any:
+def bound_role(precision: str, partial: bool, turned: bool) -> Any:
     """The function that moves bound nodes and keeps the greatest normal force in each of some steps."""
     vec3 = scalars(precision).vec3
-    gather_held, tie = gather_function(precision), tie_function(partial)
+    gather_held, tie = gather_function(precision, turned), tie_function(partial)
 
     @wp.func
     def move_bound(

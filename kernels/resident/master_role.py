@@ -147,10 +147,10 @@ def reaction(i: int, near: Near, faces: Faces, spring: Spring):
 
 
 @cache
-def master_role(precision: str) -> Any:
+def master_role(precision: str, turned: bool) -> Any:
     """The function that gives nodes of master faces their reactions and moves them, in each of some steps."""
     vec3 = scalars(precision).vec3
-    gather_held = gather_function(precision)
+    gather_held = gather_function(precision, turned)
 
     @wp.func
     def move_masters(

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import TOUCHABLE, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
@@ -24,6 +25,7 @@ class Nodes:
     Attributes:
         mass, inverse_mass: [kg], [1/kg], shape (node_count,), float64.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
+        frames: floating frames.
         first_slots, more_slots: slots of the forces on each node, see `elements.stage.gather_lists`.
         free: nodes that neither belong to a master nor are bound, shape (free_count,), int32.
         gravity: [m/s^2].
@@ -32,6 +34,7 @@ class Nodes:
     mass: wp.array(dtype=wp.float64)
     inverse_mass: wp.array(dtype=wp.float64)
     role: wp.array(dtype=wp.uint8)
+    frames: Frames
     first_slots: wp.array(dtype=wp.vec2i)
     more_slots: wp.array(dtype=wp.vec4i)
     free: wp.array(dtype=wp.int32)
@@ -46,6 +49,7 @@ class Held:
         node: its number.
         role: as in `Nodes`.
         inverse: of its mass [1/kg].
+        turn: rotation of its floating frame.
         pair: its first slots.
         row0, row1, row2: rows of more slots, -1 where there is none.
         row: of more slots that come after those, and the end of them.
@@ -55,6 +59,7 @@ class Held:
     node: wp.int32
     role: wp.int32
     inverse: wp.float64
+    turn: wp.quatd
     pair: wp.vec2i
     row0: wp.vec4i
     row1: wp.vec4i
@@ -71,6 +76,8 @@ def hold_node(i: int, nodes: Nodes):
     if nodes.role.shape[0] > 0:
         held.role = int(nodes.role[i])
     held.inverse = nodes.inverse_mass[i]
+    if nodes.frames.of_node.shape[0] > 0:
+        held.turn = nodes.frames.rotation[nodes.frames.of_node[i]]
     held.pair = nodes.first_slots[i]
     none = wp.vec4i(-1, -1, -1, 0)
     held.row0 = none
@@ -96,8 +103,8 @@ def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, gravity: wp.vec3d, d
 
 
 @cache
-def gather_function(precision: str) -> Any:
-    """The function that sums the forces of elements on a node."""
+def gather_function(precision: str, turned: bool) -> Any:
+    """The function that sums the forces of elements on a node; `turned`: they are those in its floating frame."""
     vec3 = scalars(precision).vec3
 
     @wp.func
@@ -137,16 +144,18 @@ def gather_function(precision: str) -> Any:
         for k in range(held.row, held.end):
             r = more_slots[k]
             total = add_row(total, r, force_at(r[0], force), force_at(r[1], force), force_at(r[2], force))
+        if wp.static(turned):
+            return wp.quat_rotate(held.turn, total)
         return total
 
     return gather_held
 
 
 @cache
-def total_function(precision: str, contact: bool) -> Any:
+def total_function(precision: str, contact: bool, turned: bool) -> Any:
     """The function that sums all forces on a node, of elements and as a slave; that is given once."""
     vec3 = scalars(precision).vec3
-    gather_held = gather_function(precision)
+    gather_held = gather_function(precision, turned)
 
     @wp.func
     def all_forces(
@@ -170,10 +179,10 @@ def total_function(precision: str, contact: bool) -> Any:
 
 
 @cache
-def free_role(precision: str, contact: bool) -> Any:
+def free_role(precision: str, contact: bool, turned: bool) -> Any:
     """The function that moves free nodes in each of some steps."""
     vec3 = scalars(precision).vec3
-    all_forces = total_function(precision, contact)
+    all_forces = total_function(precision, contact, turned)
 
     @wp.func
     def move_others(

@@ -46,18 +46,26 @@ class Roles:
 
 @cache
 def resident_kernel(
-    precision: str, law_name: str, contact: bool, friction: bool, stress_free: bool, contact_law: str, partial: bool
+    precision: str,
+    law_name: str,
+    turned: bool,
+    contact: bool,
+    friction: bool,
+    stress_free: bool,
+    contact_law: str,
+    partial: bool,
 ) -> Any:
     """Kernel: `steps` steps of a model of one block of `hex8`, with a contact pass if `contact`.
 
     Arguments are those of the kernels that take the same steps one by one: `hex8_patch`, `contact`, `nodes.node`,
-    `nodes.constraint`. count_out are the counts of `meeting`, zero before and after.
+    `nodes.constraint`. `turned`: elements compute in floating frames. count_out are the counts of `meeting`, zero
+    before and after.
     """
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
-    compute_patch, move_free = patch_role(precision, law_name), free_role(precision, contact)
-    touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision)
-    move_bound = bound_role(precision, partial)
+    compute_patch, move_free = patch_role(precision, law_name, turned), free_role(precision, contact, turned)
+    touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision, turned)
+    move_bound = bound_role(precision, partial, turned)
 
     @wp.func
     def give_forces(
@@ -70,6 +78,7 @@ def resident_kernel(
         patches: Patches,
         law: wp.array2d(dtype=R),
         slot: int,
+        nodes: Nodes,
         slaves: Slaves,
         master: Master,
         dt: wp.float64,
@@ -89,7 +98,7 @@ def resident_kernel(
         movers = roles.end - roles.master
         if block < roles.contact:
             compute_patch(
-                block, lane, steps, movers, X, points, patches, law, slot, u,
+                block, lane, steps, movers, X, points, patches, law, slot, nodes, u,
                 count_out, yielded_out, history_out, extreme_out, force_out,
             )  # fmt: skip
         elif wp.static(contact):
@@ -183,8 +192,8 @@ def resident_kernel(
         block = wp.tid() // wp.static(THREADS)
         if block < roles.master:
             give_forces(
-                block, lane, steps, roles, X, points, patches, law, slot, slaves, master, dt, u_out, v_out, spring,
-                count_out, yielded_out, history_out, extreme_out, force_out, contact_force_out,
+                block, lane, steps, roles, X, points, patches, law, slot, nodes, slaves, master, dt, u_out, v_out,
+                spring, count_out, yielded_out, history_out, extreme_out, force_out, contact_force_out,
                 normal_force_out[wp.static(1 if contact else 0)], flag_out,
             )  # fmt: skip
         else:

@@ -103,6 +103,7 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
 
 
 def _tradeoff(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
     parser.add_argument("--budget", type=float, metavar="SECONDS", help="time for all runs (default: all variants)")
     parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
     parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")

@@ -47,7 +47,8 @@ def surface_of(solver: Solver) -> ContactStage | None:
 
 def is_known(solver: Solver) -> bool:
     """Whether the kernel knows all that a model has."""
-    stages = {stage.name for group in solver.groups for stage in group if not stage.only_records}
+    _frames, *groups = solver.groups  # frames it knows
+    stages = {stage.name for group in groups for stage in group if not stage.only_records}
     if solver.model.rates or solver.model.scaling:
         return False
     if not stages <= STAGES or solver.layout.count > 1 or len(solver.elements) > 1 or len(solver.contacts) > 1:
@@ -88,6 +89,7 @@ class Resident:
         self.kernel = resident_kernel(
             solver.precision,
             block.law,
+            solver.nodes.turned,
             contact is not None,
             friction,
             stress_free,
@@ -106,6 +108,7 @@ class Resident:
         solver, work, elements = self.solver, self.solver.work, self.solver.elements[0]
         own, bonds = state.elements[0], state.constraints
         slaves, master, faces, spring = _contact(solver, state)
+        self.nodes.frames = work.frames(state)
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]

@@ -29,6 +29,7 @@ from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
+from warp_mca.solve.floating_stage import FloatingStage
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
@@ -64,6 +65,7 @@ class Solver:
         couplings: joints between clusters of nodes.
         loads: what acts in the joints of chains, and moves their bases.
         rigid: rigid bodies.
+        floating: frames that elements compute in.
         output: what is read off the state for paths and recorders, or None.
     """
 
@@ -107,6 +109,7 @@ class Solver:
         self.rigid = RigidStage(model, self.nodes, self.precision)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
         self.ties = TieStage(model, self.nodes, self.precision)
+        self.floating = FloatingStage(model, self.work)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = step_groups(self)
         cuda = wp.get_device().is_cuda
@@ -141,13 +144,14 @@ class Solver:
                 loads=self.loads.new_state(),
                 absorbing=self.absorbing.new_state(),
                 rigid=self.rigid.new_state(),
+                floating=self.floating.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
     def forces(self, state: State) -> None:
         """Forces of elements and contacts at the state's displacements, in `work`."""
         with wp.ScopedDevice(self.device):
-            self._streams.run(self.groups[:1], Step(state))
+            self._streams.run(self.groups[:2], Step(state))
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
@@ -165,11 +169,13 @@ class Solver:
         sums += [output.nodal_stress] if stress else []
         sums += [watch.watch_nodes] if self.chains and self.contacts else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
+        movers = (self.nodes, self.absorbing, self.ties, self.floating)
+        nodes = [kernel for stage in movers for kernel in stage.kernels()]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + self.absorbing.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
+            (nodes + elements, ELEMENT_BLOCK),
             *([self.resident.kernels()] if self.resident else []),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]

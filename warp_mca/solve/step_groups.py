@@ -15,6 +15,7 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
     rates = solver.model.rates
     common = level is None or rates is None or level >= rates.common
     return [
+        _frames(solver),
         _forces(solver, level, common),
         _energies(solver),
         _sums(solver),
@@ -124,3 +125,16 @@ def _motion(solver: Solver) -> Group:
     if solver.loads.kernels():
         motion.append(Stage("joint and base sums", solver.loads.sums, only_records=True))
     return [*motion, *solver.absorbing.record_stages(solver.records)]
+
+
+def _frames(solver: Solver) -> Group:
+    """Displacements in floating frames, which follow their bodies.
+
+    They do not go with the forces, because contact would begin before the elements.
+    """
+    if not solver.floating.count:
+        return []
+    return [
+        Stage("floating frames", solver.floating.follow, only_records=True),
+        Stage("nodes in floating frames", solver.floating.see),
+    ]
