@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from warp_mca.kernels.nodes import cluster
+from warp_mca.kernels.nodes import couple
+from warp_mca.kernels.nodes.cluster import Clusters, Sums
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from warp_mca.solve.stage import Step
     from warp_mca.solve.workspace import Workspace
 
-BLOCK = 256  # threads of a GPU for a coupling
+BLOCK = 256  # nodes of a part of a cluster on a GPU, and threads of its block; a CPU takes clusters whole
 
 
 @dataclass(eq=False)
@@ -35,10 +36,11 @@ class CouplingState:
 
 
 class CouplingStage:
-    """What `kernels.nodes.cluster` reads and writes.
+    """What `kernels.nodes.couple` reads and writes.
 
     Attributes:
         count: number of couplings.
+        clusters: on the device.
     """
 
     def __init__(
@@ -47,13 +49,12 @@ class CouplingStage:
         """Allocate on the current device."""
         self.items, self.count = model.couplings, len(model.couplings)
         self.work, self.loads, self.dt = work, loads, dt
-        self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
         weight = np.zeros(len(model.joint_first))
         for item in self.items:
             weight[item.start : item.end] = item.weight
-        self.clusters = cluster.Clusters()
+        self.clusters = Clusters()
         self.clusters.begin = wp.array([(item.start, item.middle, item.end) for item in self.items], dtype=wp.vec3i)
         self.clusters.node = constraints.bonds.first
         self.clusters.weight = wp.array(weight, dtype=wp.float64)
@@ -63,6 +64,23 @@ class CouplingStage:
         self.clusters.base = wp.array(base if (base >= 0).any() else base[:0], dtype=wp.int32)
         self.clusters.axis = wp.array([item.axis for item in self.items], dtype=wp.vec3d)
         self.clusters.arm = wp.array(np.array([item.arm for item in self.items]), dtype=wp.vec3d)
+        self._make_parts(BLOCK if wp.get_device().is_cuda else None)
+
+    def _make_parts(self, size: int | None) -> None:
+        """Cut clusters in parts of so many nodes; None: leave them whole."""
+        part, first = [], []
+        for j, item in enumerate(self.items):
+            counts = []
+            for side, (begin, end) in enumerate(((item.start, item.middle), (item.middle, item.end))):
+                counts.append(len(part))
+                part += [(j, side, k, min(k + (size or end), end)) for k in range(begin, end, size or end)]
+            first.append((*counts, len(part)))
+        self.clusters.part = wp.array(part, dtype=wp.vec4i)
+        self.clusters.first_part = wp.array(first, dtype=wp.vec3i)
+        self.threads = (len(part), size or 1)
+        self.sums = wp.zeros(len(part), dtype=Sums)
+        self.place = wp.zeros(self.count, dtype=wp.vec3d)
+        self.orientation = wp.zeros((self.count, 2), dtype=wp.quatd)
 
     def new_state(self) -> CouplingState:
         """State before the first step, on the current device."""
@@ -75,13 +93,16 @@ class CouplingStage:
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [cluster.couple] if self.count else []
+        return [couple.sum_parts] if self.count else []
 
     def couple(self, step: Step) -> None:
         """Join the clusters, once all their nodes have moved as free ones."""
-        state, own = step.state, step.state.couplings
-        inputs = [self.clusters, self.loads.device_bases, self.work.X, self.work.mass]
+        state, own, work = step.state, step.state.couplings, self.work
+        inputs = [self.clusters, work.X, work.mass, own.place, own.orientation, state.u, state.v, self.dt]
+        found = [self.sums, self.place, self.orientation]
+        wp.launch(couple.sum_parts, self.threads, inputs=inputs, outputs=found, block_dim=BLOCK)
+        inputs = [self.clusters, self.loads.device_bases, work.X, *found]
         inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse, own.place, own.orientation]
         outputs.append(self.loads.latest)
-        wp.launch(cluster.couple, (self.count, self.lanes), inputs=inputs, outputs=outputs, block_dim=BLOCK)
+        wp.launch(couple.couple_parts, self.threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)

@@ -243,14 +243,14 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "pin_pulls_at_the_mean": Mutation(
         "the impulse of a pin acts at the mean position of a cluster in place of the hinge",
-        "kernels/nodes/cluster.py",
-        "pull(begin[0], begin[1], lane, place, a, J, wp.cross(arm_P, J) + T,",
-        "pull(begin[0], begin[1], lane, place, a, J, T,",
+        "kernels/nodes/couple.py",
+        "where[2], where[3], lane, place[j], a, J, wp.cross(P - a.centre, J) + T,",
+        "where[2], where[3], lane, place[j], a, J, T,",
     ),
     "pin_stays_upright": Mutation(
         "the arm from the mean position of a cluster to its hinge does not turn with the body",
-        "kernels/nodes/cluster.py",
-        "orientation_out[j, 0] = turned(q_a, dt * spin)",
+        "kernels/nodes/couple.py",
+        "orientation_out[j, 0] = turned(q_a, dt * spin_after(a, J, T))",
         "orientation_out[j, 0] = q_a",
     ),
     "beta_swapped": Mutation(
