@@ -52,7 +52,7 @@ def _energies(solver: Solver) -> Group:
         Stage("element energies", lambda s, e=e: e.energies(solver.work, s.state, s.split), only_records=True)
         for e in solver.elements
     ]
-    return [Stage("paths, frames: stress", before, only_records=True), *energies]
+    return [Stage("paths, frames: stress", before, BESIDE, only_records=True), *energies]
 
 
 def _sums(solver: Solver) -> Group:
