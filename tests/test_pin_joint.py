@@ -8,6 +8,7 @@ from test_pin import bar, bars
 
 import warp_mca as mca
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
+from warp_mca.kernels.nodes.couple import hinge_inverse
 from warp_mca.kernels.nodes.coupling import Inverse
 from warp_mca.kernels.resident import pin_joint
 from warp_mca.kernels.resident.node_role import Nodes
@@ -51,15 +52,21 @@ def solve_alone(
         p = pin_joint.momentum_row(one, other)
         for c in range(COLUMNS):
             pool[TOTALS + COLUMNS * pin_joint.MOMENTA + c] += p[c]
-    pin_joint.find_responses(0, clusters, pool, turn, mean, inverse, shared)
-    pin_joint.find_impulses(0, clusters, dt, pool, turn, inverse, mean, shared)
+    for side in range(2):
+        pin_joint.find_response(0, side, clusters, turn, pool, mean, shared)
+    inverse[0] = hinge_inverse(mean[0], mean[1], shared[pin_joint.AXIS])
+    for side in range(2):
+        pin_joint.look_ahead(side, dt, pool, mean, shared)
+    for side in range(2):
+        pin_joint.find_impulses(side, wp.float64(1.0) / dt, pool, mean, inverse, shared)
     for k in range(begin[0], begin[2]):
         node = pin_joint.pinned_node(k, begin[2], start, clusters, nodes, X, u_out, v_out)
         node.v = v_free[node.node]
         node = pin_joint.pulled(node, wp.where(k < begin[1], 0, 1), dt, shared)
         u_out[node.node] = node.u
         v_out[node.node] = node.v
-    pin_joint.carry_joint(0, dt, start, mean, turn, shared, place_out)
+    for side in range(2):
+        pin_joint.carry_joint(0, side, dt, start, mean, turn, shared, place_out)
 
 
 def on_the_ground():

@@ -1,15 +1,16 @@
 """Owns what a hinge with pins is for one block of threads: the nodes of its clusters, their sums, and its impulses.
 
-Threads share sums and what follows from them; one of them solves. `kernels.nodes.cluster` has the equations.
+Threads share sums and what follows from them; two of them solve, one for each cluster.
+`kernels.nodes.cluster` has the equations.
 """
 
 from ctypes import sizeof
 
 import warp as wp
 
-from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, mean_response, mean_spin, spin_after
-from warp_mca.kernels.nodes.couple import hinge_impulses, hinge_inverse, joint_point, place_after
-from warp_mca.kernels.nodes.coupling import Inverse, turned
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, mean_response, spin_after
+from warp_mca.kernels.nodes.couple import joint_point, place_after
+from warp_mca.kernels.nodes.coupling import Inverse, joint_impulses, turned
 from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.kernels.resident.patch_role import THREADS
 
@@ -20,12 +21,15 @@ COLUMNS = 16  # of a row of values that are summed together
 
 # Rows: moments with q and with s q of the first, then of the second cluster; momenta of both
 MOMENTS, MOMENTA, ROWS = (0, 2), 4, 5
-# Vectors that threads share: what moves the nodes of the first, then of the second cluster; point of the joint, its
-# impulse, angular impulse, and the sum of its impulses
-STRAIGHT, TURN, CENTRE, POINT, PULL, TWIST, PULLED, VECTORS = 0, 1, 2, 6, 7, 8, 9, 10
-# First entries in shared memory, in doubles: sums over warps, then over the block; structs, vectors, rotations
+# Vectors that threads share, of each cluster: what moves its nodes, its mean position; arm and axis of the joint on it,
+# its point and axis after the free step. Then of the joint: point, impulse, angular impulse, sum of its impulses
+STRAIGHT, TURN, CENTRE, ARM, AXIS, POINT_AHEAD, AXIS_AHEAD, SIDE = range(8)
+POINT, PULL, TWIST, PULLED, VECTORS = range(2 * SIDE, 2 * SIDE + 5)
+# First entries in shared memory, in doubles: sums over warps, then over the block, inverse masses of both clusters;
+# structs, vectors, rotations
 TOTALS = ROWS * WARPS * COLUMNS
-MEANS = TOTALS + ROWS * COLUMNS
+LIGHTNESS = TOTALS + ROWS * COLUMNS
+MEANS = LIGHTNESS + 2
 INVERSE = MEANS + 2 * sizeof(Mean.ctype) // 8
 SHARED = INVERSE + sizeof(Inverse.ctype) // 8
 TURNS = SHARED + 3 * VECTORS
@@ -131,65 +135,103 @@ def vector_at(first: int, pool: wp.array(dtype=wp.float64)) -> wp.vec3d:
 
 
 @wp.func
-def find_responses(
+def find_response(
     j: int,
+    side: int,
     clusters: Clusters,
-    pool: wp.array(dtype=wp.float64),
     turn: wp.array(dtype=wp.quatd),
+    pool_out: wp.array(dtype=wp.float64),
     mean_out: wp.array(dtype=Mean),
-    inverse_out: wp.array(dtype=Inverse),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
-    """All that the impulses of coupling j need and moments give; of the ground all is zero."""
-    total = moments_at(wp.static(MOMENTS[0]), pool)
-    P = joint_point(total, turn[0], clusters.arm[j, 0])
-    a = mean_response(total, P)
-    b = Mean()
-    if clusters.begin[j][2] > clusters.begin[j][1]:
-        b = mean_response(moments_at(wp.static(MOMENTS[1]), pool), P)
-    mean_out[0] = a
-    mean_out[1] = b
-    inverse_out[0] = hinge_inverse(a, b, wp.quat_rotate(turn[0], clusters.axis[j]))
-    shared_out[wp.static(POINT)] = P
-    shared_out[wp.static(CENTRE)] = a.centre
-    shared_out[wp.static(3 + CENTRE)] = b.centre
+    """What impulses of coupling j need of one of its clusters, and moments give; of the ground all is zero."""
+    P = joint_point(moments_at(wp.static(MOMENTS[0]), pool_out), turn[0], clusters.arm[j, 0])
+    found = Mean()
+    lightness = wp.float64(0.0)
+    if clusters.begin[j][1 + side] > clusters.begin[j][side]:
+        found = mean_response(moments_at(2 * side, pool_out), P)
+        lightness = wp.float64(1.0) / found.mass
+    mean_out[side] = found
+    pool_out[wp.static(LIGHTNESS) + side] = lightness
+    first = side * wp.static(SIDE)
+    shared_out[first + wp.static(CENTRE)] = found.centre
+    shared_out[first + wp.static(ARM)] = wp.quat_rotate(turn[side], clusters.arm[j, side])
+    shared_out[first + wp.static(AXIS)] = wp.quat_rotate(turn[side], clusters.axis[j])
+    if side == 0:
+        shared_out[wp.static(POINT)] = P
+
+
+@wp.func
+def turned_by_little(r: wp.vec3d, angle: wp.vec3d) -> wp.vec3d:
+    """A vector after a rotation by a small angle, by its series; the next step makes up for what is left of it."""
+    a = wp.cross(angle, r)
+    b = wp.cross(angle, a)
+    return r + (a + (wp.float64(0.5) * b + wp.float64(1.0 / 6.0) * wp.cross(angle, b)))
+
+
+@wp.func
+def look_ahead(
+    side: int,
+    dt: wp.float64,
+    pool: wp.array(dtype=wp.float64),
+    mean_out: wp.array(dtype=Mean),
+    shared_out: wp.array(dtype=wp.vec3d),
+):
+    """Mean motion of a cluster after the free step, and where it carries point and axis of the joint."""
+    first = side * wp.static(SIDE)
+    centre = shared_out[first + wp.static(CENTRE)]
+    p = vector_at(6 * side, pool)
+    V = pool[wp.static(LIGHTNESS) + side] * p
+    w = mean_out[side].inverse * (vector_at(6 * side + 3, pool) - wp.cross(centre, p))
+    ahead = turned_by_little(shared_out[first + wp.static(ARM)], dt * w)
+    shared_out[first + wp.static(POINT_AHEAD)] = (centre + dt * V) + ahead
+    shared_out[first + wp.static(AXIS_AHEAD)] = turned_by_little(shared_out[first + wp.static(AXIS)], dt * w)
+    mean_out[side].velocity = V
+    mean_out[side].spin = w
 
 
 @wp.func
 def find_impulses(
-    j: int,
-    clusters: Clusters,
-    dt: wp.float64,
+    side: int,
+    rate: wp.float64,
     pool: wp.array(dtype=wp.float64),
-    turn: wp.array(dtype=wp.quatd),
+    mean: wp.array(dtype=Mean),
     inverse: wp.array(dtype=Inverse),
-    mean_out: wp.array(dtype=Mean),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
-    """Impulses of coupling j from the momenta, and what moves the nodes of both clusters."""
-    a = mean_out[0]
-    b = mean_out[1]
-    a.velocity = vector_at(0, pool) / a.mass
-    a.spin = mean_spin(a, vector_at(0, pool), vector_at(3, pool))
-    if b.mass > wp.float64(0.0):
-        b.velocity = vector_at(6, pool) / b.mass
-        b.spin = mean_spin(b, vector_at(6, pool), vector_at(9, pool))
-    J, T = hinge_impulses(j, clusters, inverse[0], a, b, turn[0], turn[1], dt)
-    P = shared_out[wp.static(POINT)]
-    shared_out[wp.static(STRAIGHT)] = J / a.mass
-    shared_out[wp.static(TURN)] = a.inverse * (wp.cross(P - a.centre, J) + T)
-    if b.mass > wp.float64(0.0):
-        shared_out[wp.static(3 + STRAIGHT)] = -J / b.mass
-        shared_out[wp.static(3 + TURN)] = -(b.inverse * (wp.cross(P - b.centre, J) + T))
-    shared_out[wp.static(PULL)] = J
-    shared_out[wp.static(TWIST)] = T
-    mean_out[0] = a
-    mean_out[1] = b
+    """Impulses of a coupling, and what moves the nodes of one of its clusters; `rate` is 1 / dt [1/s]."""
+    gap = shared_out[wp.static(POINT_AHEAD)] - shared_out[wp.static(SIDE + POINT_AHEAD)]
+    tilt = wp.cross(shared_out[wp.static(SIDE + AXIS_AHEAD)], shared_out[wp.static(AXIS_AHEAD)])
+    J, T = joint_impulses(inverse[0], rate * gap, rate * tilt)
+    if side == 0:
+        shared_out[wp.static(PULL)] = J
+        shared_out[wp.static(TWIST)] = T
+    else:
+        J = -J
+        T = -T
+    first = side * wp.static(SIDE)
+    arm = shared_out[wp.static(POINT)] - shared_out[first + wp.static(CENTRE)]
+    shared_out[first + wp.static(STRAIGHT)] = pool[wp.static(LIGHTNESS) + side] * J
+    shared_out[first + wp.static(TURN)] = mean[side].inverse * (wp.cross(arm, J) + T)
+
+
+@wp.func
+def quickly_turned(q: wp.quatd, angle: wp.vec3d) -> wp.quatd:
+    """`turned`, by series for small angles, which take no root and no quotient."""
+    h = wp.float64(0.25) * wp.dot(angle, angle)
+    if h > wp.float64(1e-6):
+        return turned(q, angle)
+    sine = wp.float64(0.5) * (wp.float64(1.0) - h * (wp.float64(1.0 / 6.0) - h * wp.float64(1.0 / 120.0)))
+    cosine = wp.float64(1.0) - h * (wp.float64(0.5) - h * wp.float64(1.0 / 24.0))
+    found = wp.quatd(sine * angle[0], sine * angle[1], sine * angle[2], cosine) * q
+    square = found[0] * found[0] + found[1] * found[1] + found[2] * found[2] + found[3] * found[3]
+    return (wp.float64(1.5) - wp.float64(0.5) * square) * found
 
 
 @wp.func
 def carry_joint(
     j: int,
+    side: int,
     dt: wp.float64,
     start: wp.vec3d,
     mean: wp.array(dtype=Mean),
@@ -197,21 +239,22 @@ def carry_joint(
     shared_out: wp.array(dtype=wp.vec3d),
     place_out: wp.array(dtype=wp.vec3d),
 ):
-    """Place and rotations of coupling j after the step, and the sum of its impulses."""
+    """Rotation of a cluster of coupling j after the step, and with the first one its place and sum of impulses."""
     J = shared_out[wp.static(PULL)]
     T = shared_out[wp.static(TWIST)]
-    turn_out[0] = turned(turn_out[0], dt * spin_after(mean[0], J, T))
-    turn_out[1] = turned(turn_out[1], dt * spin_after(mean[1], -J, -T))
-    place_out[j] = place_after(start, shared_out[wp.static(POINT)], mean[0], mean[1], J, T, dt)
-    shared_out[wp.static(PULLED)] = shared_out[wp.static(PULLED)] + J
+    sign = wp.where(side == 0, wp.float64(1.0), wp.float64(-1.0))
+    turn_out[side] = quickly_turned(turn_out[side], dt * spin_after(mean[side], sign * J, sign * T))
+    if side == 0:
+        place_out[j] = place_after(start, shared_out[wp.static(POINT)], mean[0], mean[1], J, T, dt)
+        shared_out[wp.static(PULLED)] = shared_out[wp.static(PULLED)] + J
 
 
 @wp.func
 def pulled(one: Pinned, side: int, dt: wp.float64, shared: wp.array(dtype=wp.vec3d)):
     """A node after the free step, which has changed its velocity alone, and the impulses on its cluster."""
-    r = (one.start + one.u) - shared[3 * side + wp.static(CENTRE)]
-    turn = wp.cross(shared[3 * side + wp.static(TURN)], r)
-    change = one.weight * (shared[3 * side + wp.static(STRAIGHT)] + turn)
+    r = (one.start + one.u) - shared[side * wp.static(SIDE) + wp.static(CENTRE)]
+    turn = wp.cross(shared[side * wp.static(SIDE) + wp.static(TURN)], r)
+    change = one.weight * (shared[side * wp.static(SIDE) + wp.static(STRAIGHT)] + turn)
     found = Pinned()
     found.node = one.node
     found.weight = one.weight

@@ -12,12 +12,14 @@ import warp as wp
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import barrier, shared_functions, slot_pools, warp_barrier
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
+from warp_mca.kernels.nodes.couple import hinge_inverse
 from warp_mca.kernels.nodes.coupling import Inverse
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Held, Nodes, gather_function, hold_node, next_velocity
 from warp_mca.kernels.resident.patch_role import THREADS
 from warp_mca.kernels.resident.pin_joint import (
+    AXIS,
     COLUMNS,
     INVERSE,
     MEANS,
@@ -32,7 +34,8 @@ from warp_mca.kernels.resident.pin_joint import (
     Row,
     carry_joint,
     find_impulses,
-    find_responses,
+    find_response,
+    look_ahead,
     moment_row,
     momentum_row,
     pinned_node,
@@ -104,10 +107,50 @@ def sum_momenta(one: Pinned, other: Pinned, lane: int, pool_out: wp.array(dtype=
     """Momenta of both clusters, by a block, for the first warp."""
     keep_in_warp(momentum_row(one, other), wp.static(MOMENTA), lane, pool_out)
     barrier()
+    if lane < wp.static(COLUMNS):
+        sum_warps(wp.static(MOMENTA * COLUMNS) + lane, pool_out)
+
+
+@wp.func
+def prepare(
+    j: int,
+    lane: int,
+    clusters: Clusters,
+    turn: wp.array(dtype=wp.quatd),
+    pool_out: wp.array(dtype=wp.float64),
+    mean_out: wp.array(dtype=Mean),
+    inverse_out: wp.array(dtype=Inverse),
+    shared_out: wp.array(dtype=wp.vec3d),
+):
+    """What impulses need and moments give, by the first warp."""
     if lane < 32:
-        if lane < wp.static(COLUMNS):
-            sum_warps(wp.static(MOMENTA * COLUMNS) + lane, pool_out)
         warp_barrier()
+        if lane < 2:
+            find_response(j, lane, clusters, turn, pool_out, mean_out, shared_out)
+        warp_barrier()
+        if lane == 0:
+            inverse_out[0] = hinge_inverse(mean_out[0], mean_out[1], shared_out[wp.static(AXIS)])
+
+
+@wp.func
+def solve(
+    lane: int,
+    dt: wp.float64,
+    rate: wp.float64,
+    pool: wp.array(dtype=wp.float64),
+    inverse: wp.array(dtype=Inverse),
+    mean_out: wp.array(dtype=Mean),
+    shared_out: wp.array(dtype=wp.vec3d),
+):
+    """Impulses of the joint from the momenta, by the first warp, for all threads."""
+    if lane < 32:
+        warp_barrier()
+        if lane < 2:
+            look_ahead(lane, dt, pool, mean_out, shared_out)
+        warp_barrier()
+        if lane < 2:
+            find_impulses(lane, rate, pool, mean_out, inverse, shared_out)
+    barrier()
 
 
 @wp.func
@@ -166,23 +209,21 @@ def pin_role(precision: str) -> Any:
         if lane < 2:
             turn[lane] = orientation_out[j, lane]
             shared[wp.static(PULLED)] = impulse_out[begin[0]]
+        rate = wp.float64(1.0) / dt
         for n in range(steps):
             sum_moments(one, other, lane, pool)
-            if lane == 0:
-                find_responses(j, clusters, pool, turn, mean, inverse, shared)
+            prepare(j, lane, clusters, turn, pool, mean, inverse, shared)
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             one.v = push(one, held, nodes, force, dt)
             other.v = push(other, other_held, nodes, force, dt)
             sum_momenta(one, other, lane, pool)
-            if lane == 0:
-                find_impulses(j, clusters, dt, pool, turn, inverse, mean, shared)
-            barrier()
+            solve(lane, dt, rate, pool, inverse, mean, shared)
             one, other = pulled(one, 0, dt, shared), pulled(other, 1, dt, shared)
             put_pinned(one, u_out, v_out)
             put_pinned(other, u_out, v_out)
             arrive(wp.static(NODES), count_out)
-            if lane == 0:  # no node waits for what follows
-                carry_joint(j, dt, start, mean, turn, shared, place_out)
+            if lane < 2:  # no node waits for what follows
+                carry_joint(j, lane, dt, start, mean, turn, shared, place_out)
             if one.node >= 0:
                 keep_speed(one.node, one.v, speed_square_out)
             if other.node >= 0:
