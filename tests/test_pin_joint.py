@@ -7,12 +7,12 @@ from impacts import begun
 from test_pin import bar, bars
 
 import warp_mca as mca
-from warp_mca.kernels.nodes.cluster import Clusters, Mean
-from warp_mca.kernels.nodes.couple import hinge_inverse
+from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.hinge import Ahead, Side, hinge_inverse
 from warp_mca.kernels.resident import pin_joint
 from warp_mca.kernels.resident.node_role import Nodes
-from warp_mca.kernels.resident.pin_joint import COLUMNS, MEANS, TOTALS
+from warp_mca.kernels.resident.pin_joint import COLUMNS, TOTALS
 from warp_mca.solve.stage import Step
 
 
@@ -24,7 +24,8 @@ def solve_alone(
     v_free: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
     pool: wp.array(dtype=wp.float64),
-    mean: wp.array(dtype=Mean),
+    sides: wp.array(dtype=Side),
+    ahead: wp.array(dtype=Ahead),
     inverse: wp.array(dtype=Inverse),
     shared: wp.array(dtype=wp.vec3d),
     turn: wp.array(dtype=wp.quatd),
@@ -53,12 +54,12 @@ def solve_alone(
         for c in range(COLUMNS):
             pool[TOTALS + COLUMNS * pin_joint.MOMENTA + c] += p[c]
     for side in range(2):
-        pin_joint.find_response(0, side, clusters, turn, pool, mean, shared)
-    inverse[0] = hinge_inverse(mean[0], mean[1], shared[pin_joint.AXIS])
+        pin_joint.find_side(0, side, clusters, turn, pool, sides, shared)
+    inverse[0] = hinge_inverse(sides[0].mean, sides[1].mean, sides[0].axis)
     for side in range(2):
-        pin_joint.look_ahead(side, dt, pool, mean, shared)
+        pin_joint.find_ahead(side, dt, pool, sides, ahead)
     for side in range(2):
-        pin_joint.find_impulses(side, wp.float64(1.0) / dt, pool, mean, inverse, shared)
+        pin_joint.find_impulses(side, wp.float64(1.0) / dt, sides, inverse, ahead, shared)
     for k in range(begin[0], begin[2]):
         node = pin_joint.pinned_node(k, begin[2], start, clusters, nodes, X, u_out, v_out)
         node.v = v_free[node.node]
@@ -66,7 +67,7 @@ def solve_alone(
         u_out[node.node] = node.u
         v_out[node.node] = node.v
     for side in range(2):
-        pin_joint.carry_joint(0, side, dt, start, mean, turn, shared, place_out)
+        pin_joint.carry_joint(0, side, dt, start, sides, ahead, turn, shared, place_out)
 
 
 def on_the_ground():
@@ -88,10 +89,11 @@ def test_one_block_joins_clusters_as_the_stages_of_a_step_do(scene):
     solver.couplings.couple(Step(state))
     nodes = Nodes()
     nodes.mass = solver.work.mass
-    pool, mean, inverse = wp.zeros(MEANS, dtype=wp.float64), wp.zeros(2, dtype=Mean), wp.zeros(1, dtype=Inverse)
+    pool, inverse = wp.zeros(pin_joint.SIDES, dtype=wp.float64), wp.zeros(1, dtype=Inverse)
+    sides, ahead = wp.zeros(2, dtype=Side), wp.zeros(2, dtype=Ahead)
     shared = wp.zeros(pin_joint.VECTORS, dtype=wp.vec3d)
     inputs = [solver.couplings.clusters, nodes, solver.work.X, v_free, solver.couplings.dt]
-    inputs += [pool, mean, inverse, shared, turn]
+    inputs += [pool, sides, ahead, inverse, shared, turn]
     wp.launch(solve_alone, 1, inputs=inputs, outputs=[before.u, before.v, before.couplings.place])
     pinned = impact.solver.model.joint_first
     pull = np.abs(state.v.numpy() - v_free.numpy())[pinned].max()

@@ -18,7 +18,7 @@ in `kernels.nodes.slide`. What one linear solve leaves of order (dt w)^2 is made
 
 import warp as wp
 
-from warp_mca.kernels.nodes.coupling import Response, inertia_about, turned
+from warp_mca.kernels.nodes.coupling import Response, inertia_about
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -65,6 +65,7 @@ class Mean:
 
     Attributes:
         mass: sum q [kg]; 0 for the ground.
+        lightness: 1 / sum q [1/kg]; 0 for the ground.
         centre: c, from the place where the joint was [m].
         velocity: V after the free step [m/s].
         spin: w after the free step [rad/s].
@@ -73,6 +74,7 @@ class Mean:
     """
 
     mass: wp.float64
+    lightness: wp.float64
     centre: wp.vec3d
     velocity: wp.vec3d
     spin: wp.vec3d
@@ -165,6 +167,7 @@ def mean_response(total: Sums, P: wp.vec3d) -> Mean:
     moment = second_moment(total, 14) - wp.outer(c, about) - wp.outer(about, c) + H * wp.outer(c, c)
     found = Mean()
     found.mass = Q
+    found.lightness = wp.float64(1.0) / Q
     found.centre = c
     found.inverse = wp.inverse(inertia(second_moment(total, 4)) - inertia_about(Q, c))
     # J and T at P are F = J and T + a x J at c, with a = P - c, and P moves with V + w x a
@@ -178,37 +181,19 @@ def mean_response(total: Sums, P: wp.vec3d) -> Mean:
 
 
 @wp.func
-def mean_spin(mean: Mean, p: wp.vec3d, L: wp.vec3d) -> wp.vec3d:
-    """w of a cluster with the momentum p and the angular momentum L about the origin [rad/s]."""
-    return mean.inverse * (L - wp.cross(mean.centre, p))
-
-
-@wp.func
 def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
     """Mean motion from the sums of a cluster, and its response at P, see `mean_response`."""
     found = mean_response(total, P)
     p = wp.vec3d(total[20], total[21], total[22])
     found.velocity = p / found.mass
-    found.spin = mean_spin(found, p, wp.vec3d(total[23], total[24], total[25]))
+    found.spin = found.inverse * (wp.vec3d(total[23], total[24], total[25]) - wp.cross(found.centre, p))
     return found
 
 
 @wp.func
-def spin_after(mean: Mean, J: wp.vec3d, T: wp.vec3d) -> wp.vec3d:
-    """w of a cluster with the impulse J and the angular impulse T at the point P of the joint [rad/s]."""
-    return mean.spin + wp.transpose(mean.response.mixed) * J + mean.response.turn * T
-
-
-@wp.func
-def point_ahead(mean: Mean, q: wp.quatd, arm: wp.vec3d, dt: wp.float64) -> wp.vec3d:
-    """Where a cluster or the ground, turned by q, carries the joint after the step, from the place where it was [m]."""
-    return mean.centre + dt * mean.velocity + wp.quat_rotate(turned(q, dt * mean.spin), arm)
-
-
-@wp.func
-def axis_ahead(mean: Mean, q: wp.quatd, axis: wp.vec3d, dt: wp.float64) -> wp.vec3d:
-    """Direction of the hinge's axis after the step, as a cluster or the ground carries it."""
-    return wp.quat_rotate(turned(q, dt * mean.spin), axis)
+def spin_after(mean: Mean, free: wp.vec3d, J: wp.vec3d, T: wp.vec3d) -> wp.vec3d:
+    """w of a cluster with the impulse J and the angular impulse T at the point of the joint; `free` without [rad/s]."""
+    return free + wp.transpose(mean.response.mixed) * J + mean.response.turn * T
 
 
 @wp.func

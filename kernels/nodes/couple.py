@@ -1,25 +1,29 @@
 """Owns the step of couplings: blocks of threads sum parts of clusters, then move the nodes of these by the impulses.
 
-`cluster` has the equations. Each block solves for the impulses of its coupling by itself, so that none waits.
+`cluster` and `hinge` have the equations. What positions alone decide is found beside the forces. Each block then solves
+for the impulses of its coupling by itself, so that none waits.
 """
 
 import warp as wp
 
 from warp_mca.kernels.nodes.base import Bases, base_velocity
-from warp_mca.kernels.nodes.cluster import (
-    Clusters,
-    Mean,
-    Sums,
-    axis_ahead,
-    cluster_sums,
-    mean_motion,
-    point_ahead,
-    pull,
-    spin_after,
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, arm_before, cluster_sums, pull, spin_after
+from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.hinge import (
+    Side,
+    hinge_impulses,
+    hinge_inverse,
+    joint_point,
+    look_ahead,
+    place_after,
+    quickly_turned,
+    side_of,
 )
-from warp_mca.kernels.nodes.coupling import Inverse, inverse_of, joint_impulses, sum_of, turned
+from warp_mca.kernels.nodes.joint_torque import wait_for_block
 
 wp.set_module_options({"enable_backward": False})
+
+Momenta = wp.types.vector(length=12, dtype=wp.float64)  # p and L of the first cluster, then of the second
 
 
 @wp.func
@@ -45,67 +49,22 @@ def ground_motion(
     return found
 
 
-@wp.func
-def hinge_inverse(a: Mean, b: Mean, axis: wp.vec3d) -> Inverse:
-    """What gives the impulses of a hinge about a unit vector, from the responses of what it joins."""
-    held = wp.identity(3, dtype=wp.float64) - wp.outer(axis, axis)
-    return inverse_of(sum_of(a.response, b.response), held)
-
-
-@wp.func
-def hinge_impulses(
-    j: int, clusters: Clusters, inverse: Inverse, a: Mean, b: Mean, q_a: wp.quatd, q_b: wp.quatd, dt: wp.float64
-):
-    """J and T on the first cluster that let the points and the axes of both coincide after the step."""
-    gap = point_ahead(a, q_a, clusters.arm[j, 0], dt) - point_ahead(b, q_b, clusters.arm[j, 1], dt)
-    tilt = wp.cross(axis_ahead(b, q_b, clusters.axis[j], dt), axis_ahead(a, q_a, clusters.axis[j], dt))
-    J, T = joint_impulses(inverse, gap / dt, tilt / dt)
-    return J, T
-
-
-@wp.func
-def place_after(place: wp.vec3d, P: wp.vec3d, a: Mean, b: Mean, J: wp.vec3d, T: wp.vec3d, dt: wp.float64) -> wp.vec3d:
-    """Where a joint at P from its `place` is after the step [m]; the ground or a base, without mass, holds it."""
-    if b.mass == wp.float64(0.0):
-        return place + dt * (b.velocity - b.response.point * J)
-    v = a.velocity + wp.cross(a.spin, P - a.centre) + a.response.point * J + a.response.mixed * T
-    return place + P + dt * v
-
-
-@wp.func
-def joint_point(total: Sums, q: wp.quatd, arm: wp.vec3d) -> wp.vec3d:
-    """The point P that the first cluster, turned by q, carries, from the origin of its sums [m]."""
-    return wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(q, arm)
-
-
 @wp.kernel(enable_backward=False)
-def sum_parts(
+def sum_moments(
     clusters: Clusters,
     X: wp.array(dtype=wp.vec3d),
     mass: wp.array(dtype=wp.float64),
     place: wp.array(dtype=wp.vec3d),
-    orientation: wp.array2d(dtype=wp.quatd),
     u: wp.array(dtype=wp.vec3d),
     v: wp.array(dtype=wp.vec3d),
-    dt: wp.float64,
     sums_out: wp.array(dtype=Sums),
-    place_out: wp.array(dtype=wp.vec3d),
-    orientation_out: wp.array2d(dtype=wp.quatd),
 ):
-    """Sums of each part of the clusters, once `constraint.bound_kernel` has advanced their nodes as free ones.
-
-    A block of threads for each part. place_out and orientation_out take what `couple_parts` then changes.
-    """
+    """Sums of each part of the clusters at t(n), by a block of threads."""
     part, lane = wp.tid()
     where = clusters.part[part]
-    j = where[0]
-    total = cluster_sums(where[2], where[3], lane, place[j], clusters, X, mass, u, v, dt)
+    total = cluster_sums(where[2], where[3], lane, place[where[0]], clusters, X, mass, u, v, wp.float64(0.0))
     if lane == 0:
         sums_out[part] = total
-        if part == clusters.first_part[j][0]:
-            place_out[j] = place[j]
-            for side in range(2):
-                orientation_out[j, side] = orientation[j, side]
 
 
 @wp.func
@@ -118,16 +77,91 @@ def sum_of_parts(first: int, end: int, lane: int, sums: wp.array(dtype=Sums)) ->
     return found[0]
 
 
+@wp.func
+def one_of(side: int, first: Sums, second: Sums) -> Sums:
+    """Those of the first or the second cluster."""
+    if side == 0:
+        return first
+    return second
+
+
 @wp.kernel(enable_backward=False)
-def couple_parts(
+def find_responses(
     clusters: Clusters,
     bases: Bases,
-    X: wp.array(dtype=wp.vec3d),
     sums: wp.array(dtype=Sums),
     place: wp.array(dtype=wp.vec3d),
     orientation: wp.array2d(dtype=wp.quatd),
     carriage: wp.array(dtype=wp.vec3d),
     clock: wp.array(dtype=wp.int32),
+    dt: wp.float64,
+    side_out: wp.array2d(dtype=Side),
+    inverse_out: wp.array(dtype=Inverse),
+    point_out: wp.array(dtype=wp.vec3d),
+    place_out: wp.array(dtype=wp.vec3d),
+):
+    """What the impulses of each coupling need and positions give, by a block of threads.
+
+    point_out takes the point P of the joint, from its place at t(n) [m], which place_out takes. `bases`, `carriage` and
+    `clock` are as in `base.move_bases`.
+    """
+    j, lane = wp.tid()
+    first = clusters.first_part[j]
+    q = orientation[j, 0]
+    total = sum_of_parts(first[0], first[1], lane, sums)
+    other = sum_of_parts(first[1], first[2], lane, sums)
+    P = joint_point(total, q, clusters.arm[j, 0])
+    for side in range(lane, 2, wp.block_dim()):
+        ground = ground_motion(j, clusters, bases, carriage, clock, dt)
+        side_out[j, side] = side_of(j, side, clusters, orientation[j, side], one_of(side, total, other), P, ground)
+    wait_for_block()
+    if lane == 0:
+        inverse_out[j] = hinge_inverse(side_out[j, 0].mean, side_out[j, 1].mean, side_out[j, 0].axis)
+        point_out[j] = P
+        place_out[j] = place[j]
+
+
+@wp.kernel(enable_backward=False)
+def sum_momenta(
+    clusters: Clusters,
+    X: wp.array(dtype=wp.vec3d),
+    mass: wp.array(dtype=wp.float64),
+    place: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    v: wp.array(dtype=wp.vec3d),
+    dt: wp.float64,
+    momenta_out: wp.array(dtype=Momenta),
+):
+    """Momenta of each part with arms of t(n), once `constraint.bound_kernel` has advanced its nodes as free ones."""
+    part, lane = wp.tid()
+    where = clusters.part[part]
+    total = Momenta()
+    for k in range(where[2] + lane, where[3], wp.block_dim()):
+        i = clusters.node[k]
+        p = clusters.weight[k] * mass[i] * v[i]
+        L = wp.cross(arm_before(i, place[where[0]], dt, X, u, v[i]), p)
+        for c in range(3):
+            total[c] += p[c]
+            total[3 + c] += L[c]
+    found = wp.tile_sum(wp.tile(total, preserve_type=True))
+    total = found[0]
+    if lane == 0:
+        if where[1] == 1:
+            for c in range(6):
+                total[6 + c] = total[c]
+                total[c] = wp.float64(0.0)
+        momenta_out[part] = total
+
+
+@wp.kernel(enable_backward=False)
+def couple_parts(
+    clusters: Clusters,
+    X: wp.array(dtype=wp.vec3d),
+    side: wp.array2d(dtype=Side),
+    inverse: wp.array(dtype=Inverse),
+    point: wp.array(dtype=wp.vec3d),
+    place: wp.array(dtype=wp.vec3d),
+    momenta: wp.array(dtype=Momenta),
     dt: wp.float64,
     u_out: wp.array(dtype=wp.vec3d),
     v_out: wp.array(dtype=wp.vec3d),
@@ -137,44 +171,44 @@ def couple_parts(
     orientation_out: wp.array2d(dtype=wp.quatd),
     latest_out: wp.array(dtype=wp.vec3d),
 ):
-    """Join the clusters of each coupling, from the sums, places and orientations that `sum_parts` has found.
+    """Join the clusters of each coupling; a block of threads for each part.
 
-    A block of threads for each part. impulse_out [N s] sums J at the first node of the first cluster. place_out
-    follows the joint, where the ground or a base holds it exactly; orientation_out the mean rotation of both clusters.
-    latest_out takes J where some base moves or slides; `bases`, `carriage` and `clock` are as in `base.move_bases`.
+    impulse_out [N s] sums J at the first node of the first cluster. place_out follows the joint, where the ground or a
+    base holds it exactly; orientation_out the mean rotation of both clusters. latest_out takes J where some base moves
+    or slides.
     """
     part, lane = wp.tid()
     where = clusters.part[part]
     j = where[0]
     first = clusters.first_part[j]
-    q_a = orientation[j, 0]
-    q_b = orientation[j, 1]
-    total = sum_of_parts(first[0], first[1], lane, sums)
-    P = joint_point(total, q_a, clusters.arm[j, 0])
-    a = mean_motion(total, P)
-    b = ground_motion(j, clusters, bases, carriage, clock, dt)
-    if first[2] > first[1]:
-        total = sum_of_parts(first[1], first[2], lane, sums)
-        b = mean_motion(total, P)
-    inverse = hinge_inverse(a, b, wp.quat_rotate(q_a, clusters.axis[j]))
-    J, T = hinge_impulses(j, clusters, inverse, a, b, q_a, q_b, dt)
+    total = Momenta()
+    for k in range(first[0] + lane, first[2], wp.block_dim()):
+        total += momenta[k]
+    found = wp.tile_sum(wp.tile(total, preserve_type=True))
+    total = found[0]
+    one = side[j, 0]
+    other = side[j, 1]
+    P = point[j]
+    a = look_ahead(one, wp.vec3d(total[0], total[1], total[2]), wp.vec3d(total[3], total[4], total[5]), dt)
+    b = look_ahead(other, wp.vec3d(total[6], total[7], total[8]), wp.vec3d(total[9], total[10], total[11]), dt)
+    J, T = hinge_impulses(inverse[j], a, b, wp.float64(1.0) / dt)
     # fmt: off
     if where[1] == 0:
         pull(
-            where[2], where[3], lane, place[j], a, J, wp.cross(P - a.centre, J) + T,
+            where[2], where[3], lane, place[j], one.mean, J, wp.cross(P - one.mean.centre, J) + T,
             clusters, X, dt, u_out, v_out, speed_square_out,
         )
     else:
         pull(
-            where[2], where[3], lane, place[j], b, -J, -(wp.cross(P - b.centre, J) + T),
+            where[2], where[3], lane, place[j], other.mean, -J, -(wp.cross(P - other.mean.centre, J) + T),
             clusters, X, dt, u_out, v_out, speed_square_out,
         )
     # fmt: on
     if part == first[0] and lane == 0:
         if latest_out.shape[0] > 0:
             latest_out[j] = J
-        orientation_out[j, 0] = turned(q_a, dt * spin_after(a, J, T))
-        orientation_out[j, 1] = turned(q_b, dt * spin_after(b, -J, -T))
-        place_out[j] = place_after(place[j], P, a, b, J, T, dt)
+        orientation_out[j, 0] = quickly_turned(orientation_out[j, 0], dt * spin_after(one.mean, a.spin, J, T))
+        orientation_out[j, 1] = quickly_turned(orientation_out[j, 1], dt * spin_after(other.mean, b.spin, -J, -T))
+        place_out[j] = place_after(place[j], P, one, other.mean, a, J, T, dt)
         i = clusters.begin[j][0]
         impulse_out[i] = impulse_out[i] + J

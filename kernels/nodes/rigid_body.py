@@ -175,7 +175,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
                 pull_cluster(p, lane, rows.place[p], clusters, X, span, mean_out, point_out, pin_impulse_out,
                              u_out, v_out, speed_square_out)
                 if lane == 0:
-                    w = spin_after(mean_out[p], pin_impulse_out[p, 0], pin_impulse_out[p, 1])
+                    w = spin_after(mean_out[p], mean_out[p].spin, pin_impulse_out[p, 0], pin_impulse_out[p, 1])
                     orientation_out[p] = turned(orientation_out[p], span * w)
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]

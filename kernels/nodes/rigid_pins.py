@@ -56,7 +56,7 @@ def move_pin(
     J = impulse[p, 0]
     T = impulse[p, 1]
     arm = point[p] - m.centre
-    w = spin_after(m, J, T)
+    w = spin_after(m, m.spin, J, T)
     v = m.velocity + wp.cross(m.spin, arm) + m.response.point * J + m.response.mixed * T - wp.cross(w, arm)
     ahead = turned(orientation[p], dt * w)
     place_out[p] = m.centre + dt * v + wp.quat_rotate(ahead, clusters.arm[p, 0])

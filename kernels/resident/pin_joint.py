@@ -1,16 +1,25 @@
 """Owns what a hinge with pins is for one block of threads: the nodes of its clusters, their sums, and its impulses.
 
 Threads share sums and what follows from them; two of them solve, one for each cluster.
-`kernels.nodes.cluster` has the equations.
+`kernels.nodes.hinge` has the equations.
 """
 
 from ctypes import sizeof
 
 import warp as wp
 
-from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, mean_response, spin_after
-from warp_mca.kernels.nodes.couple import joint_point, place_after
-from warp_mca.kernels.nodes.coupling import Inverse, joint_impulses, turned
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, spin_after
+from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.hinge import (
+    Ahead,
+    Side,
+    hinge_impulses,
+    joint_point,
+    look_ahead,
+    place_after,
+    quickly_turned,
+    side_of,
+)
 from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.kernels.resident.patch_role import THREADS
 
@@ -21,16 +30,15 @@ COLUMNS = 16  # of a row of values that are summed together
 
 # Rows: moments with q and with s q of the first, then of the second cluster; momenta of both
 MOMENTS, MOMENTA, ROWS = (0, 2), 4, 5
-# Vectors that threads share, of each cluster: what moves its nodes, its mean position; arm and axis of the joint on it,
-# its point and axis after the free step. Then of the joint: point, impulse, angular impulse, sum of its impulses
-STRAIGHT, TURN, CENTRE, ARM, AXIS, POINT_AHEAD, AXIS_AHEAD, SIDE = range(8)
-POINT, PULL, TWIST, PULLED, VECTORS = range(2 * SIDE, 2 * SIDE + 5)
-# First entries in shared memory, in doubles: sums over warps, then over the block, inverse masses of both clusters;
-# structs, vectors, rotations
+# Vectors that threads share, of each cluster: what moves its nodes, and its mean position. Then of the joint: point,
+# impulse, angular impulse, and sum of its impulses
+STRAIGHT, TURN, CENTRE, VECTORS_OF_SIDE = range(4)
+POINT, PULL, TWIST, PULLED, VECTORS = range(2 * VECTORS_OF_SIDE, 2 * VECTORS_OF_SIDE + 5)
+# First entries in shared memory, in doubles: sums over warps, then over the block; structs, vectors, rotations
 TOTALS = ROWS * WARPS * COLUMNS
-LIGHTNESS = TOTALS + ROWS * COLUMNS
-MEANS = LIGHTNESS + 2
-INVERSE = MEANS + 2 * sizeof(Mean.ctype) // 8
+SIDES = TOTALS + ROWS * COLUMNS
+AHEAD = SIDES + 2 * sizeof(Side.ctype) // 8
+INVERSE = AHEAD + 2 * sizeof(Ahead.ctype) // 8
 SHARED = INVERSE + sizeof(Inverse.ctype) // 8
 TURNS = SHARED + 3 * VECTORS
 
@@ -135,97 +143,57 @@ def vector_at(first: int, pool: wp.array(dtype=wp.float64)) -> wp.vec3d:
 
 
 @wp.func
-def find_response(
+def find_side(
     j: int,
     side: int,
     clusters: Clusters,
     turn: wp.array(dtype=wp.quatd),
-    pool_out: wp.array(dtype=wp.float64),
-    mean_out: wp.array(dtype=Mean),
+    pool: wp.array(dtype=wp.float64),
+    side_out: wp.array(dtype=Side),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
-    """What impulses of coupling j need of one of its clusters, and moments give; of the ground all is zero."""
-    P = joint_point(moments_at(wp.static(MOMENTS[0]), pool_out), turn[0], clusters.arm[j, 0])
-    found = Mean()
-    lightness = wp.float64(0.0)
-    if clusters.begin[j][1 + side] > clusters.begin[j][side]:
-        found = mean_response(moments_at(2 * side, pool_out), P)
-        lightness = wp.float64(1.0) / found.mass
-    mean_out[side] = found
-    pool_out[wp.static(LIGHTNESS) + side] = lightness
-    first = side * wp.static(SIDE)
-    shared_out[first + wp.static(CENTRE)] = found.centre
-    shared_out[first + wp.static(ARM)] = wp.quat_rotate(turn[side], clusters.arm[j, side])
-    shared_out[first + wp.static(AXIS)] = wp.quat_rotate(turn[side], clusters.axis[j])
+    """What impulses of coupling j need of one of its clusters, and moments give."""
+    P = joint_point(moments_at(wp.static(MOMENTS[0]), pool), turn[0], clusters.arm[j, 0])
+    found = side_of(j, side, clusters, turn[side], moments_at(2 * side, pool), P, Mean())
+    side_out[side] = found
+    shared_out[wp.static(VECTORS_OF_SIDE) * side + wp.static(CENTRE)] = found.mean.centre
     if side == 0:
         shared_out[wp.static(POINT)] = P
 
 
 @wp.func
-def turned_by_little(r: wp.vec3d, angle: wp.vec3d) -> wp.vec3d:
-    """A vector after a rotation by a small angle, by its series; the next step makes up for what is left of it."""
-    a = wp.cross(angle, r)
-    b = wp.cross(angle, a)
-    return r + (a + (wp.float64(0.5) * b + wp.float64(1.0 / 6.0) * wp.cross(angle, b)))
-
-
-@wp.func
-def look_ahead(
+def find_ahead(
     side: int,
     dt: wp.float64,
     pool: wp.array(dtype=wp.float64),
-    mean_out: wp.array(dtype=Mean),
-    shared_out: wp.array(dtype=wp.vec3d),
+    sides: wp.array(dtype=Side),
+    ahead_out: wp.array(dtype=Ahead),
 ):
-    """Mean motion of a cluster after the free step, and where it carries point and axis of the joint."""
-    first = side * wp.static(SIDE)
-    centre = shared_out[first + wp.static(CENTRE)]
-    p = vector_at(6 * side, pool)
-    V = pool[wp.static(LIGHTNESS) + side] * p
-    w = mean_out[side].inverse * (vector_at(6 * side + 3, pool) - wp.cross(centre, p))
-    ahead = turned_by_little(shared_out[first + wp.static(ARM)], dt * w)
-    shared_out[first + wp.static(POINT_AHEAD)] = (centre + dt * V) + ahead
-    shared_out[first + wp.static(AXIS_AHEAD)] = turned_by_little(shared_out[first + wp.static(AXIS)], dt * w)
-    mean_out[side].velocity = V
-    mean_out[side].spin = w
+    """Motion of a cluster after the free step."""
+    ahead_out[side] = look_ahead(sides[side], vector_at(6 * side, pool), vector_at(6 * side + 3, pool), dt)
 
 
 @wp.func
 def find_impulses(
     side: int,
     rate: wp.float64,
-    pool: wp.array(dtype=wp.float64),
-    mean: wp.array(dtype=Mean),
+    sides: wp.array(dtype=Side),
     inverse: wp.array(dtype=Inverse),
+    ahead: wp.array(dtype=Ahead),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
     """Impulses of a coupling, and what moves the nodes of one of its clusters; `rate` is 1 / dt [1/s]."""
-    gap = shared_out[wp.static(POINT_AHEAD)] - shared_out[wp.static(SIDE + POINT_AHEAD)]
-    tilt = wp.cross(shared_out[wp.static(SIDE + AXIS_AHEAD)], shared_out[wp.static(AXIS_AHEAD)])
-    J, T = joint_impulses(inverse[0], rate * gap, rate * tilt)
+    J, T = hinge_impulses(inverse[0], ahead[0], ahead[1], rate)
     if side == 0:
         shared_out[wp.static(PULL)] = J
         shared_out[wp.static(TWIST)] = T
     else:
         J = -J
         T = -T
-    first = side * wp.static(SIDE)
-    arm = shared_out[wp.static(POINT)] - shared_out[first + wp.static(CENTRE)]
-    shared_out[first + wp.static(STRAIGHT)] = pool[wp.static(LIGHTNESS) + side] * J
-    shared_out[first + wp.static(TURN)] = mean[side].inverse * (wp.cross(arm, J) + T)
-
-
-@wp.func
-def quickly_turned(q: wp.quatd, angle: wp.vec3d) -> wp.quatd:
-    """`turned`, by series for small angles, which take no root and no quotient."""
-    h = wp.float64(0.25) * wp.dot(angle, angle)
-    if h > wp.float64(1e-6):
-        return turned(q, angle)
-    sine = wp.float64(0.5) * (wp.float64(1.0) - h * (wp.float64(1.0 / 6.0) - h * wp.float64(1.0 / 120.0)))
-    cosine = wp.float64(1.0) - h * (wp.float64(0.5) - h * wp.float64(1.0 / 24.0))
-    found = wp.quatd(sine * angle[0], sine * angle[1], sine * angle[2], cosine) * q
-    square = found[0] * found[0] + found[1] * found[1] + found[2] * found[2] + found[3] * found[3]
-    return (wp.float64(1.5) - wp.float64(0.5) * square) * found
+    first = wp.static(VECTORS_OF_SIDE) * side
+    arm = shared_out[wp.static(POINT)] - sides[side].mean.centre
+    shared_out[first + wp.static(STRAIGHT)] = sides[side].mean.lightness * J
+    shared_out[first + wp.static(TURN)] = sides[side].mean.inverse * (wp.cross(arm, J) + T)
 
 
 @wp.func
@@ -234,7 +202,8 @@ def carry_joint(
     side: int,
     dt: wp.float64,
     start: wp.vec3d,
-    mean: wp.array(dtype=Mean),
+    sides: wp.array(dtype=Side),
+    ahead: wp.array(dtype=Ahead),
     turn_out: wp.array(dtype=wp.quatd),
     shared_out: wp.array(dtype=wp.vec3d),
     place_out: wp.array(dtype=wp.vec3d),
@@ -243,18 +212,19 @@ def carry_joint(
     J = shared_out[wp.static(PULL)]
     T = shared_out[wp.static(TWIST)]
     sign = wp.where(side == 0, wp.float64(1.0), wp.float64(-1.0))
-    turn_out[side] = quickly_turned(turn_out[side], dt * spin_after(mean[side], sign * J, sign * T))
+    spin = spin_after(sides[side].mean, ahead[side].spin, sign * J, sign * T)
+    turn_out[side] = quickly_turned(turn_out[side], dt * spin)
     if side == 0:
-        place_out[j] = place_after(start, shared_out[wp.static(POINT)], mean[0], mean[1], J, T, dt)
+        place_out[j] = place_after(start, shared_out[wp.static(POINT)], sides[0], sides[1].mean, ahead[0], J, T, dt)
         shared_out[wp.static(PULLED)] = shared_out[wp.static(PULLED)] + J
 
 
 @wp.func
 def pulled(one: Pinned, side: int, dt: wp.float64, shared: wp.array(dtype=wp.vec3d)):
     """A node after the free step, which has changed its velocity alone, and the impulses on its cluster."""
-    r = (one.start + one.u) - shared[side * wp.static(SIDE) + wp.static(CENTRE)]
-    turn = wp.cross(shared[side * wp.static(SIDE) + wp.static(TURN)], r)
-    change = one.weight * (shared[side * wp.static(SIDE) + wp.static(STRAIGHT)] + turn)
+    r = (one.start + one.u) - shared[wp.static(VECTORS_OF_SIDE) * side + wp.static(CENTRE)]
+    turn = wp.cross(shared[wp.static(VECTORS_OF_SIDE) * side + wp.static(TURN)], r)
+    change = one.weight * (shared[wp.static(VECTORS_OF_SIDE) * side + wp.static(STRAIGHT)] + turn)
     found = Pinned()
     found.node = one.node
     found.weight = one.weight

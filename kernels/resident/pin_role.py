@@ -11,21 +11,21 @@ import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import barrier, shared_functions, slot_pools, warp_barrier
-from warp_mca.kernels.nodes.cluster import Clusters, Mean
-from warp_mca.kernels.nodes.couple import hinge_inverse
+from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.hinge import Ahead, Side, hinge_inverse
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Held, Nodes, gather_function, hold_node, next_velocity
 from warp_mca.kernels.resident.patch_role import THREADS
 from warp_mca.kernels.resident.pin_joint import (
-    AXIS,
+    AHEAD,
     COLUMNS,
     INVERSE,
-    MEANS,
     MOMENTA,
     PULLED,
     SHARED,
+    SIDES,
     TOTALS,
     TURNS,
     VECTORS,
@@ -33,9 +33,9 @@ from warp_mca.kernels.resident.pin_joint import (
     Pinned,
     Row,
     carry_joint,
+    find_ahead,
     find_impulses,
-    find_response,
-    look_ahead,
+    find_side,
     moment_row,
     momentum_row,
     pinned_node,
@@ -117,8 +117,8 @@ def prepare(
     lane: int,
     clusters: Clusters,
     turn: wp.array(dtype=wp.quatd),
-    pool_out: wp.array(dtype=wp.float64),
-    mean_out: wp.array(dtype=Mean),
+    pool: wp.array(dtype=wp.float64),
+    side_out: wp.array(dtype=Side),
     inverse_out: wp.array(dtype=Inverse),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
@@ -126,10 +126,10 @@ def prepare(
     if lane < 32:
         warp_barrier()
         if lane < 2:
-            find_response(j, lane, clusters, turn, pool_out, mean_out, shared_out)
+            find_side(j, lane, clusters, turn, pool, side_out, shared_out)
         warp_barrier()
         if lane == 0:
-            inverse_out[0] = hinge_inverse(mean_out[0], mean_out[1], shared_out[wp.static(AXIS)])
+            inverse_out[0] = hinge_inverse(side_out[0].mean, side_out[1].mean, side_out[0].axis)
 
 
 @wp.func
@@ -138,18 +138,19 @@ def solve(
     dt: wp.float64,
     rate: wp.float64,
     pool: wp.array(dtype=wp.float64),
+    sides: wp.array(dtype=Side),
     inverse: wp.array(dtype=Inverse),
-    mean_out: wp.array(dtype=Mean),
+    ahead_out: wp.array(dtype=Ahead),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
     """Impulses of the joint from the momenta, by the first warp, for all threads."""
     if lane < 32:
         warp_barrier()
         if lane < 2:
-            look_ahead(lane, dt, pool, mean_out, shared_out)
+            find_ahead(lane, dt, pool, sides, ahead_out)
         warp_barrier()
         if lane < 2:
-            find_impulses(lane, rate, pool, mean_out, inverse, shared_out)
+            find_impulses(lane, rate, sides, inverse, ahead_out, shared_out)
     barrier()
 
 
@@ -197,8 +198,9 @@ def pin_role(precision: str) -> Any:
         orientation_out: wp.array2d(dtype=wp.quatd),
     ):
         """All threads of a block; `pushers`: blocks of threads that give forces."""
-        pool = wp.array(ptr=shared_pool(), shape=(MEANS,), dtype=wp.float64)
-        mean = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * MEANS)), shape=(2,), dtype=Mean)
+        pool = wp.array(ptr=shared_pool(), shape=(SIDES,), dtype=wp.float64)
+        sides = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * SIDES)), shape=(2,), dtype=Side)
+        ahead = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * AHEAD)), shape=(2,), dtype=Ahead)
         inverse = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * INVERSE)), shape=(1,), dtype=Inverse)
         shared = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * SHARED)), shape=(VECTORS,), dtype=wp.vec3d)
         turn = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * TURNS)), shape=(2,), dtype=wp.quatd)
@@ -212,18 +214,18 @@ def pin_role(precision: str) -> Any:
         rate = wp.float64(1.0) / dt
         for n in range(steps):
             sum_moments(one, other, lane, pool)
-            prepare(j, lane, clusters, turn, pool, mean, inverse, shared)
+            prepare(j, lane, clusters, turn, pool, sides, inverse, shared)
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             one.v = push(one, held, nodes, force, dt)
             other.v = push(other, other_held, nodes, force, dt)
             sum_momenta(one, other, lane, pool)
-            solve(lane, dt, rate, pool, inverse, mean, shared)
+            solve(lane, dt, rate, pool, sides, inverse, ahead, shared)
             one, other = pulled(one, 0, dt, shared), pulled(other, 1, dt, shared)
             put_pinned(one, u_out, v_out)
             put_pinned(other, u_out, v_out)
             arrive(wp.static(NODES), count_out)
             if lane < 2:  # no node waits for what follows
-                carry_joint(j, lane, dt, start, mean, turn, shared, place_out)
+                carry_joint(j, lane, dt, start, sides, ahead, turn, shared, place_out)
             if one.node >= 0:
                 keep_speed(one.node, one.v, speed_square_out)
             if other.node >= 0:

@@ -10,6 +10,8 @@ import warp as wp
 
 from warp_mca.kernels.nodes import couple
 from warp_mca.kernels.nodes.cluster import Clusters, Sums
+from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.hinge import Side
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -78,9 +80,9 @@ class CouplingStage:
         self.clusters.part = wp.array(part, dtype=wp.vec4i)
         self.clusters.first_part = wp.array(first, dtype=wp.vec3i)
         self.threads = (len(part), size or 1)
-        self.sums = wp.zeros(len(part), dtype=Sums)
-        self.place = wp.zeros(self.count, dtype=wp.vec3d)
-        self.orientation = wp.zeros((self.count, 2), dtype=wp.quatd)
+        self.sums, self.momenta = wp.zeros(len(part), dtype=Sums), wp.zeros(len(part), dtype=couple.Momenta)
+        self.sides, self.inverse = wp.zeros((self.count, 2), dtype=Side), wp.zeros(self.count, dtype=Inverse)
+        self.point, self.place = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.vec3d)
 
     def new_state(self) -> CouplingState:
         """State before the first step, on the current device."""
@@ -93,16 +95,25 @@ class CouplingStage:
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [couple.sum_parts] if self.count else []
+        return [couple.couple_parts] if self.count else []
+
+    def find_responses(self, step: Step) -> None:
+        """What impulses need and positions give."""
+        state, own, work = step.state, step.state.couplings, self.work
+        inputs = [self.clusters, work.X, work.mass, own.place, state.u, state.v]
+        wp.launch(couple.sum_moments, self.threads, inputs=inputs, outputs=[self.sums], block_dim=BLOCK)
+        inputs = [self.clusters, self.loads.device_bases, self.sums, own.place, own.orientation]
+        inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
+        outputs = [self.sides, self.inverse, self.point, self.place]
+        threads = (self.count, self.threads[1])
+        wp.launch(couple.find_responses, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
 
     def couple(self, step: Step) -> None:
         """Join the clusters, once all their nodes have moved as free ones."""
         state, own, work = step.state, step.state.couplings, self.work
-        inputs = [self.clusters, work.X, work.mass, own.place, own.orientation, state.u, state.v, self.dt]
-        found = [self.sums, self.place, self.orientation]
-        wp.launch(couple.sum_parts, self.threads, inputs=inputs, outputs=found, block_dim=BLOCK)
-        inputs = [self.clusters, self.loads.device_bases, work.X, *found]
-        inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
+        inputs = [self.clusters, work.X, work.mass, self.place, state.u, state.v, self.dt]
+        wp.launch(couple.sum_momenta, self.threads, inputs=inputs, outputs=[self.momenta], block_dim=BLOCK)
+        inputs = [self.clusters, work.X, self.sides, self.inverse, self.point, self.place, self.momenta, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse, own.place, own.orientation]
         outputs.append(self.loads.latest)
         wp.launch(couple.couple_parts, self.threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)

@@ -34,7 +34,14 @@ if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
     from warp_mca.solve.state import State
 
-STAGES = {"element forces", "contact", "joints, driven nodes", "couplings", "free nodes"}  # that the kernel knows
+STAGES = {
+    "element forces",
+    "contact",
+    "joints, driven nodes",
+    "free nodes",
+    "couplings: responses",
+    "couplings",
+}  # known
 MOST_FREE = 4  # nodes that a thread moves in turn at most
 
 

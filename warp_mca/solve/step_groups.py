@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.stage import BESIDE, SUMS, Group, Stage, Step
+from warp_mca.solve.stage import ASIDE, BESIDE, SUMS, Group, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -25,7 +25,7 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
 
 
 def _forces(solver: Solver, level: int | None, common: bool) -> Group:
-    """Forces on nodes.
+    """Forces on nodes, and what couplings need of their places.
 
     Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want it,
     and patches want another division than contact.
@@ -37,6 +37,8 @@ def _forces(solver: Solver, level: int | None, common: bool) -> Group:
         Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
     ]
+    if common and solver.couplings.count:
+        found.append(Stage("couplings: responses", solver.couplings.find_responses, ASIDE))
     return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
 
 

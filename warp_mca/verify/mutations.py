@@ -244,14 +244,14 @@ MUTATIONS: dict[str, Mutation] = {
     "pin_pulls_at_the_mean": Mutation(
         "the impulse of a pin acts at the mean position of a cluster in place of the hinge",
         "kernels/nodes/couple.py",
-        "where[2], where[3], lane, place[j], a, J, wp.cross(P - a.centre, J) + T,",
-        "where[2], where[3], lane, place[j], a, J, T,",
+        "where[2], where[3], lane, place[j], one.mean, J, wp.cross(P - one.mean.centre, J) + T,",
+        "where[2], where[3], lane, place[j], one.mean, J, T,",
     ),
     "pin_stays_upright": Mutation(
         "the arm from the mean position of a cluster to its hinge does not turn with the body",
         "kernels/nodes/couple.py",
-        "orientation_out[j, 0] = turned(q_a, dt * spin_after(a, J, T))",
-        "orientation_out[j, 0] = q_a",
+        "orientation_out[j, 0] = quickly_turned(orientation_out[j, 0], dt * spin_after(one.mean, a.spin, J, T))",
+        "orientation_out[j, 0] = orientation_out[j, 0]",
     ),
     "beta_swapped": Mutation(
         "isotropic and kinematic hardening are swapped: 1 - beta is taken for beta",
