@@ -125,6 +125,21 @@ def test_steps_of_one_launch_take_pins_and_mass_scaling(precision, other, scaled
         assert a == pytest.approx(b, abs=near * np.abs(b).max()), name
 
 
+@pytest.mark.parametrize("scene", [oblique(), hinged(None, None), hinged("b", None)], ids=["block", "ground", "pin"])
+def test_launches_of_many_steps_follow_each_other_without_a_record(scene):
+    scene = replace(scene, contacts=(replace(scene.contacts[0], two_way=False, penalty=1.0),))
+    resident, single = (begun(scene, device="cuda:0", precision="float64") for _ in range(2))
+    assert resident.solver.resident is not None
+    single.solver.resident = None
+    for run in (resident, single):
+        run.advance(until=run.steps.per_interval * 2)
+        for _ in range(20):
+            run.solver.search(run.state)
+            run.solver.step(run.state, 17)
+    u, expected = (run.state.u.numpy() for run in (resident, single))
+    assert u == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
 def test_extremes_are_those_of_the_cpu_and_repeat_bit_for_bit(element):
     scene = oblique()

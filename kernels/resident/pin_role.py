@@ -230,6 +230,7 @@ def pin_role(precision: str) -> Any:
                 keep_speed(one.node, one.v, speed_square_out)
             if other.node >= 0:
                 keep_speed(other.node, other.v, speed_square_out)
+        barrier()
         if lane == 0:
             impulse_out[begin[0]] = shared[wp.static(PULLED)]
             for side in range(2):
