@@ -204,7 +204,8 @@ def pin_role(precision: str) -> Any:
         inverse = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * INVERSE)), shape=(1,), dtype=Inverse)
         shared = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * SHARED)), shape=(VECTORS,), dtype=wp.vec3d)
         turn = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * TURNS)), shape=(2,), dtype=wp.quatd)
-        begin, start = clusters.begin[j], place_out[j]
+        begin = clusters.begin[j]
+        start = place_out[j]  # a copy, which a tuple of assignments would not make
         one = pinned_node(begin[0] + lane, begin[1], start, clusters, nodes, X, u_out, v_out)
         other = pinned_node(begin[1] + lane, begin[2], start, clusters, nodes, X, u_out, v_out)
         held, other_held = hold_node(wp.max(one.node, 0), nodes), hold_node(wp.max(other.node, 0), nodes)
