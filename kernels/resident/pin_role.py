@@ -112,7 +112,7 @@ def sum_momenta(one: Pinned, other: Pinned, lane: int, pool_out: wp.array(dtype=
 
 
 @wp.func
-def prepare(
+def prepare_joint(
     j: int,
     lane: int,
     clusters: Clusters,
@@ -133,7 +133,7 @@ def prepare(
 
 
 @wp.func
-def solve(
+def solve_joint(
     lane: int,
     dt: wp.float64,
     rate: wp.float64,
@@ -215,12 +215,12 @@ def pin_role(precision: str) -> Any:
         rate = wp.float64(1.0) / dt
         for n in range(steps):
             sum_moments(one, other, lane, pool)
-            prepare(j, lane, clusters, turn, pool, sides, inverse, shared)
+            prepare_joint(j, lane, clusters, turn, pool, sides, inverse, shared)
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             one.v = push(one, held, nodes, force, dt)
             other.v = push(other, other_held, nodes, force, dt)
             sum_momenta(one, other, lane, pool)
-            solve(lane, dt, rate, pool, sides, inverse, ahead, shared)
+            solve_joint(lane, dt, rate, pool, sides, inverse, ahead, shared)
             one, other = pulled(one, 0, dt, shared), pulled(other, 1, dt, shared)
             put_pinned(one, u_out, v_out)
             put_pinned(other, u_out, v_out)

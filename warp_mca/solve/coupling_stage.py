@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from warp_mca.solve.stage import Step
     from warp_mca.solve.workspace import Workspace
 
-BLOCK = 256  # nodes of a part of a cluster on a GPU, and threads of its block; a CPU takes clusters whole
+# Threads of a block on a GPU, and nodes of its part of a cluster; a CPU takes clusters whole. Small blocks fit in what
+# patches of elements leave free, see `PatchStage.make_room`.
+BLOCK, PART = 64, 128
 
 
 @dataclass(eq=False)
@@ -66,7 +68,7 @@ class CouplingStage:
         self.clusters.base = wp.array(base if (base >= 0).any() else base[:0], dtype=wp.int32)
         self.clusters.axis = wp.array([item.axis for item in self.items], dtype=wp.vec3d)
         self.clusters.arm = wp.array(np.array([item.arm for item in self.items]), dtype=wp.vec3d)
-        self._make_parts(BLOCK if wp.get_device().is_cuda else None)
+        self._make_parts(PART if wp.get_device().is_cuda else None)
 
     def _make_parts(self, size: int | None) -> None:
         """Cut clusters in parts of so many nodes; None: leave them whole."""
@@ -79,7 +81,7 @@ class CouplingStage:
             first.append((*counts, len(part)))
         self.clusters.part = wp.array(part, dtype=wp.vec4i)
         self.clusters.first_part = wp.array(first, dtype=wp.vec3i)
-        self.threads = (len(part), size or 1)
+        self.threads = (len(part), BLOCK if size else 1)
         self.sums, self.momenta = wp.zeros(len(part), dtype=Sums), wp.zeros(len(part), dtype=couple.Momenta)
         self.sides, self.inverse = wp.zeros((self.count, 2), dtype=Side), wp.zeros(self.count, dtype=Inverse)
         self.point, self.place = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.vec3d)
@@ -96,6 +98,11 @@ class CouplingStage:
     def kernels(self) -> list[Any]:
         """Those of a step."""
         return [couple.couple_parts] if self.count else []
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of threads that take part."""
+        return self.threads[0] if self.count else 0
 
     def find_responses(self, step: Step) -> None:
         """What impulses need and positions give."""
