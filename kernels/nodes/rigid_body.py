@@ -10,13 +10,13 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.cluster import Clusters, Mean
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, spin_after
 from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.joint_torque import wait_for_block
 from warp_mca.kernels.nodes.node import nodal_force_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
-from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster, spin_of
+from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
 from warp_mca.kernels.nodes.symmetric import factorise
 from warp_mca.kernels.records.extremes import keep_speed
@@ -177,7 +177,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: boo
                 pull_cluster(p, lane, rows.place[p], clusters, X, span, mean_out, point_out, pin_impulse_out,
                              u_out, v_out, speed_square_out)
                 if lane == 0:
-                    w = spin_of(mean_out[p], pin_impulse_out[p, 0], pin_impulse_out[p, 1])
+                    w = spin_after(mean_out[p], mean_out[p].spin, pin_impulse_out[p, 0], pin_impulse_out[p, 1])
                     orientation_out[p] = turned(orientation_out[p], span * w)
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]

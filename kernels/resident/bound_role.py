@@ -134,10 +134,10 @@ def bound_role(precision: str, partial: bool, turned: bool) -> Any:
             if mine:
                 total = gather_held(held, nodes.more_slots, force)
                 other_total = gather_held(other_held, nodes.more_slots, force)
-                free = next_velocity(held, one.v, total, nodes.gravity, dt)
+                free = next_velocity(held, one.v, total, nodes, dt)
                 one.v = free
                 one.u = one.u + dt * free
-                other.v = next_velocity(other_held, other.v, other_total, nodes.gravity, dt)
+                other.v = next_velocity(other_held, other.v, other_total, nodes, dt)
                 other.u = other.u + dt * other.v
                 if lane < pairs:
                     one, other = tie(lane, one, other, bonds)

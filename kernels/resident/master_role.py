@@ -190,7 +190,7 @@ def master_role(precision: str, turned: bool) -> Any:
                     for c in range(3):
                         share[c] += exchange(share[c], 1 << k)
                 if mine:
-                    v = next_velocity(held, v, total + share, nodes.gravity, dt)
+                    v = next_velocity(held, v, total + share, nodes, dt)
                     u = u + dt * v
                     v_out[held.node] = v
                     u_out[held.node] = u

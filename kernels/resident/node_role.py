@@ -29,6 +29,7 @@ class Nodes:
         first_slots, more_slots: slots of the forces on each node, see `elements.stage.gather_lists`.
         free: nodes that neither belong to a master nor are bound, shape (free_count,), int32.
         gravity: [m/s^2].
+        weight: acceleration of each node by its weight [m/s^2], shape (node_count,), vec3d; empty where it is gravity.
     """
 
     mass: wp.array(dtype=wp.float64)
@@ -39,6 +40,7 @@ class Nodes:
     more_slots: wp.array(dtype=wp.vec4i)
     free: wp.array(dtype=wp.int32)
     gravity: wp.vec3d
+    weight: wp.array(dtype=wp.vec3d)
 
 
 @wp.struct
@@ -97,8 +99,11 @@ def hold_node(i: int, nodes: Nodes):
 
 
 @wp.func
-def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, gravity: wp.vec3d, dt: wp.float64):
+def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, nodes: Nodes, dt: wp.float64):
     """As `kernels.nodes.node.integrate_kernel` has it [m/s]."""
+    gravity = nodes.gravity
+    if nodes.weight.shape[0] > 0:
+        gravity = nodes.weight[held.node]
     return v + dt * hold(held.role, held.inverse * total + gravity)
 
 
@@ -199,7 +204,7 @@ def free_role(precision: str, contact: bool, turned: bool) -> Any:
         for k in range(begin, nodes.free.shape[0], stride):
             held = hold_node(nodes.free[k], nodes)
             total = all_forces(held, nodes.more_slots, force, contact_force_out)
-            v = next_velocity(held, v_out[held.node], total, nodes.gravity, dt)
+            v = next_velocity(held, v_out[held.node], total, nodes, dt)
             v_out[held.node] = v
             u_out[held.node] = u_out[held.node] + dt * v
             keep_speed(held.node, v, speed_square_out)
@@ -231,7 +236,7 @@ def free_role(precision: str, contact: bool, turned: bool) -> Any:
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             if mine:
                 total = all_forces(held, nodes.more_slots, force, contact_force_out)
-                v = next_velocity(held, v, total, nodes.gravity, dt)
+                v = next_velocity(held, v, total, nodes, dt)
                 u = u + dt * v
                 v_out[held.node] = v
                 u_out[held.node] = u

@@ -206,7 +206,7 @@ class _Loop:
     def _interval(self, interval: int, last: int) -> None:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
-        for number, part in enumerate(self.steps.parts()):
+        for number, part in enumerate(self.steps.parts(interval)):
             end = first + part.count
             if self.state.steps < min(end, last):
                 self._part(part, first, min(end, last), interval if number == 0 else None)

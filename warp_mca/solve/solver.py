@@ -23,6 +23,7 @@ from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
+from warp_mca.solve import coupling_stage
 from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
@@ -97,14 +98,13 @@ class Solver:
         scenes = [model.passes[k * passes : (k + 1) * passes] for k in range(self.layout.count)]
         self.normal_force = NormalForce(scenes if passes else [], self.threads)
         self.contacts = [ContactStage(model.passes[k::passes], model, k, self.normal_force) for k in range(passes)]
-        if self.contacts:
-            blocks = max(stage.blocks for stage in self.contacts)
-            for stage in self.elements:
-                stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
         dt = self.dt / model.common_steps
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, dt)
         self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, dt)
+        if blocks := max((stage.blocks for stage in self.contacts), default=0) + self.couplings.blocks:
+            for stage in self.elements:
+                stage.make_room(blocks)
         self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, self._early)
         self.rigid = RigidStage(model, self.nodes, self.precision)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
@@ -164,7 +164,7 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
         sums = self.records.kernels() + self.loads.kernels() + self.absorbing.record_kernels()
-        sums += self.couplings.kernels() + self.rigid.kernels()
+        sums += self.rigid.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [watch.watch_nodes] if self.chains and self.contacts else []
@@ -177,6 +177,7 @@ class Solver:
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
             (nodes + elements, ELEMENT_BLOCK),
             *([self.resident.kernels()] if self.resident else []),
+            (self.couplings.kernels(), coupling_stage.BLOCK),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
