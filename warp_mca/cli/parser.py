@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import warp_mca as mca
 from warp_mca.cli import commands, run
+from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.elements import ELEMENTS
 
 WELCOME = """\
@@ -56,6 +57,7 @@ def _run(parser: argparse.ArgumentParser) -> None:
         metavar="auto|N",
         help="let N groups of elements take steps of their own; auto: as many as suit the device (default: one step)",
     )
+    add_accuracy(parser)
     parser.add_argument(
         "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
     )

@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
+from warp_mca.accuracy.plan import planned
+from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.base.errors import GuardError, RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.precision import check_range
@@ -49,6 +52,7 @@ def run(
     force: bool = False,
     refine: float | None = None,
     mass_scaling: float | str | None = None,
+    accuracy: float | str | Accuracy | None = None,
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
@@ -70,6 +74,8 @@ def run(
         refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
         mass_scaling: in place of `ImpactPhase.mass_scaling`: how many times longer the stable step is to be, or that
             step as "2e-8s", by added mass.
+        accuracy: greatest error of the first force peak, the impulse and the contact duration, as 0.02 or "2%": mesh,
+            step and contact springs are then chosen, but those that are given here (docs/accuracy.md).
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
@@ -90,19 +96,44 @@ def run(
     check_recorders(recorders)
     settings = settings_of(device, precision, threads, multi_rate)
     check_files(recorders, None if out is None else check_output(out, force=force))
+    plan = None
+    if accuracy is not None:
+        asked = accuracy_of(accuracy).keeping(refine=refine, mass_scaling=mass_scaling, multi_rate=multi_rate)
+        again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
+        plan = planned(scene, asked, device=device, finished_meshes=meshes is not None, run=again)
+        scene, settings = plan.scene, replace(settings, **plan.variant.options)
 
     def result() -> Result:
-        if scene.t_end is not None:
-            return _cycle(scene, meshes, span, tell, settings, recorders)
-        (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
-        if found.stopped is not None:
-            raise GuardError(found.stopped)
-        return found
+        ready = plan.ready if plan and not recorders else None
+        found = ready or _single(scene, meshes, span, tell, settings, recorders)
+        return plan.judged(found) if plan else found
 
     if out is None:
         return result()
     with hold(out, force=force) as folder:
         return write(result(), folder, force=force)
+
+
+def _single(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    recorders: Sequence[Recorder],
+) -> Result:
+    """One impact, or many in turn; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: the run lost its footing.
+    """
+    if scene.t_end is not None:
+        return _cycle(scene, meshes, span, tell, settings, recorders)
+    (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
+    if found.stopped is not None:
+        raise GuardError(found.stopped)
+    return found
 
 
 def _cycle(
