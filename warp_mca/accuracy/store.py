@@ -72,7 +72,7 @@ class Family:
     scene: str
     features: Mapping[str, str]
     mesh: Mapping[str, Any]
-    any_value: Mapping[str, Any]
+    any_value: tuple[str, ...]
     no_limit: Mapping[str, str]
     variants: tuple[Variant, ...]
     sizes: tuple[Size, ...]
@@ -150,7 +150,7 @@ def _family(name: str, data: Mapping[str, Any]) -> Family:
         scene=name,
         features=data["features"],
         mesh=mesh,
-        any_value=data["any_value"],
+        any_value=tuple(data["any_value"]),
         no_limit=data["no_limit"],
         variants=variants,
         sizes=_sizes(len(variants), data["scenes"]),
