@@ -4,9 +4,9 @@ python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --workers 10 --d
 python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 --deadline 350
 python -m benchmarks.accuracy render
 
-`both` does the one and the other. `learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store;
+`learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store;
 `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
-docs/accuracy.json as it goes; `render` puts its tables into docs/accuracy.md.
+docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into docs/accuracy.md.
 """
 
 from __future__ import annotations

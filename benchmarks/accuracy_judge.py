@@ -1,4 +1,4 @@
-"""Owns how choices of `--accuracy` are judged: true errors, estimates, cost beside the cheapest variant; their table."""
+"""Owns how choices of `--accuracy` are judged: true errors, estimates, cost over the cheapest variant; their table."""
 
 from __future__ import annotations
 

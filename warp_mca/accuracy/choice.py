@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from warp_mca.accuracy.prediction import Expected, expected_errors
 from warp_mca.accuracy.request import Accuracy
@@ -41,19 +41,21 @@ class Choice:
 def choices(
     family: Family, parameters: Mapping[str, object], asked: Accuracy, figures: Sequence[str], step: StepCost, cpu: bool
 ) -> list[Choice]:
-    """Variants of a family that keep what the user typed, from the cheapest on; `step` is the cost of one."""
+    """Variants of a family that keep what the user typed, from the cheapest on; `step` is the cost of one.
+
+    Bodies that must keep their masses take the same meshes without mass scaling, whose errors are smaller.
+    """
+    variants = [replace(item, mass_scaling=None) if asked.full else item for item in family.variants]
     found = [
         Choice(variant, k, expected_errors(family, parameters, k, figures), cost_of(family.sizes[k], step, cpu))
-        for k, variant in enumerate(family.variants)
+        for k, variant in enumerate(variants)
         if keeps(variant, asked)
     ]
     return sorted(found, key=lambda choice: choice.cost)
 
 
 def keeps(variant: Variant, asked: Accuracy) -> bool:
-    """Whether a variant leaves everything that was typed as it is, and masses where they must stay."""
-    if asked.full and variant.mass_scaling is not None:
-        return False
+    """Whether a variant leaves everything that was typed as it is."""
     return all(variant.knobs[name] == value for name, value in asked.typed.items() if name in variant.knobs)
 
 

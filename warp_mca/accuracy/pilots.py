@@ -31,6 +31,7 @@ ORDER = 1.5  # assumed before the run [-]
 MARGIN = 0.8  # of what was asked that an error foreseen may reach [-]
 SPRINGS = 0.3  # of what was asked that contact springs may give away [-]
 STIFFEST = 30.0  # penalty [-]
+SHRINKS = 0.6  # power of the size of cells with which the share of springs goes, measured on `two_link` [-]
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Pilots:
         if self.result is None:
             assert self.variant.refine is not None
             sizes, runs = (*sizes, 1.0 / self.variant.refine), (*runs, found)
-        lost = _spring_loss(result) if self.auto else 0.0
+        lost = _spring_loss(result)
         shares: dict[str, float | str] = {}
         for name in self.bound:
             resolution = self.resolution if name == "contact_duration" else 0.0
@@ -73,7 +74,8 @@ class Pilots:
             if limit.value is None or value is None:
                 shares[name] = f"it does not converge: {limit.why}"
             else:
-                shares[name] = max(abs(value / limit.value - 1.0), 0.5 * (limit.left or 0.0)) + lost
+                error = max(abs(value / limit.value - 1.0), 0.5 * (limit.left or 0.0))
+                shares[name] = error + lost if self.auto else max(error, lost)
         return shares
 
 
@@ -97,16 +99,16 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     if all(known[1][name] is None for name in bound):
         raise bad_value("accuracy", asked.share, "a coarse run of the scene has no contact force that it could bind")
     auto = any(contact.penalty == "auto" for contact in start.applied(scene).contacts)
-    lost = _spring_loss(second) if auto else 0.0
+    springs = Springs(_spring_loss(second), auto)
     errors = {name: error for name in bound if (error := _foreseen(known[0][name], known[1][name])) is not None}
-    level = _level(asked, errors, lost, typed is not None, second)
+    level = _level(asked, errors, springs, typed is not None, second)
     worst = max(errors, key=lambda name: errors[name], default="")
     at = f" after coarse runs that leave {errors[worst]:.1%} in {worst}" if worst else ""
     variant = replace(start, refine=level * base)
-    springs = f", penalty {penalty_of(start):g}" if stiffer else ""
+    stiff = f", penalty {penalty_of(start):g}" if stiffer else ""
     return Pilots(
         variant=variant,
-        why=f"refine {level * base:.3g}{springs}{at}",
+        why=f"refine {level * base:.3g}{stiff}{at}",
         sizes=tuple(1.0 / (level * base) for level in LEVELS),
         figures=known,
         resolution=scene.impact.output_interval,
@@ -118,6 +120,23 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
 
 def _pilot(scene: Scene, variant: Variant, run: Callable[..., Result]) -> Result:
     return run(variant.applied(scene), **variant.options)
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Contact springs of the second pilot.
+
+    Attributes:
+        lost: of the greatest force [-], by estimate.
+        auto: the mesh chooses their penalty, so that the loss stays; otherwise they are softer in larger cells.
+    """
+
+    lost: float
+    auto: bool
+
+    def left(self, level: float) -> float:
+        """What is lost with another refine over that of the scene [-]."""
+        return self.lost if self.auto else self.lost * (LEVELS[1] / level) ** SHRINKS
 
 
 def _spring_loss(result: Result) -> float:
@@ -152,34 +171,38 @@ def _foreseen(first: float | None, second: float | None) -> float | None:
     return abs(first / second - 1.0) / ((LEVELS[1] / LEVELS[0]) ** ORDER - 1.0)
 
 
-def _level(asked: Accuracy, errors: Mapping[str, float], lost: float, fixed: bool, second: Result) -> float:
-    """Refine of the run over that of the scene [-].
+def _level(asked: Accuracy, errors: Mapping[str, float], springs: Springs, fixed: bool, second: Result) -> float:
+    """Refine of the run over that of the scene [-]: the first level whose error stays within what was asked.
 
     Args:
         asked: accuracy.
         errors: foreseen of the second pilot's figures [-].
-        lost: that springs give away whatever the mesh [-].
+        springs: of its contacts.
         fixed: the user typed the scene's refine.
         second: that pilot.
 
     Raises:
         RequestError: no mesh is fine enough.
     """
-    allowed, error = MARGIN * asked.share - lost, max(errors.values(), default=0.0)
-    coarse = LEVELS[1]
+    coarse, error = LEVELS[1], max(errors.values(), default=0.0)
+
+    def left(level: float) -> float:
+        return error * (coarse / level) ** ORDER + springs.left(level)
+
     if fixed:
-        left = error * coarse**ORDER + lost
-        if left > asked.share:
-            remedy = f"this mesh leaves about {left:.1%} by coarse runs of the scene; leave refine out, or ask for that"
-            raise bad_value("accuracy", asked.share, remedy)
-        return 1.0
-    if error <= allowed:
-        return coarse
-    wanted = coarse * (error / allowed) ** (1.0 / ORDER) if allowed > 0.0 else math.inf
-    level = LEAST if wanted <= LEAST else LEAST * STEP ** math.ceil(math.log(wanted / LEAST, STEP) - 1e-9)
-    if level <= MOST:
-        return level
-    best = error * (coarse / MOST) ** ORDER / MARGIN + lost
+        if left(1.0) <= asked.share:
+            return 1.0
+        remedy = f"this mesh leaves about {left(1.0):.1%} by coarse runs of the scene; leave it out, or ask for that"
+        raise bad_value("refine", asked.typed["refine"], remedy)
+    count = math.floor(math.log(MOST / LEAST, STEP) + 1e-9)
+    levels = [coarse, *(LEAST * STEP**k for k in range(count + 1))]
+    for level in levels:
+        if left(level) <= MARGIN * asked.share:
+            return level
+    if "penalty" in asked.typed and springs.left(MOST) > 0.5 * left(MOST):
+        remedy = f"springs of this penalty give away about {springs.left(1.0):.1%}; leave it out, or give a larger one"
+        raise bad_value("penalty", asked.typed["penalty"], remedy)
     steps = second.summary["n_elements"] * second.summary["n_steps"] * (MOST / coarse) ** 4
-    remedy = f"about {best:.1%} can be had with refine {MOST:g} times the scene's, for some {steps:.1e} element-steps"
-    raise bad_value("accuracy", asked.share, f"{remedy}; ask for no less, or refine the scene where bodies touch")
+    remedy = f"about {left(MOST) / MARGIN:.1%} can be had, with refine {MOST:g} times the scene's in some {steps:.1e}"
+    remedy += " element-steps; ask for no less, or refine the scene where bodies touch"
+    raise bad_value("accuracy", asked.share, remedy)
