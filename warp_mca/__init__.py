@@ -37,6 +37,7 @@ from warp_mca.scene import (
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
+    from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.geometry import Box, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
@@ -62,6 +63,7 @@ _LAZY = {
     "make_scene": "warp_mca.scene.catalogue",
     "Result": "warp_mca.results.result",
     "load": "warp_mca.results.storage",
+    "tradeoff": "warp_mca.accuracy.tradeoff",
     "quality_table": "warp_mca.report.quality",
     "mesh": "warp_mca.runs.simulation",
     "run": "warp_mca.runs.simulation",
@@ -109,6 +111,7 @@ __all__ = [
     "quality_table",
     "run",
     "run_batch",
+    "tradeoff",
     "load",
     "Result",
     "McaError",

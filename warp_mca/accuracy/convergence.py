@@ -20,6 +20,8 @@ ORDERS = (
 LEAST_ORDER = 0.25  # below which differences hardly shrink: no limit can be told [-]
 STEADY = 0.02  # share of a figure; a series that moves by less has its limit there, whatever its differences do [-]
 
+NO_RUN = "no run has this figure"
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -50,7 +52,7 @@ def limit_of(sizes: Sequence[float], values: Sequence[float | None], resolution:
     """
     known = [value for value in values if value is not None]
     if not known or len(known) < len(values):
-        return Limit(None, why="not every run has this figure" if known else "no run has this figure")
+        return Limit(None, why="not every run has this figure" if known else NO_RUN)
     h, f = tuple(sizes)[-3:], tuple(known)[-3:]
     if len(f) == 1 or f[-1] == 0.0:
         return Limit(f[-1])

@@ -15,13 +15,17 @@ NAMES = (*BOUND, "max_plastic_strain", "path_stress")  # [-], [Pa]
 
 
 def figures_of(result: Result) -> Figures:
-    """Headline figures of a run, each None where it has none: a contact without a peak, elastic bodies, no path."""
+    """Headline figures of a run, each None where it has none: a contact without a peak, elastic bodies, no path.
+
+    A contact that is still open when the run ends has no duration.
+    """
     summary = result.summary
+    lasts = summary.get("contact_open_at_end")
     peaks = summary["F_n_peaks"]
     return {
         "F_n_first_peak": float(peaks[0][1]) if peaks else None,
         "impulse": normal_impulse(result) or None,
-        "contact_duration": summary["contact_duration"] or None,
+        "contact_duration": None if lasts else summary["contact_duration"] or None,
         "max_plastic_strain": summary["max_plastic_strain"] or None,
         "path_stress": max((float(path.von_mises.max()) for path in result.paths if path.stress.size), default=None),
     }

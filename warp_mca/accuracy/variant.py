@@ -54,7 +54,8 @@ class Variant:
             RequestError: a value is not allowed in this scene.
         """
         if self.parameters:
-            scene = load_source(scene.name).build({**scene.parameters, **self.parameters})
+            built = load_source(scene.name).build({**scene.parameters, **self.parameters})
+            scene = replace(built, refine=scene.refine)
         scene = with_options(scene, self.refine, self.mass_scaling, None)
         if self.penalty is not None:
             scene = replace(scene, contacts=tuple(replace(item, penalty=self.penalty) for item in scene.contacts))

@@ -1,0 +1,101 @@
+"""Owns promising combinations: which knobs to turn together, foreseen from what each does alone.
+
+Changes of a figure are taken to multiply, as are those of the cost. Of all combinations those are kept that no other
+one beats in both; errors that cancel are distrusted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.knobs import Trial
+from warp_mca.accuracy.measure import Bench, Measured
+from warp_mca.accuracy.variant import Variant
+
+Array = NDArray[np.float64]
+
+BETTER = 0.98  # error over that of a cheaper combination below which more is worth its cost [-]
+DISTRUST = 0.1  # share of each change, without its sign, that is added to the foreseen error
+
+
+def combinations(
+    bench: Bench, runs: Sequence[Measured], truth: Mapping[str, float | None], floor: float, most: int
+) -> list[tuple[Trial, float]]:
+    """Combinations of two knobs or more on the foreseen frontier, and the cost of each over the scene as written [-].
+
+    Args:
+        bench: that ran them.
+        runs: variants with one knob changed.
+        truth: limits of the figures.
+        floor: error below which figures are equally good [-]: that of the reference itself.
+        most: number of combinations; they are spread along the frontier.
+    """
+    base = bench.base
+    names = [name for name in BOUND if truth.get(name) and base is not None and base.figures.get(name)]
+    if base is None or not names:
+        return []
+    by_knob: dict[str, list[Measured]] = {}
+    for run in runs:
+        if not run.stopped and all(run.figures.get(name) for name in names):
+            by_knob.setdefault(run.trial.knob, []).append(run)
+    rows = [
+        np.vstack([_nothing(names), *(_change(bench, base, run, names) for run in own)]) for own in by_knob.values()
+    ]
+    if len(rows) < 2:
+        return []
+    totals = reduce(lambda left, right: (left[:, None, :] + right[None, :, :]).reshape(-1, left.shape[1]), rows)
+    start = np.log([(base.figures[name] or 1.0) / (truth[name] or 1.0) for name in names])
+    changes, distrust = totals[:, 1 : 1 + len(names)], totals[:, 1 + len(names) :]
+    error = np.maximum(np.abs(np.expm1(changes + start)).max(axis=1) + DISTRUST * distrust.max(axis=1), floor)
+    chosen = np.stack(np.unravel_index(np.arange(len(totals)), [len(row) for row in rows]), axis=1)
+    several = (chosen > 0).sum(axis=1) > 1
+    front = [k for k in _frontier(totals[:, 0], error) if several[k]]
+    spread = np.unique(np.linspace(0, len(front) - 1, min(most, len(front))).round().astype(int)) if front else []
+    groups = list(by_knob.values())
+    return [
+        (
+            Trial(
+                "combined", merged([own[i - 1].trial.variant for own, i in zip(groups, chosen[k], strict=True) if i])
+            ),
+            cost,
+        )
+        for k, cost in ((front[n], math.exp(totals[front[n], 0])) for n in spread)
+    ]
+
+
+def merged(variants: Sequence[Variant]) -> Variant:
+    """One variant with what all of them change; they change different things."""
+    options: dict[str, object] = {}
+    parameters: dict[str, object] = {}
+    for variant in variants:
+        parameters |= variant.parameters
+        options |= {name: value for name, value in variant.knobs.items() if name not in variant.parameters}
+    return Variant(**options, parameters=parameters)  # pyright: ignore[reportArgumentType]
+
+
+def _nothing(names: Sequence[str]) -> Array:
+    return np.zeros(1 + 2 * len(names))
+
+
+def _change(bench: Bench, base: Measured, run: Measured, names: Sequence[str]) -> Array:
+    """Logarithms of cost and figures over those of the scene as written, then the sizes of the latter [-]."""
+    cost = math.log(bench.work_of(run) / bench.work_of(base))
+    values = [(run.figures[name] or 1.0) / (base.figures[name] or 1.0) for name in names]
+    changes = np.log(np.abs(values))
+    return np.concatenate([[cost], changes, np.abs(changes)])
+
+
+def _frontier(cost: Array, error: Array) -> list[int]:
+    """Those that no other beats in both, by rising cost."""
+    found, best = [], math.inf
+    for k in np.lexsort((error, cost)):
+        if error[k] < BETTER * best:
+            found.append(int(k))
+            best = float(error[k])
+    return found
