@@ -14,8 +14,8 @@ from warp_mca.accuracy.choice import Choice, choices
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import Pilots, run_pilots
-from warp_mca.accuracy.request import Accuracy
-from warp_mca.accuracy.store import family_of
+from warp_mca.accuracy.request import Accuracy, accuracy_of
+from warp_mca.accuracy.store import Family, family_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import bad_value
 from warp_mca.runs.advice import LOGGER
@@ -97,24 +97,37 @@ class Plan:
         return replace(result, summary={**result.summary, "accuracy": accuracy})
 
 
-def planned(scene: Scene, asked: Accuracy, *, device: str, finished_meshes: bool, run: Run) -> Plan:
-    """Choose how to model a scene, and say so.
+def planned(
+    scene: Scene,
+    accuracy: float | str | Accuracy | None,
+    typed: Mapping[str, object],
+    device: str,
+    meshes: object,
+    run: Run,
+) -> Plan | None:
+    """Choose how to model a scene, and say so; None without an accuracy.
 
     Args:
         scene: as its user wrote it.
-        asked: accuracy.
+        accuracy: as `warp_mca.run` takes it.
+        typed: options of the run that must stay, unless they are None.
         device: as "cpu" or "cuda:0".
-        finished_meshes: the run is given meshes.
+        meshes: finished ones that the run is given, or None.
         run: makes coarse runs of the scene.
 
     Raises:
         RequestError: what is asked cannot be had, or contradicts what was typed.
     """
-    begin = time.perf_counter()
-    _check(scene, asked, finished_meshes)
+    if accuracy is None:
+        return None
+    begin, asked = time.perf_counter(), accuracy_of(accuracy).keeping(**typed)
+    _check(scene, asked, meshes is not None)
     reasons = {**without_limit(scene), **_without_strain(scene)}
+    family = family_of(scene)
+    reasons = {**(family.no_limit if family else {}), **reasons}
     bound = [name for name in BOUND if name not in reasons]
-    found = _from_family(scene, asked, reasons, bound, device) or _from_pilots(scene, asked, reasons, bound, run)
+    found = _from_family(family, scene, asked, reasons, bound, device) if family else None
+    found = found or _from_pilots(scene, asked, reasons, bound, run)
     logger = logging.getLogger(LOGGER)
     logger.info("%s", f"accuracy {asked.share:.3g}: {found.why}")
     for name, why in found.reasons.items():
@@ -143,12 +156,9 @@ def _materials(material: Elastic | Mapping[str, Elastic]) -> Sequence[Elastic]:
 
 
 def _from_family(
-    scene: Scene, asked: Accuracy, reasons: Mapping[str, str], bound: Sequence[str], device: str
+    family: Family, scene: Scene, asked: Accuracy, reasons: Mapping[str, str], bound: Sequence[str], device: str
 ) -> Plan | None:
-    """By what scenes of the same family have shown; None where none has, or no variant is accurate enough."""
-    family = family_of(scene)
-    if family is None:
-        return None
+    """By what scenes of the same family have shown; None where no variant is accurate enough."""
     cpu = device.startswith("cpu")
     found = choices(family, scene.parameters, asked, bound, cost_of(device), cpu)
     within = [item for item in found if item.greatest <= asked.share]

@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from warp_mca.accuracy.plan import planned
-from warp_mca.accuracy.request import Accuracy, accuracy_of
+from warp_mca.accuracy.plan import Plan, planned
+from warp_mca.accuracy.request import Accuracy
 from warp_mca.base.errors import GuardError, RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.precision import check_range
@@ -87,31 +87,53 @@ def run(
         RequestError: the request cannot be carried out; nothing was written.
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
-    from warp_mca.recorders.frames import check_files
-
     check_scene("scene", scene)
     scene = with_options(scene, refine, mass_scaling, meshes)
-    tell = teller(progress)
-    span = span_of(scene, duration)
-    check_recorders(recorders)
+    tell, span = teller(progress), span_of(scene, duration)
     settings = settings_of(device, precision, threads, multi_rate)
-    check_files(recorders, None if out is None else check_output(out, force=force))
-    plan = None
-    if accuracy is not None:
-        asked = accuracy_of(accuracy).keeping(refine=refine, mass_scaling=mass_scaling, multi_rate=multi_rate)
-        again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
-        plan = planned(scene, asked, device=device, finished_meshes=meshes is not None, run=again)
-        scene, settings = plan.scene, replace(settings, **plan.variant.options)
-
-    def result() -> Result:
-        ready = plan.ready if plan and not recorders else None
-        found = ready or _single(scene, meshes, span, tell, settings, recorders)
-        return plan.judged(found) if plan else found
-
+    _check_files(recorders, out, force)
+    typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
+    again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
+    plan = planned(scene, accuracy, typed, device, meshes, again)
+    result = partial(_result, plan, scene, meshes, span, tell, settings, recorders)
     if out is None:
         return result()
     with hold(out, force=force) as folder:
         return write(result(), folder, force=force)
+
+
+def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None, force: bool) -> None:
+    """Refuse what is no recorder, and files that cannot be written.
+
+    Raises:
+        RequestError: so it is.
+    """
+    from warp_mca.recorders.frames import check_files
+
+    check_recorders(recorders)
+    check_files(recorders, None if out is None else check_output(out, force=force))
+
+
+def _result(
+    plan: Plan | None,
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    recorders: Sequence[Recorder],
+) -> Result:
+    """One impact, or many in turn, of the scene or what was planned in its place; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: the run lost its footing.
+    """
+    if plan is None:
+        return _single(scene, meshes, span, tell, settings, recorders)
+    settings = replace(settings, **plan.variant.options)
+    ready = None if recorders else plan.ready
+    return plan.judged(ready or _single(plan.scene, meshes, span, tell, settings, recorders))
 
 
 def _single(
