@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
+from benchmarks.accuracy_calibrate import calibrated
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, render
 from benchmarks.accuracy_measure import FINE, Table, jobs_of, measured, row_of, run_jobs, sampled, stored, truth_of
@@ -89,8 +90,8 @@ def learn(args: argparse.Namespace, families: list[Family], until: float) -> Non
     found: dict[str, Any] = {}
     for tables in _tables(args, scenes, families, until):
         found = {f.scene: stored(f, scenes[f.scene], tables[f.scene]) for f in families}
-        known = {name: item for name, item in found.items() if item["scenes"]}
-        target.write_text(json.dumps({"families": {**before, **known}}, indent=None) + "\n", encoding="utf-8")
+    known = {name: calibrated(name, item) for name, item in found.items() if item["scenes"]}
+    target.write_text(json.dumps({"families": {**before, **known}}) + "\n", encoding="utf-8")
     print({name: len(item["scenes"]) for name, item in found.items()})
 
 

@@ -113,7 +113,7 @@ def jobs_of(family: Family, scenes: Sequence[Values], device: str, scale: float)
     On a GPU scenes of `two_link` of equal duration share a batch; references are alone.
     """
     together = BATCH if device != "cpu" and family.scene == "two_link" else 1
-    order = sorted(range(len(scenes)), key=lambda k: scenes[k].get("duration", 0.0))
+    order = sorted(range(len(scenes)), key=lambda k: (scenes[k].get("duration", 0.0), _stiffness(scenes[k])))
     parts: list[tuple[int, list[int]]] = []
     for _, group in groupby(order, key=lambda k: scenes[k].get("duration")):
         members = list(group)
@@ -126,6 +126,11 @@ def jobs_of(family: Family, scenes: Sequence[Values], device: str, scale: float)
             for number, piece in pieces
         ]
     return jobs
+
+
+def _stiffness(values: Values) -> float:
+    """Greatest modulus of a scene [Pa]: scenes of a batch take the shortest step of all."""
+    return max((values[name] for name in ("E_tip", "E_body") if name in values), default=70e9)
 
 
 def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[str, int, int, Row]]:

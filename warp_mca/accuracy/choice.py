@@ -12,8 +12,6 @@ from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
 from warp_mca.runs.rate_groups import StepCost
 
-SPREADS = 1.0  # standard deviations by which an expected error must stay within the bound
-
 
 @dataclass(frozen=True)
 class Choice:
@@ -24,17 +22,19 @@ class Choice:
         number: of the variant in its family.
         errors: expected, by figure; None where too few scenes tell.
         cost: of its steps, as stored for the device [s].
+        spreads: as in `Family`.
     """
 
     variant: Variant
     number: int
     errors: Mapping[str, Expected | None]
     cost: float
+    spreads: float = 1.0
 
     @property
     def greatest(self) -> float:
         """The greatest error that is allowed for [-]; infinite where one is not known."""
-        bounds = [math.inf if error is None else error.bound(SPREADS) for error in self.errors.values()]
+        bounds = [math.inf if error is None else error.bound(self.spreads) for error in self.errors.values()]
         return max(bounds, default=0.0)
 
 
@@ -47,7 +47,13 @@ def choices(
     """
     variants = [replace(item, mass_scaling=None) if asked.full else item for item in family.variants]
     found = [
-        Choice(variant, k, expected_errors(family, parameters, k, figures), cost_of(family.sizes[k], step, cpu))
+        Choice(
+            variant=variant,
+            number=k,
+            errors=expected_errors(family, parameters, k, figures),
+            cost=cost_of(family.sizes[k], step, cpu),
+            spreads=family.spreads,
+        )
         for k, variant in enumerate(variants)
         if keeps(variant, asked)
     ]

@@ -172,7 +172,7 @@ def _from_family(
         asked=asked,
         why=_why(chosen, found, len(family.scenes), family.sizes[chosen.number].elements),
         reasons=reasons,
-        expected={name: error.size for name, error in chosen.errors.items() if error is not None},
+        expected={name: family.scale * error.size for name, error in chosen.errors.items() if error is not None},
     )
 
 
@@ -181,10 +181,12 @@ def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float) 
     errors = ", ".join(f"{NAMES[name]} {error.size:.1%}" for name, error in chosen.errors.items() if error)
     cheaper = found[: found.index(chosen)]
     beside = ""
-    if cheaper:
-        name, error = max(cheaper[-1].errors.items(), key=lambda item: item[1].bound(1.0) if item[1] else 0.0)
+    if cheaper and any(cheaper[-1].errors.values()):
+        name, error = max(
+            cheaper[-1].errors.items(), key=lambda item: item[1].bound(chosen.spreads) if item[1] else 0.0
+        )
         if error is not None:
-            beside = f"; the next cheaper one may miss the {NAMES[name]} by {error.bound(1.0):.1%}"
+            beside = f"; the next cheaper one may miss the {NAMES[name]} by {error.bound(chosen.spreads):.1%}"
     return (
         f"refine {chosen.variant.refine:.3g} with {elements:,.0f} elements is the cheapest of {len(found)} variants "
         f"that {scenes} scenes like this one allow; errors expected: {errors}{beside}"

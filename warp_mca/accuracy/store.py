@@ -62,11 +62,14 @@ class Family:
         scene: its name in the catalogue.
         features: parameters in which the scenes differ, each "log" or "linear".
         mesh: parameters of the scene that say how it is modelled, with values that variants start from.
-        any_value: parameters that have no influence on the figures of `same_for`, such as that of the kind of hinge.
+        any_value: parameters that do not matter to errors, or only to those of figures without a limit.
         no_limit: figures without a limit, with the reason.
         variants: from which to choose.
         sizes: of each variant.
         scenes: measured.
+        spreads: standard deviations by which an expected error must stay within what is asked [-].
+        scale: of estimated errors over expected ones [-]; this and `spreads` are those that suit the measured scenes
+            best when each is foreseen from the others.
     """
 
     scene: str
@@ -77,6 +80,8 @@ class Family:
     variants: tuple[Variant, ...]
     sizes: tuple[Size, ...]
     scenes: tuple[Measured, ...]
+    spreads: float = 1.0
+    scale: float = 1.0
 
     def values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
         """Features of a scene of the family, as numbers."""
@@ -129,13 +134,14 @@ def _read(path: Path) -> dict[str, Family]:
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-        return {name: _family(name, item) for name, item in data["families"].items()}
+        return {name: family_from(name, item) for name, item in data["families"].items()}
     except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         remedy = f"it cannot be read as measurements ({type(error).__name__}: {error}); correct or remove it"
         raise bad_value("file of the accuracy store", str(path), remedy) from error
 
 
-def _family(name: str, data: Mapping[str, Any]) -> Family:
+def family_from(name: str, data: Mapping[str, Any]) -> Family:
+    """The family that a file of the store describes."""
     mesh = data["mesh"]
     variants = tuple(
         Variant(**{**item, "parameters": {**mesh, **item.get("parameters", {})}}) for item in data["variants"]
@@ -155,6 +161,8 @@ def _family(name: str, data: Mapping[str, Any]) -> Family:
         variants=variants,
         sizes=_sizes(len(variants), data["scenes"]),
         scenes=scenes,
+        spreads=data.get("spreads", 1.0),
+        scale=data.get("scale", 1.0),
     )
 
 
