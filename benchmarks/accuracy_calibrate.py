@@ -15,7 +15,7 @@ from warp_mca.runs.rate_groups import COSTS
 ASKED = (0.02, 0.03, 0.05)
 SPREADS = (0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)
 SCALES = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4)
-WITHIN = 0.93  # share of the choices that must be within what was asked
+WITHIN = 0.92  # share of the choices that must be within what was asked
 
 
 @dataclass(frozen=True)

@@ -61,15 +61,10 @@ def _expected(family: Family, parameters: Mapping[str, object], variant: int, fi
     known = [(scene, error) for scene, error in rows if error is not None]
     if len(known) < FEWEST:
         return None
-    points = np.array([_coordinates(family, scene.parameters) for scene, _ in known])
-    here = np.array(_coordinates(family, parameters))
+    points = np.array([family.coordinates(scene.parameters) for scene, _ in known])
+    here = np.array(family.coordinates(parameters))
     scale = np.maximum(points.std(axis=0), 1e-12 + 1e-3 * np.abs(points).max(axis=0))
     return gaussian_process(points / scale, np.array([error for _, error in known]), here / scale)
-
-
-def _coordinates(family: Family, parameters: Mapping[str, object]) -> list[float]:
-    values = family.values(parameters)
-    return [math.log(values[name]) if kind == "log" else values[name] for name, kind in family.features.items()]
 
 
 def gaussian_process(points: Array, errors: Array, here: Array) -> Expected:

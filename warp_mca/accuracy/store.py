@@ -7,6 +7,7 @@ there by a run, so that what a run chooses depends on these files and the scene 
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from collections.abc import Mapping
@@ -61,6 +62,7 @@ class Family:
     Attributes:
         scene: its name in the catalogue.
         features: parameters in which the scenes differ, each "log" or "linear".
+        defaults: values of these where a scene does not name them.
         mesh: parameters of the scene that say how it is modelled, with values that variants start from.
         any_value: parameters that do not matter to errors, or only to those of figures without a limit.
         no_limit: figures without a limit, with the reason.
@@ -74,6 +76,7 @@ class Family:
 
     scene: str
     features: Mapping[str, str]
+    defaults: Mapping[str, Any]
     mesh: Mapping[str, Any]
     any_value: tuple[str, ...]
     no_limit: Mapping[str, str]
@@ -83,10 +86,10 @@ class Family:
     spreads: float = 1.0
     scale: float = 1.0
 
-    def values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
-        """Features of a scene of the family, as numbers."""
-        defaults = {name: item.default for name, item in load_source(self.scene).parameters.items()}
-        return {name: float({**defaults, **parameters}[name]) for name in self.features}
+    def coordinates(self, parameters: Mapping[str, Any]) -> list[float]:
+        """Features of a scene of the family [-], logarithms of those that are "log"."""
+        values = {name: float(parameters.get(name, self.defaults[name])) for name in self.features}
+        return [math.log(values[name]) if kind == "log" else values[name] for name, kind in self.features.items()]
 
 
 def user_folder() -> Path:
@@ -155,6 +158,7 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
     return Family(
         scene=name,
         features=data["features"],
+        defaults={key: item.default for key, item in load_source(name).parameters.items() if key in data["features"]},
         mesh=mesh,
         any_value=tuple(data["any_value"]),
         no_limit=data["no_limit"],
