@@ -7,6 +7,7 @@ edges of contacts; the run itself is the third value, which gives the order that
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -47,6 +48,7 @@ class Pilots:
         bound: figures that must be accurate.
         auto: penalties are chosen by the mesh, so that what springs give away does not shrink with the cells.
         result: of the last pilot, where that is chosen.
+        wall: that this pilot took [s].
     """
 
     variant: Variant
@@ -57,6 +59,7 @@ class Pilots:
     bound: tuple[str, ...]
     auto: bool
     result: Result | None = None
+    wall: float = 0.0
 
     def estimate(self, result: Result) -> Mapping[str, float | str]:
         """Error of each figure of the run [-], or why none can be told."""
@@ -93,8 +96,9 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     if stiffer is not None:
         start = replace(start, **stiffer)
         first = _pilot(scene, start, run)
-    second_variant = replace(start, refine=LEVELS[1] * base)
-    second = _pilot(scene, second_variant, run)
+    begin = time.perf_counter()
+    second = _pilot(scene, replace(start, refine=LEVELS[1] * base), run)
+    wall = time.perf_counter() - begin
     known = figures_of(first), figures_of(second)
     if all(known[1][name] is None for name in bound):
         raise bad_value("accuracy", asked.share, "a coarse run of the scene has no contact force that it could bind")
@@ -115,6 +119,7 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
         bound=tuple(bound),
         auto=auto,
         result=second if level == LEVELS[1] else None,
+        wall=wall,
     )
 
 
