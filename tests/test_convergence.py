@@ -40,7 +40,16 @@ def test_a_series_that_swings_has_a_limit_only_if_it_settles():
     settling = limit_of(SIZES, (1.0, 1.1, 1.06))
     assert settling.value == 1.06 and settling.left == pytest.approx(0.04 / 1.06)
     assert settling.order is None and settling.ratio == pytest.approx(-0.4)
-    assert limit_of(SIZES, (1.0, 1.1, 1.01)).value is None
+    assert limit_of(SIZES, (1.0, 1.2, 1.01)).value is None
+    late = limit_of(SIZES, (1.0, 1.0, 1.2))
+    assert late.value is None and late.ratio is None
+
+
+def test_an_irregular_series_is_taken_at_its_last_value_with_all_its_change():
+    """First peaks of `two_link` on coarse meshes: the first change is small by chance."""
+    found = limit_of((0.0790, 0.0546, 0.0403), (3688.8, 3681.4, 3580.4))
+    assert found.value == 3580.4 and found.left == pytest.approx(101.0 / 3580.4)
+    assert found.order is None and (found.ratio or 0.0) > 10.0
 
 
 def test_changes_within_two_percent_or_the_resolution_are_a_limit():

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import warp_mca as mca
-from warp_mca.accuracy.combine import combinations, merged
+from warp_mca.accuracy.combine import combinations, merged, spread
 from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import NAMES
 from warp_mca.accuracy.findings import TradeOff
@@ -96,11 +96,31 @@ def test_combinations_are_foreseen_from_changes_that_multiply():
     ]
     bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
     bench.base = base
-    chosen = combinations(bench, runs, {"F_n_first_peak": 100.0}, floor=1e-4, most=10)
+    chosen = combinations(bench, runs, {"F_n_first_peak": 100.0}, floor=1e-4)
     knobs = {tuple(sorted(trial.variant.knobs)): cost for trial, cost in chosen}
     assert knobs[("multi_rate", "refine")] == pytest.approx(0.125)
     assert knobs[("multi_rate", "penalty")] == pytest.approx(1.0)
     assert all(len(names) > 1 and "precision" not in names for names in knobs)
+
+
+def test_knobs_that_a_run_refuses_together_are_not_combined():
+    base = measured("as written", Variant(), 8.0, 100.0)
+    runs = [
+        measured("mass scaling", Variant(mass_scaling=2.0), 4.0, 101.0),
+        measured("far link rigid", Variant(parameters={"rigid_bodies": "OA"}), 2.0, 102.0),
+        measured("element", Variant(element="hex8r"), 1.0, 103.0),
+    ]
+    bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
+    bench.base = base
+    chosen = [trial.variant.knobs for trial, _ in combinations(bench, runs, {"F_n_first_peak": 100.0}, floor=0.0)]
+    assert {"element": "hex8r", "rigid_bodies": "OA"} in chosen
+    assert not any({"mass_scaling", "rigid_bodies"} <= set(knobs) for knobs in chosen)
+
+
+def test_combinations_are_tried_spread_along_the_frontier():
+    assert spread(9, 3) == [0, 4, 8, 1, 2, 3, 5, 6, 7]
+    assert spread(2, 10) == [0, 1]
+    assert spread(0, 10) == []
 
 
 def test_merged_variants_keep_what_each_changes():

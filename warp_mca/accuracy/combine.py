@@ -14,27 +14,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.accuracy.figures import BOUND
-from warp_mca.accuracy.knobs import Trial
+from warp_mca.accuracy.knobs import EXCLUDED, Trial
 from warp_mca.accuracy.measure import Bench, Measured
 from warp_mca.accuracy.variant import Variant
 
 Array = NDArray[np.float64]
 
 BETTER = 0.98  # error over that of a cheaper combination below which more is worth its cost [-]
+WORST = 0.2  # foreseen error of combinations that are not worth running [-]
 DISTRUST = 0.1  # share of each change, without its sign, that is added to the foreseen error
 
 
 def combinations(
-    bench: Bench, runs: Sequence[Measured], truth: Mapping[str, float | None], floor: float, most: int
+    bench: Bench, runs: Sequence[Measured], truth: Mapping[str, float | None], floor: float
 ) -> list[tuple[Trial, float]]:
     """Combinations of two knobs or more on the foreseen frontier, and the cost of each over the scene as written [-].
+
+    They come by rising cost.
 
     Args:
         bench: that ran them.
         runs: variants with one knob changed.
         truth: limits of the figures.
         floor: error below which figures are equally good [-]: that of the reference itself.
-        most: number of combinations; they are spread along the frontier.
     """
     base = bench.base
     names = [name for name in BOUND if truth.get(name) and base is not None and base.figures.get(name)]
@@ -54,19 +56,29 @@ def combinations(
     changes, distrust = totals[:, 1 : 1 + len(names)], totals[:, 1 + len(names) :]
     error = np.maximum(np.abs(np.expm1(changes + start)).max(axis=1) + DISTRUST * distrust.max(axis=1), floor)
     chosen = np.stack(np.unravel_index(np.arange(len(totals)), [len(row) for row in rows]), axis=1)
-    several = (chosen > 0).sum(axis=1) > 1
-    front = [k for k in _frontier(totals[:, 0], error) if several[k]]
-    spread = np.unique(np.linspace(0, len(front) - 1, min(most, len(front))).round().astype(int)) if front else []
+    allowed = (chosen > 0).sum(axis=1) > 1
+    for pair in excluded(list(by_knob)):
+        allowed &= (chosen[:, pair] == 0).any(axis=1)
+    kept = np.flatnonzero(allowed & (error <= WORST))
     groups = list(by_knob.values())
-    return [
-        (
-            Trial(
-                "combined", merged([own[i - 1].trial.variant for own, i in zip(groups, chosen[k], strict=True) if i])
-            ),
-            cost,
-        )
-        for k, cost in ((front[n], math.exp(totals[front[n], 0])) for n in spread)
-    ]
+    found = []
+    for k in kept[_frontier(totals[kept, 0], error[kept])]:
+        turned = [own[i - 1].trial.variant for own, i in zip(groups, chosen[k], strict=True) if i]
+        found.append((Trial("combined", merged(turned)), math.exp(totals[k, 0])))
+    return found
+
+
+def spread(count: int, most: int) -> list[int]:
+    """Numbers from 0 to count - 1, those first that lie evenly among them: `most` of these."""
+    first = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)).tolist()
+    return first + [k for k in range(count) if k not in first]
+
+
+def excluded(knobs: Sequence[str]) -> list[tuple[int, int]]:
+    """Places of two knobs that a run refuses to turn together."""
+    places = {knob: k for k, knob in enumerate(knobs)}
+    pairs = ((one, other) for one, others in EXCLUDED.items() for other in others)
+    return [(places[one], places[other]) for one, other in pairs if one in places and other in places]
 
 
 def merged(variants: Sequence[Variant]) -> Variant:

@@ -18,6 +18,8 @@ ORDERS = (
     2.0,
 )  # of elements with linear shape functions [-]; steeper or flatter series are extrapolated with these
 LEAST_ORDER = 0.25  # below which differences hardly shrink: no limit can be told [-]
+SINGULAR = -3.0  # order of the strongest singularity that counts as one, that of strain energy near a point load [-]
+SETTLING = 0.1  # share of a figure; irregular series that move by less are taken at their last value [-]
 STEADY = 0.02  # share of a figure; a series that moves by less has its limit there, whatever its differences do [-]
 
 NO_RUN = "no run has this figure"
@@ -30,8 +32,9 @@ class Limit:
     Attributes:
         value: the limit; None where there is none, or none can be told.
         left: greatest error that `value` is expected to have, as a share of it [-]; None without `value`.
-        order: observed order p [-]; None where fewer than three values, or values that swing, give none.
-        ratio: of the last two differences [-], below 1 in size where they shrink; None with fewer than three values.
+        order: observed order p [-]; None where fewer than three values, or irregular ones, give none.
+        ratio: of the last two differences [-], below 1 in size where they shrink; None with fewer than three values,
+            and where the first two are equal.
         why: the reason why there is no value, in one sentence; empty otherwise.
     """
 
@@ -95,7 +98,7 @@ def _ratio(sizes: Sequence[float], p: float) -> float:
 
 def _of_three(h: Sequence[float], f: Sequence[float], resolution: float) -> Limit:
     first, last = f[1] - f[0], f[2] - f[1]
-    ratio = last / first if first else math.copysign(math.inf, last) if last else 0.0
+    ratio = last / first if first else None
     spread = max(abs(first), abs(last))
     if spread <= max(resolution, STEADY * abs(f[-1])):
         return _steady(h, f, ratio, resolution)
@@ -103,14 +106,17 @@ def _of_three(h: Sequence[float], f: Sequence[float], resolution: float) -> Limi
     if order is not None and order >= LEAST_ORDER:
         found = _extrapolated(h, f, min(max(order, ORDERS[0]), ORDERS[1]), resolution)
         return Limit(found.value, found.left, order, ratio)
-    if order is None and abs(ratio) <= 0.5:  # values swing around a limit
+    if ratio is not None and -0.5 <= ratio <= 0.0:  # values swing around a limit
         return Limit(f[-1], (abs(last) + resolution) / abs(f[-1]), None, ratio)
+    irregular = order is None or order < SINGULAR  # as of coarse meshes, whose first change is small by chance
+    if irregular and spread + resolution <= SETTLING * abs(f[-1]):
+        return Limit(f[-1], (spread + resolution) / abs(f[-1]), None, ratio)
     moves = f"the last two are {_share(first, f)} and {_share(last, f)}"
-    what = "its changes keep one sign" if order is not None else "its changes swing"
+    what = "its changes swing" if ratio is not None and ratio < 0.0 else "its changes keep one sign"
     return Limit(None, None, order, ratio, f"{what} and do not shrink as they must: {moves}")
 
 
-def _steady(h: Sequence[float], f: Sequence[float], ratio: float, resolution: float) -> Limit:
+def _steady(h: Sequence[float], f: Sequence[float], ratio: float | None, resolution: float) -> Limit:
     """A series that hardly moves: extrapolated where it shows an order, its last value otherwise."""
     order = observed_order(h, f)
     if order is not None and order >= ORDERS[0]:

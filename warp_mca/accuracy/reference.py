@@ -72,9 +72,13 @@ def choose_penalty(
         return max(runs, default=own), {}
     stiff = limits([1.0 / penalty for penalty in runs], [found.figures for found in runs.values()])
     taken = {penalty: _taken(found, stiff) for penalty, found in runs.items()}
-    enough = (penalty for penalty in runs if all(abs(taken[penalty].get(name, 0.0)) <= STIFF for name in BOUND))
-    chosen = next(enough, max(runs))
+    chosen = next((penalty for penalty in runs if _stiff(runs[penalty], taken[penalty])), max(runs))
     return chosen, taken[chosen]
+
+
+def _stiff(found: Measured, taken: Mapping[str, float]) -> bool:
+    """Whether springs take next to nothing from the figures that an asked accuracy binds, as far as a run has them."""
+    return all(found.figures.get(name) is None or abs(taken.get(name, 1.0)) <= STIFF for name in BOUND)
 
 
 def _taken(found: Measured, stiff: Mapping[str, Limit]) -> dict[str, float]:

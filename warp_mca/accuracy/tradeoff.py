@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from warp_mca.accuracy.combine import combinations
+from warp_mca.accuracy.combine import combinations, spread
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.files import write_tradeoff, writing_to
 from warp_mca.accuracy.findings import TradeOff
@@ -115,10 +115,15 @@ class _Study:
     def combine(self, single: Sequence[Trial], reference: Reference) -> None:
         """Run promising combinations."""
         runs = [self.runs[_key(trial)] for trial in single[1:] if _key(trial) in self.runs]
-        floor = max((reference.limits[name].left or 0.0 for name in BOUND), default=0.0)
+        known = [reference.limits[name].left for name in BOUND]
+        floor = min((left for left in known if left is not None), default=0.0)
         base = self.runs[_key(BASE)]
-        for trial, cost in combinations(self.bench, runs, reference.figures, floor, COMBINED):
-            self.try_(trial, cost * base.wall["fe"] + self.bench.beside * base.elements, 0.0)
+        found = combinations(self.bench, runs, reference.figures, floor)
+        done = 0
+        for k in spread(len(found), COMBINED)[: 2 * COMBINED]:
+            trial, cost = found[k]
+            if done < COMBINED and self.try_(trial, cost * base.wall["fe"] + self.bench.beside * base.elements, 0.0):
+                done += 1
 
     def note(self, trial: Trial) -> Measured:
         """What a variant gave; each is run once."""
@@ -129,12 +134,16 @@ class _Study:
                 self.progress(self.runs[key], f"{len(self.runs)} runs, {time.perf_counter() - self.begun:.0f} s")
         return self.runs[key]
 
-    def try_(self, trial: Trial, foreseen: float, reserve: float) -> None:
-        """Run a variant if what is left of the budget, less a reserve [s], allows for the time foreseen [s]."""
+    def try_(self, trial: Trial, foreseen: float, reserve: float) -> bool:
+        """Run a variant if what is left of the budget, less a reserve [s], allows for the time foreseen [s].
+
+        Returns:
+            Whether it gave figures.
+        """
         if _key(trial) in self.runs or foreseen <= self.left - reserve:
-            self.note(trial)
-        else:
-            self.left_out.append((trial, foreseen))
+            return not self.note(trial).stopped
+        self.left_out.append((trial, foreseen))
+        return False
 
     def affords(self, variant: Variant, share: float) -> bool:
         """Whether a variant takes no more than a share of what is left of the budget."""

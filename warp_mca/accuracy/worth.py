@@ -129,7 +129,10 @@ def _table(rows: list[list[str]]) -> Table:
     last = len(rows[0]) - 1
     for k, heading in enumerate(rows[0]):
         text = k in (0, last) and not heading.endswith("]")
-        table.add_column(heading, justify="left" if text else "right", no_wrap=k < last)
+        lines = heading if text else heading.replace(" ", "\n")  # narrow columns leave room for the last one
+        table.add_column(
+            lines, justify="left" if text else "right", no_wrap=k < last, overflow="fold", vertical="bottom"
+        )
     for row in rows[1:]:
         table.add_row(*row)
     return table
