@@ -23,7 +23,7 @@ import warp_mca as mca
 from benchmarks.accuracy_calibrate import calibrated
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, render
-from benchmarks.accuracy_measure import FINE, Table, jobs_of, measured, row_of, run_jobs, sampled, stored, truth_of
+from benchmarks.accuracy_measure import Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of
 from warp_mca.accuracy.store import OWN
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -72,8 +72,6 @@ def _tables(
     """All rows so far, by family, scene and variant, after each job."""
     jobs = [job for f in families for job in jobs_of(f, scenes[f.scene], args.device, args.reference)]
     tables: dict[str, dict[int, Table]] = {name: {} for name in scenes}
-    if jobs and args.workers > 1:  # kernels are compiled once, before many processes would do it
-        measured(next(job for job in jobs if job.variant != FINE))
     for count, (name, scene, variant, row) in enumerate(run_jobs(jobs, args.workers, until), 1):
         tables[name].setdefault(scene, {})[variant] = row
         if count % 20 == 0:
@@ -90,7 +88,9 @@ def learn(args: argparse.Namespace, families: list[Family], until: float) -> Non
     found: dict[str, Any] = {}
     for tables in _tables(args, scenes, families, until):
         found = {f.scene: stored(f, scenes[f.scene], tables[f.scene]) for f in families}
-    known = {name: calibrated(name, item) for name, item in found.items() if item["scenes"]}
+        found = {name: item for name, item in found.items() if item["scenes"]}
+        target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
+    known = {name: calibrated(name, item) for name, item in found.items()}
     target.write_text(json.dumps({"families": {**before, **known}}) + "\n", encoding="utf-8")
     print({name: len(item["scenes"]) for name, item in found.items()})
 
@@ -144,8 +144,8 @@ def accurate_run(task: tuple[str, int, Values, float, str]) -> dict[str, Any]:
     entry = {"scene": name, "number": number, "asked": asked}
     try:
         result = mca.run(mca.make_scene(name, **values), accuracy=asked, device=device, threads=1)
-    except mca.McaError as error:
-        return {**entry, "refused": str(error)}
+    except Exception as error:  # which must not end the runs of others
+        return {**entry, "refused": f"{type(error).__name__}: {error}"}
     wall = time.perf_counter() - begin
     accuracy = result.summary["accuracy"]
     return {

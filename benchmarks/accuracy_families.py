@@ -22,7 +22,7 @@ DURATIONS = {
     "body": (1.39e-3, 0.42e-3, 0.22e-3),
     "whole": (1.57e-3, 0.42e-3, 0.14e-3),
 }
-SPANS = (0.3e-3, 0.6e-3, 1.2e-3, 2.4e-3)  # simulated [s]: scenes of equal span are batched
+SPANS = (0.3e-3, 0.6e-3, 1.0e-3, 1.6e-3, 2.1e-3)  # simulated [s]: scenes of equal span are batched
 
 
 @dataclass(frozen=True, kw_only=True)

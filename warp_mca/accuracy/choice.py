@@ -55,7 +55,7 @@ def choices(
             spreads=family.spreads,
         )
         for k, variant in enumerate(variants)
-        if keeps(variant, asked)
+        if keeps(variant, asked) and family.sizes[k].steps > 0.0
     ]
     return sorted(found, key=lambda choice: choice.cost)
 

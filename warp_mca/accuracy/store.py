@@ -171,14 +171,14 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
 
 
 def _sizes(count: int, scenes: Any) -> tuple[Size, ...]:
-    """Mean sizes; steps relative to those of the first variant in the same scene, times its mean."""
+    """Mean sizes; steps relative to those of the first variant in the same scene, times its mean; 0 where unknown."""
     rows = [{run["variant"]: run for run in item["runs"]} for item in scenes]
     rows = [row for row in rows if 0 in row]
-    first = sum(row[0]["steps"] for row in rows) / len(rows)
+    first = sum(row[0]["steps"] for row in rows) / max(len(rows), 1)
 
     def mean(k: int, value: Any) -> float:
         found = [value(row[k], row[0]) for row in rows if k in row]
-        return sum(found) / len(found)
+        return sum(found) / max(len(found), 1)
 
     return tuple(
         Size(
