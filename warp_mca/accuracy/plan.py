@@ -36,7 +36,6 @@ NAMES = {
 STRAIN = "it grows without bound at the edge of the contact as cells shrink"
 
 Run = Callable[..., "Result"]  # a scene, and options of `warp_mca.run`
-Estimate = Mapping[str, float | str]  # by figure: its error [-], or why there is none
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 NOISE = 2e-3  # error of the references themselves [-]
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
+FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
+NEAR = 0.02  # distance from the median within which it is none [-]
 FEWEST = 4  # scenes from which anything is foreseen
 
 
@@ -75,6 +77,7 @@ def gaussian_process(points: Array, errors: Array, here: Array) -> Expected:
         errors: measured there [-], shape (count,).
         here: features of the scene in question [-], shape (feature_count,).
     """
+    errors = _without_outliers(errors)
     middle = float(np.mean(errors))
     about = errors - middle
     variance = float(np.mean(about**2)) + NOISE**2
@@ -86,6 +89,13 @@ def gaussian_process(points: Array, errors: Array, here: Array) -> Expected:
     weights = np.linalg.solve(K, k)
     left = max(variance - float(k @ weights), 0.0) + NOISE**2
     return Expected(middle + float(weights @ about), math.sqrt(left))
+
+
+def _without_outliers(errors: Array) -> Array:
+    """Errors; those far off, where another peak was taken for the first, say, are moved to the edge of the others."""
+    middle = float(np.median(errors))
+    reach = max(FAR * 1.4826 * float(np.median(np.abs(errors - middle))), NEAR)  # 1.4826: of a normal distribution
+    return np.clip(errors, middle - reach, middle + reach)
 
 
 def _covariance(squares: Array, variance: float, length: float) -> Array:
