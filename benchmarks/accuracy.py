@@ -23,7 +23,7 @@ import warp_mca as mca
 from benchmarks.accuracy_calibrate import calibrated
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, render
-from benchmarks.accuracy_measure import Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of
+from benchmarks.accuracy_measure import Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of, warm
 from warp_mca.accuracy.store import OWN
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -99,8 +99,10 @@ def validate(args: argparse.Namespace, families: list[Family], until: float) -> 
     """Try the accuracies on scenes that were not learnt from."""
     target = args.output or JSON
     scenes = {family.scene: _scenes(args, family, HELD_OUT, 1) for family in families}
+    if args.workers > 1:
+        warm([job for f in families for job in jobs_of(f, scenes[f.scene], args.device, args.reference)])
     begin = time.monotonic()
-    runs = _accurate_runs(args, scenes, until)
+    runs = _accurate_runs(args, scenes, until - 0.5 * (until - begin))
     print(f"{len(runs)} runs with an accuracy in {time.monotonic() - begin:.0f} s", flush=True)
     found: list[dict[str, Any]] = []
     for tables in _tables(args, scenes, families, until):
@@ -125,12 +127,12 @@ def _accurate_runs(args: argparse.Namespace, scenes: Mapping[str, list[Values]],
         for asked in ASKED
     ]
     if args.workers < 2:
-        return [accurate_run(task) for task in tasks]
-    found: list[dict[str, Any]] = [accurate_run(tasks[0])]  # which compiles the kernels
+        return [accurate_run(task) for task in tasks if time.monotonic() < until]
+    found: list[dict[str, Any]] = []
     with multiprocessing.get_context("spawn").Pool(args.workers) as pool:
-        pending = pool.imap_unordered(accurate_run, tasks[1:])
+        pending = pool.imap_unordered(accurate_run, tasks)
         try:
-            for _ in tasks[1:]:
+            for _ in tasks:
                 found.append(pending.next(timeout=max(until - time.monotonic(), 0.01)))
         except multiprocessing.TimeoutError:
             pool.terminate()

@@ -32,6 +32,7 @@ ORDER = 1.5  # assumed before the run [-]
 MARGIN = 0.8  # of what was asked that an error foreseen may reach [-]
 SPRINGS = 0.3  # of what was asked that contact springs may give away [-]
 STIFFEST = 30.0  # penalty [-]
+IMPULSE = 0.5  # what springs take from the impulse over what they take from peak and duration, on `two_link` [-]
 SHRINKS = 0.6  # power of the size of cells with which the share of springs goes, measured on `two_link` [-]
 
 
@@ -78,7 +79,8 @@ class Pilots:
                 shares[name] = f"it does not converge: {limit.why}"
             else:
                 error = max(abs(value / limit.value - 1.0), 0.5 * (limit.left or 0.0))
-                shares[name] = error + lost if self.auto else max(error, lost)
+                own = lost * (IMPULSE if name == "impulse" else 1.0)
+                shares[name] = error + own if self.auto else max(error, own)
         return shares
 
 
