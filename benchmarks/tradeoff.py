@@ -56,7 +56,8 @@ CASES = (
 NOTES = {
     "coarse": "Cells of this size resolve neither tip nor hinges: what is left of the first peak says so (on 977,616 "
     "elements it is 3572 N). Stiffer springs and finer cells at the contact are worth most; coarse tied rods and a "
-    "rigid far link spoil the impulse.",
+    "rigid far link spoil the impulse. The plastic strain is that of the contact: the point loads of the hinges, which "
+    "have no limit, take over on finer meshes.",
     "rolling_sphere": "The ball begins pressed into the plane, to a depth computed for its mesh: its first peak is the "
     "transient of that start, and little can be said about it; the impulse is what the scene is about.",
 }

@@ -1,7 +1,8 @@
 """Owns promising combinations: which knobs to turn together, foreseen from what each does alone.
 
 Changes of a figure are taken to multiply, as are those of the cost. Of all combinations those are kept that no other
-one beats in both; errors that cancel are distrusted.
+one beats in both. Knobs on the way to the limit (cells, springs) change figures with their sign; what shortcuts change
+is added to the error, so that none is chosen because it happens to cancel another error.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ Array = NDArray[np.float64]
 
 BETTER = 0.98  # error over that of a cheaper combination below which more is worth its cost [-]
 WORST = 0.2  # foreseen error of combinations that are not worth running [-]
-DISTRUST = 0.1  # share of each change, without its sign, that is added to the foreseen error
+CONVERGING = ("mesh", "springs", "finer contact")  # knobs on the way to the limit
+DISTRUST = 0.1  # share of their changes, without sign, that is added to the foreseen error
 
 
 def combinations(
@@ -54,7 +56,7 @@ def combinations(
     totals = reduce(lambda left, right: (left[:, None, :] + right[None, :, :]).reshape(-1, left.shape[1]), rows)
     start = np.log([(base.figures[name] or 1.0) / (truth[name] or 1.0) for name in names])
     changes, distrust = totals[:, 1 : 1 + len(names)], totals[:, 1 + len(names) :]
-    error = np.maximum(np.abs(np.expm1(changes + start)).max(axis=1) + DISTRUST * distrust.max(axis=1), floor)
+    error = np.maximum(np.abs(np.expm1(changes + start)).max(axis=1) + distrust.max(axis=1), floor)
     chosen = np.stack(np.unravel_index(np.arange(len(totals)), [len(row) for row in rows]), axis=1)
     allowed = (chosen > 0).sum(axis=1) > 1
     for pair in excluded(list(by_knob)):
@@ -96,11 +98,13 @@ def _nothing(names: Sequence[str]) -> Array:
 
 
 def _change(bench: Bench, base: Measured, run: Measured, names: Sequence[str]) -> Array:
-    """Logarithms of cost and figures over those of the scene as written, then the sizes of the latter [-]."""
+    """Logarithms of cost and figures over those of the scene as written, then what is added to the errors [-]."""
     cost = math.log(bench.work_of(run) / bench.work_of(base))
     values = [(run.figures[name] or 1.0) / (base.figures[name] or 1.0) for name in names]
     changes = np.log(np.abs(values))
-    return np.concatenate([[cost], changes, np.abs(changes)])
+    if run.trial.knob in CONVERGING:
+        return np.concatenate([[cost], changes, DISTRUST * np.abs(changes)])
+    return np.concatenate([[cost], 0.0 * changes, np.abs(changes)])
 
 
 def _frontier(cost: Array, error: Array) -> list[int]:

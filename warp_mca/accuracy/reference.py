@@ -19,6 +19,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene import Scene
 
 LADDER = (1.0, 3.0, 10.0)  # penalties of which the softest is taken whose springs hold no more than STIFF
+UNCHECKED = 3.0  # penalty that is taken, at least, where there is no time for others
 STIFF = 0.005  # share by which the figures of a penalty may differ from those of stiff springs
 FINEST = (2.0, 1.7, 1.4, 1.2, 1.0)  # finest mesh of the reference over the scene's own; the first that can be afforded
 STEP = 1.4  # between the cells of its meshes
@@ -49,7 +50,7 @@ class Reference:
 def choose_penalty(
     bench: Bench, afford: Callable[[Variant], bool], note: Callable[[Trial], Measured]
 ) -> tuple[float | str | None, dict[str, float]]:
-    """The penalty of the reference, and the share that its springs take from each figure.
+    """The penalty of the reference, and the share that its springs take from each figure, as far as that was measured.
 
     The limit of stiff springs is that of a series of penalties as 1/penalty goes to zero, on the scene's own mesh.
 
@@ -69,7 +70,7 @@ def choose_penalty(
             if not found.stopped:
                 runs[penalty] = found
     if len(runs) < 2:
-        return max(runs, default=own), {}
+        return max(own, UNCHECKED) if isinstance(own, float | int) else UNCHECKED, {}
     stiff = limits([1.0 / penalty for penalty in runs], [found.figures for found in runs.values()])
     taken = {penalty: _taken(found, stiff) for penalty, found in runs.items()}
     chosen = next((penalty for penalty in runs if _stiff(runs[penalty], taken[penalty])), max(runs))

@@ -58,6 +58,7 @@ def reference_lines(contents: Mapping[str, Any]) -> list[str]:
     reference = contents["reference"]
     meshes = ", ".join(f"{level['elements']:,}" for level in reference["levels"])
     springs = f", contact springs with penalty {reference['penalty']:g}" if _is_number(reference["penalty"]) else ""
+    springs += " (no time to check that)" if springs and not reference["springs"] else ""
     lines = [f"reference: limit of meshes of {meshes} elements, {reference['precision']}{springs}"]
     for name in NAMES:
         value, unit = reference["figures"][name], UNITS[name]
