@@ -142,7 +142,6 @@ FAMILIES = (
             _links(4 / 3, 56, 2.0),
             _links(5 / 3, 56, 2.0),
             _links(2.0, 64, 2.0),
-            _links(2.0, 64, 2.0, None),
         ),
         fine=_links(3.0, 72, 3.0, None),
         partner=10,
