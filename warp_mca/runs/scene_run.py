@@ -14,6 +14,7 @@ from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.runs.contact_warnings import resolution_warnings
+from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
     from warp_mca.solve.state import State
     from warp_mca.solve.steps import Steps
-
-COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
 
 
 class SceneRun:
@@ -163,15 +162,9 @@ class SceneRun:
 
     def _warnings(self, shares: Mapping[str, float | None]) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
-        found: list[str] = []
-        small = [body.name for body in scene.bodies if body.kinematics == "corotational"]
-        if small and ledger.kept.max_strain > COROTATIONAL_STRAIN:
-            where = "" if len(small) == len(scene.bodies) else f", if that was in {' or '.join(small)}"
-            found.append(
-                f"strain reached {ledger.kept.max_strain:.2f}; the co-rotational element takes strains as small, "
-                f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose "
-                f"kinematics='finite'{where}"
-            )
+        first, end = self.solver.layout.nodes[self.index : self.index + 2]
+        u = self.state.u.numpy()[first:end]
+        found = element_warnings(scene, self.ready.model, ledger, u, self.state.steps)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
