@@ -43,11 +43,13 @@ class Trial:
         scene: to run, with any element.
         read: figures of its result.
         options: further arguments of `mca.run`.
+        forced: how many times longer the step is than what the scene asks for, past all checks.
     """
 
     scene: mca.Scene
     read: Callable[[mca.Result], list[Figure]]
     options: Mapping[str, Any] = field(default_factory=dict)
+    forced: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import warp_mca as mca
 from benchmarks.stability.axis import AXES, Trial, Value, with_element
+from warp_mca.model.model import Model
+from warp_mca.runs import division
 
 PRECISIONS = ("mixed", "float64")
 Cell = dict[str, Any]
@@ -29,7 +33,8 @@ def cell(name: str, value: Value, element: str, precision: str, device: str) -> 
 
 
 def _run(trial: Trial, element: str, precision: str, device: str) -> Cell:
-    result = mca.run(with_element(trial.scene, element), device=device, precision=precision, **trial.options)
+    with forced_step(trial.forced):
+        result = mca.run(with_element(trial.scene, element), device=device, precision=precision, **trial.options)
     figures = trial.read(result)
     worst = max(figures, key=lambda item: item.error / item.tolerance if item.error == item.error else float("inf"))
     return {
@@ -41,6 +46,22 @@ def _run(trial: Trial, element: str, precision: str, device: str) -> Cell:
         "said": list(result.warnings),
         "steps": result.summary["n_steps"],
     }
+
+
+@contextmanager
+def forced_step(times: float) -> Iterator[None]:
+    """Let runs take steps so many times longer than they chose."""
+    chosen = division._limits
+
+    def longer(scene: mca.Scene, model: Model, interval: float, intervals: int) -> tuple[float, int]:
+        stable, searches = chosen(scene, model, interval, intervals)
+        return times * stable, searches
+
+    division._limits = longer
+    try:
+        yield
+    finally:
+        division._limits = chosen
 
 
 def wrong(found: Cell) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
-from benchmarks.stability import bars, bodies, contact, material, motion, options  # noqa: F401  (they register axes)
+from benchmarks.stability import arm, bars, bodies, contact, material, motion, options  # noqa: F401  (they register axes)
 from benchmarks.stability.axis import AXES, Level
 from benchmarks.stability.measure import PRECISIONS, Cell, cell
 from warp_mca.elements import ELEMENTS

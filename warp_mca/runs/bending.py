@@ -45,6 +45,7 @@ def bending_warnings(model: Model, u: Array, exchanged: float) -> Iterator[str]:
             )
 
 
+@np.errstate(all="ignore")  # what is not a number is not above a share
 def _shares(model: Model, u: Array) -> dict[str, tuple[str, float, float]]:
     """Of each body its element, the energy spent so and all strain energy of the cells that were looked at [J]."""
     found: dict[str, tuple[str, float, float]] = {}

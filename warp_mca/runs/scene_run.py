@@ -163,7 +163,7 @@ class SceneRun:
     def _warnings(self, shares: Mapping[str, float | None]) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        u = self.state.u.numpy()[first:end]
+        u = np.asarray(self.state.u.numpy()[first:end], dtype=np.float64)
         found = element_warnings(scene, self.ready.model, ledger, u, self.state.steps)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
