@@ -16,6 +16,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+DESCRIPTION = "Run the table of extremes, and write docs/stability.md."
 DOCS = Path(__file__).parent.parent.parent / "docs"
 
 
@@ -27,8 +28,8 @@ def main() -> None:
     from benchmarks.stability.page import line, write_page
     from benchmarks.stability.table import AXES, merged, tasks
 
-    wp.config.quiet = True
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.stability", description=__doc__.splitlines()[0])
+    setattr(wp.config, "quiet", True)  # noqa: B010
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.stability", description=DESCRIPTION)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--level", default="full", choices=("quick", "full", "long"))
     parser.add_argument("--only", nargs="*", default=(), choices=tuple(AXES), metavar="AXIS")
@@ -41,11 +42,13 @@ def main() -> None:
         for task in tasks(args.only, args.level):
             new.append(task(args.device))
             print(line(new[-1]), flush=True)
+            if args.level != "quick":
+                stored = merged(stored, new[-1:])
+                text = ",\n".join(json.dumps(item) for item in stored)
+                args.data.write_text(f"[\n{text}\n]\n", encoding="utf-8")
         print(f"{len(new)} cells, {sum(map(wrong, new))} of them wrong without a warning")
         if args.level == "quick":
             return
-        stored = merged(stored, new)
-        args.data.write_text("[\n" + ",\n".join(json.dumps(item) for item in stored) + "\n]\n", encoding="utf-8")
     write_page(stored, DOCS / "stability.md")
 
 

@@ -171,7 +171,7 @@ def bent_cells(value: str, element: str) -> Trial:
     group="bars",
     title="Poisson's ratio of a cantilever",
     reference="Lowest bending frequency of a slender cantilever by Timoshenko, 2 cells deep, 20 long.",
-    values=(-0.9, -0.5, 0.0, 0.3, 0.45, 0.499),
+    values=(-0.5, 0.0, 0.3, 0.45, 0.499),
 )
 def bent_poisson(value: float, element: str) -> Trial:
     """A cantilever under sudden gravity."""

@@ -15,12 +15,10 @@ BLOCK = "One cell pulled to a strain of 1 % and pushed to -1 %: the bilinear loo
 
 
 def loop(
-    *, nu: float = 0.3, sigma_y: float = 400e6, E_t: float = 20e9, beta: float = 0.5, strain: float = 0.01
+    *, nu: float = 0.3, sigma_y: float = 400e6, E_t: float = 20e9, beta: float = 0.5, stroke: float = 4e-3
 ) -> Trial:
-    """A block of one cell, pulled and pushed so slowly that it is in equilibrium; greatest error of its stress."""
-    scene = mca.make_scene(
-        "metal_block", strokes=2, stroke=4e-3, nu=nu, sigma_y=sigma_y, E_t=E_t, beta=beta, strain=strain
-    )
+    """A block of one cell, pulled and pushed in strokes [s] that keep it in equilibrium."""
+    scene = mca.make_scene("metal_block", strokes=2, stroke=stroke, nu=nu, sigma_y=sigma_y, E_t=E_t, beta=beta)
 
     def read(result: mca.Result) -> list[Figure]:
         along = displacement(scene.prescribed[0], result.time) / 0.01
@@ -31,9 +29,7 @@ def loop(
         if work[-1] > 0.0:
             figures.append(Figure("plastic work", result.summary["energy"]["plastic"], work[-1] * 0.01**3, 0.01))
         else:
-            figures.append(
-                Figure("plastic work", result.summary["energy"]["plastic"], 0.0, 0.01, scale * strain * 1e-6)
-            )
+            figures.append(Figure("plastic work", result.summary["energy"]["plastic"], 0.0, 0.01, scale * 0.01 * 1e-6))
         return figures
 
     return Trial(scene, read)

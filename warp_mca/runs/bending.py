@@ -1,4 +1,4 @@
-"""Owns what the shape of a finished run says of bending: strain energy that cells too long or too few spend on it.
+"""Owns what the shape of bodies says of bending in a run: strain energy that cells too long or too few spend on it.
 
 A trilinear hexahedron of all integration points cannot bend without shear: displacements u_j = q xi_j xi_k along its
 edge j give the strain q xi_k / a_j that bending asks for, and a shear q xi_j / a_k that it does not. Linear tetrahedra
@@ -19,7 +19,9 @@ from warp_mca.geometry.hexahedron import CORNERS
 from warp_mca.geometry.tetrahedron import gradients, volumes
 
 if TYPE_CHECKING:
+    from warp_mca.model.assembly import Block
     from warp_mca.model.model import Model
+    from warp_mca.solve.records import SceneRecords
 
 Array = NDArray[np.float64]
 
@@ -27,41 +29,63 @@ SHARE = 0.2  # of a body's strain energy from which on a word is said: bending f
 SAMPLE = 4096  # hexahedra of a body that are looked at, evenly spread
 MOST = 200_000  # tetrahedra of a body that are looked at: of more, none
 LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
+LOOKS = 8  # in a run, besides that at its end
 
 
-def bending_warnings(model: Model, u: Array, exchanged: float) -> Iterator[str]:
-    """A sentence for each body whose cells bend too stiffly.
+def look(model: Model, u: Array, kept: SceneRecords) -> None:
+    """Keep the energies of each body, if its strain energy is the greatest so far.
 
     Args:
         model: of the scene alone.
-        u: displacements at the end of the run [m], shape (node_count, 3), float64.
-        exchanged: energy that bodies exchanged [J].
+        u: displacements [m], shape (node_count, 3), float64.
+        kept: of the scene; its `stiffened` changes.
     """
-    for name, (element, wasted, energy) in _shares(model, u).items():
-        if energy > LEAST * exchanged and wasted > SHARE * energy:
+    if not len(kept.stiffened):
+        kept.stiffened = np.zeros((len(model.element_start), 2))
+    found = _energies(model, u)
+    greater = found[:, 1] > kept.stiffened[:, 1]  # not-a-number is not
+    kept.stiffened[greater] = found[greater]
+
+
+def bending_warnings(model: Model, kept: SceneRecords) -> Iterator[str]:
+    """A sentence for each body whose cells bend too stiffly, of the scene alone."""
+    element = {name: block.element for block in model.blocks for name in _bodies(model, block)}
+    for name, (wasted, energy) in zip(model.element_start, kept.stiffened, strict=False):
+        if energy > LEAST * kept.exchanged and wasted > SHARE * energy:
             yield (
-                f"at the end {wasted / energy:.0%} of the strain energy of {name} lay {_WHERE[element]}: it is about "
-                "that much too stiff, as it moves then; choose hex8r, or smaller cells"
+                f"{wasted / energy:.0%} of the strain energy of {name} lay {_WHERE[element[name]]} when it was "
+                "greatest: the body is about that much too stiff, as it moved then; choose hex8r, or smaller cells"
             )
 
 
+def _bodies(model: Model, block: Block) -> list[str]:
+    """Names of the bodies that have elements in a block."""
+    names = np.array(list(model.element_start))
+    return names[np.unique(_body_of(model, block))].tolist()
+
+
+def _body_of(model: Model, block: Block) -> NDArray[np.intp]:
+    """Number of the body of each element of a block, in the order of `Model.element_start`."""
+    own = model.element_of[block.first : block.first + block.conn.shape[1]]
+    start = np.array(list(model.element_start.values()))
+    order = np.argsort(start, kind="stable")
+    return order[np.searchsorted(start[order], own, side="right") - 1]
+
+
 @np.errstate(all="ignore")  # what is not a number is not above a share
-def _shares(model: Model, u: Array) -> dict[str, tuple[str, float, float]]:
-    """Of each body its element, the energy spent so and all strain energy of the cells that were looked at [J]."""
-    found: dict[str, tuple[str, float, float]] = {}
-    starts = sorted(model.element_start.items(), key=lambda item: item[1])
+def _energies(model: Model, u: Array) -> Array:
+    """Of each body, energy that its cells spend so and strain energy of those looked at [J], shape (body_count, 2)."""
+    found = np.zeros((len(model.element_start), 2))
+    if not np.isfinite(u).all():
+        return found
     for block in model.blocks:
         if block.element not in _ENERGIES:
             continue
-        own = model.element_of[block.first : block.first + block.conn.shape[1]]
-        body = np.searchsorted([start for _, start in starts], own, side="right") - 1
+        body = _body_of(model, block)
         for k, material in np.unique(np.column_stack([body, block.material]), axis=0):
             part = (body == k) & (block.material == material)
             K, G = model.law[material, :2]
-            wasted, energy = _ENERGIES[block.element](model.X, u, block.conn[:, part].T, K, G)
-            name = starts[k][0]
-            _, before, total = found.get(name, ("", 0.0, 0.0))
-            found[name] = block.element, before + wasted, total + energy
+            found[k] += _ENERGIES[block.element](model.X, u, block.conn[:, part].T, K, G)
     return found
 
 
@@ -110,9 +134,11 @@ def _tetrahedra(X: Array, u: Array, conn: NDArray[np.int32], K: float, G: float)
     corner = corner.reshape(conn.shape)
     total, weight = np.zeros((len(node), 3, 3)), np.zeros(len(node))
     for k in range(4):
-        np.add.at(total, corner[:, k], volume[:, None, None] * deviator)
+        np.add.at(total, corner[:, k], volume[:, None, None] * strain)
         np.add.at(weight, corner[:, k], volume)
     mean = (total / weight[:, None, None])[corner].mean(axis=1)
+    theta = np.trace(mean, axis1=1, axis2=2)  # tet4 takes the mean dilatation around its nodes
+    mean -= theta[:, None, None] / 3.0 * np.eye(3)
     energy = 0.5 * K * theta**2 + G * (deviator**2).sum(axis=(1, 2))
     wasted = G * ((deviator - mean) ** 2).sum(axis=(1, 2))
     return float((volume * wasted).sum()), float((volume * energy).sum())

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.runs.bending import bending_warnings
 
@@ -16,28 +15,23 @@ if TYPE_CHECKING:
     from warp_mca.runs.ledger import Ledger
     from warp_mca.scene import Scene
 
-Array = NDArray[np.float64]
-
 COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
 COROTATIONAL_VOLUME = 0.15  # loss of volume, which goes with that strain where bodies cannot give way sideways
 NOISE = 0.02  # pressure that rounding shakes up, as a share of stress, from which on a word is said
 ROUNDING = 1.4 * 2.0**-24  # of dilatation in float32 in each step, over the strain; measured, see docs/decisions.md
 
 
-def element_warnings(scene: Scene, model: Model, ledger: Ledger, u: Array, steps: int) -> list[str]:
+def element_warnings(scene: Scene, model: Model, ledger: Ledger, steps: int) -> list[str]:
     """What a run's elements leave in doubt, one sentence each.
 
     Args:
         scene: that was run. model: of the scene alone. ledger: of the run.
-        u: displacements at the end [m], shape (node_count, 3), float64.
         steps: that it took.
     """
     found = list(_large_strain(scene, ledger))
     if ledger.precision == "mixed":
         found += _shaken_pressure(model, ledger.kept.max_strain, steps)
-    if np.isfinite(u).all():
-        found += bending_warnings(model, u, ledger.kept.exchanged)
-    return found
+    return found + list(bending_warnings(model, ledger.kept))
 
 
 def _large_strain(scene: Scene, ledger: Ledger) -> Iterator[str]:

@@ -14,6 +14,7 @@ from warp_mca.base.errors import GuardError
 from warp_mca.model.batch_model import join_models
 from warp_mca.model.layout import offsets
 from warp_mca.results.paths import join_probes
+from warp_mca.runs.bending import LOOKS
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.scene_run import SceneRun
@@ -202,6 +203,10 @@ class _Loop:
     def _interval(self, interval: int, last: int) -> None:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
+        if interval and interval % max(1, self.steps.intervals // LOOKS) == 0 and self.state.steps == first:
+            for item, stopped in zip(self.impact.scene_runs, self.impact.stopped, strict=True):
+                if stopped is None:
+                    item.look()
         for number, part in enumerate(self.steps.parts()):
             end = first + part.count
             if self.state.steps < min(end, last):

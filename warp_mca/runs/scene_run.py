@@ -13,6 +13,7 @@ from warp_mca.model.cells import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
+from warp_mca.runs.bending import look
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
@@ -74,12 +75,18 @@ class SceneRun:
             if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
+    def look(self) -> None:
+        """Look at the shape of the bodies, for what `runs.bending` says of it."""
+        first, end = self.solver.layout.nodes[self.index : self.index + 2]
+        look(self.ready.model, np.asarray(self.state.u.numpy()[first:end], dtype=np.float64), self.ledger.kept)
+
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
 
     def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
+        self.look()
         history = self.history()
         names = contact_names(self.ready.scene.contacts)
         contacts = contact_histories(self.ledger, names)
@@ -162,9 +169,7 @@ class SceneRun:
 
     def _warnings(self, shares: Mapping[str, float | None]) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
-        first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        u = np.asarray(self.state.u.numpy()[first:end], dtype=np.float64)
-        found = element_warnings(scene, self.ready.model, ledger, u, self.state.steps)
+        found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
