@@ -227,8 +227,8 @@ def step_scale(value: float, element: str) -> Trial:
 @axis(
     group="steps",
     title="Steps longer than stable, with the check of `time_step_scale` left out",
-    reference="A rod of 4 cells in a row strikes a wall at 1 m/s: what the guard on energy does where a step is too long, "
-    "whatever the reason.",
+    reference="A rod of 4 cells in a row strikes a wall at 1 m/s: what the guard on energy does where a step is too "
+    "long, whatever the reason.",
     values=(1.02, 1.05, 1.1, 1.2, 1.5),
     quick=(1.2,),
 )

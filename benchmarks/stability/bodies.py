@@ -100,7 +100,7 @@ def both_ratios(value: str, element: str) -> Trial:
     group="two bodies",
     title="Cells across the striking rod's end for each one of the struck rod",
     reference=f"{RODS}. The striking rod is the slave.",
-    values=(0.5, 1, 3, 8),
+    values=(0.5, 1, 3),
 )
 def cells_ratio(value: float, element: str) -> Trial:
     """As `rods`."""

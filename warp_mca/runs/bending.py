@@ -21,7 +21,6 @@ from warp_mca.geometry.tetrahedron import gradients, volumes
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Block
     from warp_mca.model.model import Model
-    from warp_mca.solve.records import SceneRecords
 
 Array = NDArray[np.float64]
 
@@ -32,26 +31,24 @@ LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says not
 LOOKS = 8  # in a run, besides that at its end
 
 
-def look(model: Model, u: Array, kept: SceneRecords) -> None:
-    """Keep the energies of each body, if its strain energy is the greatest so far.
+def seen(model: Model, u: Array, before: Array) -> Array:
+    """Energies of each body as `SceneRecords.stiffened` has them, of the shape with more strain energy.
 
     Args:
         model: of the scene alone.
         u: displacements [m], shape (node_count, 3), float64.
-        kept: of the scene; its `stiffened` changes.
+        before: what was seen before, shape (body_count, 2), float64, or empty.
     """
-    if not len(kept.stiffened):
-        kept.stiffened = np.zeros((len(model.element_start), 2))
     found = _energies(model, u)
-    greater = found[:, 1] > kept.stiffened[:, 1]  # not-a-number is not
-    kept.stiffened[greater] = found[greater]
+    before = before if len(before) else np.zeros_like(found)
+    return np.where(found[:, 1:] > before[:, 1:], found, before)  # not-a-number is not greater
 
 
-def bending_warnings(model: Model, kept: SceneRecords) -> Iterator[str]:
-    """A sentence for each body whose cells bend too stiffly, of the scene alone."""
+def bending_warnings(model: Model, stiffened: Array, exchanged: float) -> Iterator[str]:
+    """A sentence for each body whose cells bend too stiffly, of the scene alone, which exchanged so much energy [J]."""
     element = {name: block.element for block in model.blocks for name in _bodies(model, block)}
-    for name, (wasted, energy) in zip(model.element_start, kept.stiffened, strict=False):
-        if energy > LEAST * kept.exchanged and wasted > SHARE * energy:
+    for name, (wasted, energy) in zip(model.element_start, stiffened, strict=True):
+        if energy > LEAST * exchanged and wasted > SHARE * energy:
             yield (
                 f"{wasted / energy:.0%} of the strain energy of {name} lay {_WHERE[element[name]]} when it was "
                 "greatest: the body is about that much too stiff, as it moved then; choose hex8r, or smaller cells"

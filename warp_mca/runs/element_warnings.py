@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.runs.bending import bending_warnings
-
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.runs.ledger import Ledger
@@ -31,7 +29,7 @@ def element_warnings(scene: Scene, model: Model, ledger: Ledger, steps: int) -> 
     found = list(_large_strain(scene, ledger))
     if ledger.precision == "mixed":
         found += _shaken_pressure(model, ledger.kept.max_strain, steps)
-    return found + list(bending_warnings(model, ledger.kept))
+    return found
 
 
 def _large_strain(scene: Scene, ledger: Ledger) -> Iterator[str]:

@@ -204,9 +204,8 @@ class _Loop:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
         if interval and interval % max(1, self.steps.intervals // LOOKS) == 0 and self.state.steps == first:
-            for item, stopped in zip(self.impact.scene_runs, self.impact.stopped, strict=True):
-                if stopped is None:
-                    item.look()
+            for item in self.impact.scene_runs:
+                item.ledger.kept.stiffened = item.look()
         for number, part in enumerate(self.steps.parts()):
             end = first + part.count
             if self.state.steps < min(end, last):

@@ -13,7 +13,7 @@ from warp_mca.model.cells import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
-from warp_mca.runs.bending import look
+from warp_mca.runs.bending import bending_warnings, seen
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
     from warp_mca.solve.state import State
     from warp_mca.solve.steps import Steps
+
+Array = NDArray[np.float64]
 
 
 class SceneRun:
@@ -75,10 +77,11 @@ class SceneRun:
             if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
-    def look(self) -> None:
-        """Look at the shape of the bodies, for what `runs.bending` says of it."""
+    def look(self) -> Array:
+        """What `runs.bending` has seen of the bodies, with their shape now; see `SceneRecords.stiffened`."""
         first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        look(self.ready.model, np.asarray(self.state.u.numpy()[first:end], dtype=np.float64), self.ledger.kept)
+        u = np.asarray(self.state.u.numpy()[first:end], dtype=np.float64)
+        return seen(self.ready.model, u, self.ledger.kept.stiffened)
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
@@ -86,7 +89,6 @@ class SceneRun:
 
     def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
         """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
-        self.look()
         history = self.history()
         names = contact_names(self.ready.scene.contacts)
         contacts = contact_histories(self.ledger, names)
@@ -94,7 +96,7 @@ class SceneRun:
         facts = self._facts(wall, shares)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)
-        warnings = (*self._warnings(shares), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
+        warnings = (*self._warnings(shares, stopped), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
         return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> RunFacts:
@@ -167,9 +169,11 @@ class SceneRun:
             "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _warnings(self, shares: Mapping[str, float | None]) -> list[str]:
+    def _warnings(self, shares: Mapping[str, float | None], stopped: str | None) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
+        if stopped is None:
+            found += bending_warnings(self.ready.model, self.look(), ledger.kept.exchanged)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
