@@ -80,6 +80,12 @@ class Axis:
 
 
 AXES: dict[str, Axis] = {}
+GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "arm")  # in the order of the page
+
+
+def ordered_axes() -> list[Axis]:
+    """All axes in the order of the page, whatever was imported first."""
+    return sorted(AXES.values(), key=lambda item: GROUPS.index(item.group))
 
 
 def axis(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
 from benchmarks.stability import arm, bars, bodies, contact, material, motion, options  # noqa: F401  (they register axes)
-from benchmarks.stability.axis import AXES, Level
+from benchmarks.stability.axis import AXES, Level, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, cell
 from warp_mca.elements import ELEMENTS
 
@@ -22,7 +22,7 @@ def key(found: Cell) -> Key:
 
 def keys(names: Iterable[str] = (), level: Level | None = None) -> Iterator[Key]:
     """Axis, value, element and precision of each cell of a level, of both "full" and "long" if None."""
-    for item in AXES.values():
+    for item in ordered_axes():
         if (names and item.name not in names) or (level == "long" and item.level != "long"):
             continue
         if level in ("quick", "full") and item.level == "long":
