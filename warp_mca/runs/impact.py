@@ -175,6 +175,7 @@ class _Loop:
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
+        self.looks = Transfer({"u": self.state.u}, self.solver.device)
         self.watch, self.contact = contact_watch(self.solver, self.state), True
         self.written = 0
 
@@ -208,8 +209,7 @@ class _Loop:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
         if interval and interval % max(1, self.steps.intervals // LOOKS) == 0 and self.state.steps == first:
-            for item in self.impact.scene_runs:
-                item.ledger.kept.stiffened = item.look()
+            self._look()
         for number, part in enumerate(self.steps.parts(interval)):
             end = first + part.count
             if self.state.steps < min(end, last):
@@ -253,6 +253,19 @@ class _Loop:
         self.impact.read(*self.transfer.receive())
         self.told()
 
+    def _look(self) -> None:
+        """Have bodies looked at as they are now, once their shape has come, while the device goes on."""
+        while self.looks.pending:
+            self._see()
+        self.looks.send(0)
+
+    def _see(self) -> None:
+        _, shape = self.looks.receive()
+        for item in self.impact.scene_runs:
+            item.ledger.kept.stiffened = item.look(shape["u"])
+
     def _receive_all(self) -> None:
+        while self.looks.pending:
+            self._see()
         while self.transfer.pending:
             self._receive()

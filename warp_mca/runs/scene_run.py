@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from warp_mca.model.cells import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
-from warp_mca.runs.bending import bending_warnings, seen
+from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
@@ -78,11 +79,19 @@ class SceneRun:
             if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
-    def look(self) -> Array:
-        """What `runs.bending` has seen of the bodies, with their shape now; see `SceneRecords.stiffened`."""
+    @cached_property
+    def _samples(self) -> list[Sample]:
+        return samples_of(self.ready.model)
+
+    def look(self, u: Array) -> Array:
+        """What `runs.bending` has seen of the bodies, with these displacements of all scenes [m] too.
+
+        See `SceneRecords.stiffened`.
+        """
+        if not self._samples:
+            return self.ledger.kept.stiffened
         first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        u = np.asarray(self.state.u.numpy()[first:end], dtype=np.float64)
-        return seen(self.ready.model, u, self.ledger.kept.stiffened)
+        return seen(self.ready.model, self._samples, u[first:end], self.ledger.kept.stiffened)
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
@@ -179,7 +188,8 @@ class SceneRun:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
         if stopped is None:
-            found += bending_warnings(self.ready.model, self.look(), ledger.kept.exchanged)
+            shape = np.asarray(self.state.u.numpy(), dtype=np.float64)
+            found += bending_warnings(self.ready.model, self.look(shape), ledger.kept.exchanged)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
