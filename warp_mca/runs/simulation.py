@@ -23,6 +23,8 @@ from warp_mca.runs.arguments import (
     span_of,
     teller,
 )
+from warp_mca.runs.checkpoint import METHOD, Checkpoint, Every, every_of
+from warp_mca.runs.checkpoint import advance as advance_stored
 from warp_mca.runs.meshing import mesh
 from warp_mca.runs.prepare import Clock, Prepared, prepare
 from warp_mca.runs.rate_groups import grouping
@@ -52,6 +54,8 @@ def run(
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
+    method: str = "mca",
+    checkpoint: str | Every | None = None,
 ) -> Result:
     """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
 
@@ -73,6 +77,9 @@ def run(
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
+        method: "mca" swings rigid links; "pure-fem" computes the swing by finite elements too.
+        checkpoint: how often the state is stored in `out`, as "100" (steps), "2e-5s" (simulated) or "30w" (wall time),
+            so that the same call goes on after an interruption; "pure-fem" does by default.
 
     Returns:
         The result, with histories as float64 arrays.
@@ -90,19 +97,49 @@ def run(
     check_recorders(recorders)
     settings = settings_of(device, precision, threads, multi_rate)
     check_files(recorders, None if out is None else check_output(out, force=force))
+    every = every_of(method, checkpoint, out, scene, recorders)
 
-    def result() -> Result:
+    def result(store: Checkpoint | None) -> Result:
+        if method == METHOD:
+            return _pure(scene, meshes, span, tell, settings, store)
         if scene.t_end is not None:
             return _cycle(scene, meshes, span, tell, settings, recorders)
-        (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
+        (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders, store)
         if found.stopped is not None:
             raise GuardError(found.stopped)
         return found
 
     if out is None:
-        return result()
+        return result(None)
     with hold(out, force=force) as folder:
-        return write(result(), folder, force=force)
+        store = Checkpoint(folder.path, every, force) if every else None
+        found = write(result(store), folder, force=force)
+        if store:
+            store.remove()
+        return found
+
+
+def _pure(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    store: Checkpoint | None,
+) -> Result:
+    """Finite elements from the release on; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: the run lost its footing, or nothing touched.
+    """
+    from warp_mca.runs.pure_fem import PureRun
+    from warp_mca.runs.pure_result import pure_result
+
+    run = PureRun(scene, meshes, span, settings, tell)
+    run.run(store)
+    tell("impact", 1.0)
+    return pure_result(run)
 
 
 def _cycle(
@@ -136,6 +173,7 @@ def simulate(
     tell: Progress,
     settings: Settings,
     recorders: Sequence[Recorder] = (),
+    store: Checkpoint | None = None,
 ) -> list[Result]:
     """Run scenes side by side.
 
@@ -146,6 +184,7 @@ def simulate(
         tell: told of stages.
         settings: device, precision and threads.
         recorders: of a lone scene.
+        store: where a lone scene without recorders stores its state, and goes on from it.
 
     Returns:
         The result of each scene; where a guard stopped one, `Result.stopped` says so.
@@ -170,7 +209,9 @@ def simulate(
         paths = first.probes.position
         info = RunInfo(first.scene, first.model, surfaces, paths, steps.dt, steps.interval, span, said.append)
         impact.recording = Recording(recorders, info, steps.intervals, steps.per_interval, impact.solver.output)
-    _advance(impact, tell)
+    if store:
+        store.is_for(impact, span, settings, "mca")
+    _advance(impact, tell, store)
     clock.lap("fe")
     failed: tuple[str, ...] = ()
     if impact.recording:
@@ -184,8 +225,8 @@ def simulate(
     return [replace(result, failed=failed) for result in results]
 
 
-def _advance(impact: Impact, tell: Progress) -> None:
-    """The impact phase, with its recorders."""
+def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) -> None:
+    """The impact phase, with its recorders or its checkpoint."""
     passed = 0  # rows that recorders have
 
     def told() -> None:
@@ -195,6 +236,9 @@ def _advance(impact: Impact, tell: Progress) -> None:
             impact.recording.history(lambda: impact.scene_runs[0].history(first))
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
+    if store:
+        advance_stored(impact, store, told)
+        return
     try:
         impact.advance(told=told)
     except BaseException:
