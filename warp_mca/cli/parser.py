@@ -97,8 +97,8 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--checkpoint",
         metavar="EVERY",
-        help="store the state each 100 steps, 2e-5s simulated or 30w (s of wall time), so that the same command goes on "
-        "after an interruption (default with pure-fem: 30w)",
+        help="store the state each 100 steps, 2e-5s simulated or 30w (seconds of wall time); after an interruption the "
+        "same command goes on from it (default with pure-fem: 30w)",
     )
     parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")

@@ -111,4 +111,6 @@ def _sweep(args: argparse.Namespace) -> None:
     """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
     if _recorders(args, Path()):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
+    if args.method != "mca" or args.checkpoint is not None:
+        raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
     sweep.sweep(args, "--sweep", args.sweeps, folders=True)

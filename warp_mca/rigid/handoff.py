@@ -128,9 +128,7 @@ def hand_off(
     )
 
 
-def at_release(
-    scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]
-) -> tuple[HandOff, HandOff]:
+def at_release(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> tuple[HandOff, HandOff]:
     """Place every body at the release, and say where rigid links will touch.
 
     The target's body lies where its motion takes it under the tip of rigid links, with `centre_target`.

@@ -116,7 +116,7 @@ class PureRun:
         self.links = [link.body for link in self.touch.chain.links]
         self.passes = [k for k, item in enumerate(ready.model.passes) if _of_link(scene, item.contact, self.links)]
         if not self.passes:
-            raise bad_value("Scene.contacts", (), "no link can touch anything; give a Contact of a link with its target")
+            raise bad_value("Scene.contacts", (), "no link can touch anything; give a Contact of a link")
         self._angles = _angles(self.touch)
         self.clock.lap("compile")
 

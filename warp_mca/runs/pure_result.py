@@ -12,10 +12,10 @@ from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.paths import PathHistory, path_histories
 from warp_mca.results.result import Result
 from warp_mca.rigid.target import target_plane
+from warp_mca.runs.checkpoint import METHOD
 from warp_mca.runs.cycle_rows import STORED
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
-from warp_mca.runs.checkpoint import METHOD
 from warp_mca.runs.pure_fem import PureRun
 
 Array = NDArray[np.float64]
