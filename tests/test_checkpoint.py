@@ -80,12 +80,13 @@ def test_the_state_is_stored_as_often_as_asked(
 
 def test_another_request_is_refused_and_force_begins_anew(tmp_path: Path, stops: Callable[..., list[int]]):
     stops(tmp_path, 2, checkpoint="7")
-    for change, arguments, what in (
+    others: tuple[tuple[dict[str, Any], dict[str, Any], str], ...] = (
         ({"gravity": (0.0, -9.0, 0.0)}, {}, "model"),
         ({"impact": replace(LANDING.impact, energy_tolerance=0.02)}, {}, "impact"),
         ({}, {"duration": 5e-5}, "span"),
         ({}, {"precision": "float64"}, "precision"),
-    ):
+    )
+    for change, arguments, what in others:
         with pytest.raises(mca.RequestError, match=rf"^out = .*of another request \({what}\)"):
             mca.run(replace(LANDING, **change), out=tmp_path, checkpoint="7", threads=1, **arguments)
     assert stops(tmp_path, 1, checkpoint="7", force=True) == [7]

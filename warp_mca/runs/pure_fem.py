@@ -10,62 +10,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import asdict, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
-from warp_mca.model.build import build_model
-from warp_mca.model.cells import nodal_masses
-from warp_mca.model.precision import check_range
-from warp_mca.results.paths import locate
-from warp_mca.rigid.handoff import HandOff, at_release
 from warp_mca.rigid.placement import link_placements
-from warp_mca.runs.advice import mesh_warnings, warn
+from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress
 from warp_mca.runs.checkpoint import METHOD, Checkpoint, go_on
 from warp_mca.runs.division import coarser
 from warp_mca.runs.impact import Impact
-from warp_mca.runs.meshing import mesh
-from warp_mca.runs.prepare import Clock, Prepared
-from warp_mca.runs.rate_groups import grouping
+from warp_mca.runs.prepare import Clock
+from warp_mca.runs.pure_setup import Place, angles_of, check, is_of_link, prepare_release
 from warp_mca.runs.settings import Settings
-from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene import Scene
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.state_figures import joint_impulses
-
-Array = NDArray[np.float64]
+from warp_mca.solve.steps import Steps
 
 SWING_INTERVAL = 1e-4  # between rows of the swing [s]
 BLOCK = 10  # rows of the swing, or 1 ms: what is done again when something has touched in it
 LATEST = 1.5, 0.01  # times the touch of rigid links, and [s] more: by then flexible ones must have touched
 LOOK = 100  # rows between two looks whether something has touched, once it is near
-
-
-@dataclass
-class Place:
-    """Where a run is.
-
-    Attributes:
-        phase: "swing", or "impact" with the scene's output interval.
-        swung: steps until that phase.
-        touch: row of the impact whose interval the touch is in; None while nothing has touched.
-        joint_impulse: of each joint in the swing [N s], by name.
-        configuration: times [s] and greatest distances of the links' nodes from those of rigid links, as shares of the
-            chain's reach [-].
-        wall: wall-clock seconds of the run so far, by stage, and those of swing and impact.
-    """
-
-    phase: Literal["swing", "impact"] = "swing"
-    swung: int = 0
-    touch: int | None = None
-    joint_impulse: dict[str, list[float]] = field(default_factory=dict)
-    configuration: list[list[float]] = field(default_factory=list)
-    wall: dict[str, float] = field(default_factory=dict)
 
 
 class PureRun:
@@ -99,7 +68,7 @@ class PureRun:
         check(scene)
         self.clock, self.tell, self.span, self.settings = Clock(), tell, span, settings
         self.place, self.swing = Place(), SceneRecords()
-        ready, self.touch = _prepare(scene, meshes, span, settings, self.clock, tell)
+        ready, self.touch = prepare_release(scene, meshes, span, settings, self.clock, tell)
         warn(ready.warnings)
         tell("compile", 0.0)
         assert self.touch.swing is not None and self.touch.chain is not None
@@ -114,10 +83,10 @@ class PureRun:
         self.coarse = coarser(self.fine, ready.model, joined, BLOCK * (blocks + 1), speed)
         self.impact.divide_anew(self.coarse)
         self.links = [link.body for link in self.touch.chain.links]
-        self.passes = [k for k, item in enumerate(ready.model.passes) if _of_link(scene, item.contact, self.links)]
+        self.passes = [k for k, item in enumerate(ready.model.passes) if is_of_link(scene, item.contact, self.links)]
         if not self.passes:
             raise bad_value("Scene.contacts", (), "no link can touch anything; give a Contact of a link")
-        self._angles = _angles(self.touch)
+        self._angles = angles_of(self.touch)
         self.clock.lap("compile")
 
     def run(self, checkpoint: Checkpoint | None) -> None:
@@ -181,7 +150,8 @@ class PureRun:
             self.place.touch = self._first_touch(impact.rows)
         impact.take(self._ending(self.place.touch))
 
-    def _ending(self, touch: int) -> Any:
+    def _ending(self, touch: int) -> Steps:
+        """Rows of the impact until `span` after the touch, which is in the interval of this row."""
         return replace(self.fine, intervals=touch - 1 + self.rows)
 
     def _first_touch(self, last: int) -> int | None:
@@ -261,57 +231,3 @@ class PureRun:
             self.swing = SceneRecords.of(more)
             self.impact.steps = self.fine if self.place.touch is None else self._ending(self.place.touch)
         self.impact.load(checkpoint.path)
-
-
-def check(scene: Scene) -> None:
-    """Refuse scenes that cannot be run from their release by finite elements alone.
-
-    Raises:
-        RequestError: so it is.
-    """
-    if scene.rigid is None:
-        remedy = "without a rigid phase bodies start where they are, by finite elements; leave it out"
-        raise bad_value("method", METHOD, remedy)
-    if scene.t_end is not None:
-        raise bad_value("Scene.t_end", scene.t_end, f"{METHOD} ends duration after the first touch; leave t_end out")
-    if scene.prescribed:
-        remedy = f"times of a Prescribed velocity count from the touch, which {METHOD} does not know; leave it out"
-        raise bad_value("Scene.prescribed", scene.prescribed[0].body, remedy)
-
-
-def _prepare(
-    scene: Scene, meshes: Mapping[str, Mesh] | None, span: float, settings: Settings, clock: Clock, tell: Progress
-) -> tuple[Prepared, HandOff]:
-    """The scene at its release, and the hand-off of rigid links.
-
-    Raises:
-        RequestError: the scene cannot be built as written.
-    """
-    tell("mesh", 0.0)
-    meshes = mesh(scene, None, meshes)
-    clock.lap("mesh")
-    tell("rigid", 0.0)
-    start, touch = at_release(scene, meshes, nodal_masses(scene, meshes))
-    clock.lap("rigid")
-    groups = grouping(scene, span, settings.device, settings.multi_rate)
-    X, V = start.positions, start.velocities
-    model = build_model(scene, meshes, X, V, chain=start.chain, start=0.0, grouping=groups)
-    check_range(model, settings.precision)
-    probes = locate(scene, model, meshes)
-    clock.lap("mesh")
-    return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model))), touch
-
-
-def _of_link(scene: Scene, contact: int, links: list[str]) -> bool:
-    """Whether a contact is of a link with something that is none."""
-    item = scene.contacts[contact]
-    other = None if isinstance(item.master, RigidPlane) else item.master.body
-    return (item.slave.body in links) != (other in links)
-
-
-def _angles(touch: HandOff) -> Any:
-    """Coordinates of rigid links as a function of time [s], by cubic interpolation of the swing with its rates."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    assert touch.swing is not None
-    return CubicHermiteSpline(touch.swing.t, touch.swing.theta_t, touch.swing.theta_dot_t)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -109,8 +109,17 @@ def run(
             raise GuardError(found.stopped)
         return found
 
-    if out is None:
-        return result(None)
+    return result(None) if out is None else _kept(result, out, force, every)
+
+
+def _kept(
+    result: Callable[[Checkpoint | None], Result], out: str | os.PathLike[str], force: bool, every: Every | None
+) -> Result:
+    """What came of a run that writes to a folder, which it holds meanwhile; arguments as in `run`.
+
+    Raises:
+        RequestError: the folder cannot be used.
+    """
     with hold(out, force=force) as folder:
         store = Checkpoint(folder.path, every, force) if every else None
         found = write(result(store), folder, force=force)
