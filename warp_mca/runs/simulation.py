@@ -78,8 +78,7 @@ def run(
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
         method: "mca" swings rigid links; "pure-fem" computes the swing by finite elements too.
-        checkpoint: how often the state is stored in `out`, as "100" (steps), "2e-5s" (simulated) or "30w" (wall time),
-            so that the same call goes on after an interruption; "pure-fem" does by default.
+        checkpoint: how often `out` gets the state, as `Every.parse` has it, from which the same call goes on.
 
     Returns:
         The result, with histories as float64 arrays.
@@ -92,8 +91,7 @@ def run(
 
     check_scene("scene", scene)
     scene = with_options(scene, refine, mass_scaling, meshes)
-    tell = teller(progress)
-    span = span_of(scene, duration)
+    tell, span = teller(progress), span_of(scene, duration)
     check_recorders(recorders)
     settings = settings_of(device, precision, threads, multi_rate)
     check_files(recorders, None if out is None else check_output(out, force=force))
