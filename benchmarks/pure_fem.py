@@ -5,7 +5,7 @@ elements from the release on; rigid links until the touch, then finite elements;
 its contacts have been open for a while, for several such times. Writes pure_fem.json; the run of finite elements alone
 goes on in DIR/pure after an interruption.
 
-    python -m benchmarks.pure_fem two_link --preset paper --set joint_nodes=axis --set penalty=1 --device cuda:0 --out t2
+    python -m benchmarks.pure_fem two_link --preset paper --set joint_nodes=axis --set penalty=1 --device cuda:0 --out t
 """
 
 from __future__ import annotations

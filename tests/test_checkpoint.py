@@ -33,6 +33,13 @@ class StoppedError(Exception):
     pass
 
 
+@pytest.fixture(autouse=True)
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing them takes longer than the runs."""
+    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+        monkeypatch.setattr(figure, lambda *_: None)
+
+
 @pytest.fixture
 def stops(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[int]]:
     """Runs into a folder until the state has been stored so often; gives the steps at which it was."""
