@@ -124,9 +124,10 @@ class PureRun:
                     f"at {self._predicted:.4g} s: let the scene's links be stiffer, or run it without --method pure-fem"
                 )
             impact.advance(until=impact.state.steps + block)
-            self._check(0)
             if self._first_touch(BLOCK) is not None or self._presses():
+                impact.stopped = [None]  # a guard that rightly stopped the block does so again
                 break
+            self._check(0)
             held.assign(impact.state)
             self._note_configuration()
             self.tell("impact", min(1.0, impact.state.steps * self.fine.dt / (self._predicted + self.span)))

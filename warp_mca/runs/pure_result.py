@@ -65,7 +65,7 @@ def _figures(run: PureRun, found: Result, origin: float, touch: int) -> dict[str
     """
     place, t_contact = run.place, run.begin + origin
     steps = place.swung + found.summary["n_steps"]
-    fe = run.clock.wall["fe"]
+    rate = found.summary["element_steps_per_s"]
     impulse = {
         name: (np.asarray(total) - place.joint_impulse[name]).tolist()
         for name, total in found.summary["joint_impulse"].items()
@@ -78,7 +78,7 @@ def _figures(run: PureRun, found: Result, origin: float, touch: int) -> dict[str
         "theta_dot": [],
         "n_steps": steps,
         "simulated_time": steps * run.fine.dt,
-        "element_steps_per_s": found.summary["n_elements"] * steps / fe if fe > 0.0 else None,
+        "element_steps_per_s": None if rate is None else rate * steps / found.summary["n_steps"],
         "joint_impulse": impulse,
         "phases": _phases(run, t_contact, touch),
         "configuration": place.configuration,
