@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.validate import DAMAGE
-from warp_mca.solve.state import digest
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Recorder
@@ -113,6 +112,8 @@ class Checkpoint:
 
     def is_for(self, impact: Impact, span: float, settings: Settings, method: str) -> None:
         """Say what the run is, `span` [s] of impact: another one does not go on from its file."""
+        from warp_mca.solve.state import digest  # which imports Warp, that the command line need not
+
         ready, solver = impact.ready[0], impact.solver
         self.request = {
             "method": method,
