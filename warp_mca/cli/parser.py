@@ -11,6 +11,7 @@ import warp_mca as mca
 from warp_mca.cli import commands, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.elements import ELEMENTS
+from warp_mca.runs.checkpoint import METHODS
 
 WELCOME = """\
 warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
@@ -43,6 +44,7 @@ def make_parser() -> argparse.ArgumentParser:
     add = partial(parser.add_subparsers(metavar="COMMAND").add_parser, allow_abbrev=False)
     _run(add("run", help="run a scene or a built model"))
     _sweep(add("sweep", help="run a scene for each combination of values, and collect a row of figures a run"))
+    _resume(add("resume", help="go on with a run that was stopped, from the state stored in its folder"))
     _tradeoff(add("tradeoff", help="measure what choices of the model cost in error and in time"))
     _build(add("build", help="make the meshes of a scene and store them with it"))
     _scenes(add("scenes", help="list scenes, presets and parameters"))
@@ -90,10 +92,27 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE,…",
         help="as warp-mca sweep --grid, with the files of each run in folders 0, 1, … in DIR",
     )
+    parser.add_argument(
+        "--method",
+        default="mca",
+        choices=METHODS,
+        help="mca: rigid links swing until they touch; pure-fem: finite elements from the release on (default: mca)",
+    )
+    parser.add_argument(
+        "--checkpoint",
+        metavar="EVERY",
+        help="store the state each 100 steps, 2e-5s simulated or 30w (seconds of wall time); after an interruption the "
+        "same command goes on from it (default with pure-fem: 30w)",
+    )
     parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(parser)
     parser.set_defaults(command=run.run)
+
+
+def _resume(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", type=_folder, help="folder of a run with --checkpoint or pure-fem")
+    parser.set_defaults(command=run.resume, parse=lambda words: make_parser().parse_args(words))
 
 
 def _sweep(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from warp_mca.cli import sweep
 from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.request import read_request
 from warp_mca.cli.warp_start import start_warp
+from warp_mca.runs.checkpoint import DEFAULT, Every, stored_command
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
@@ -28,10 +29,10 @@ def run(args: argparse.Namespace) -> None:
         _sweep(args)
         return
     request = read_request(args)
-    out = args.out or Path(request.label)
+    out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
     recorders = _recorders(args, out)
     start_warp(*(["scipy.integrate"] if request.scene.rigid else []), "scipy.signal", "matplotlib.backends.backend_agg")
-    with _noting_recordings(args), progress_bar() as progress:
+    with _noting_what_is_left(args), progress_bar() as progress:
         result = mca.run(
             request.scene,
             device=args.device,
@@ -45,6 +46,8 @@ def run(args: argparse.Namespace) -> None:
             meshes=request.meshes,
             recorders=recorders,
             progress=progress,
+            method=args.method,
+            checkpoint=_every(args),
         )
     written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
     recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
@@ -74,9 +77,26 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     return found + [SnapshotFile(out / f"snapshot-{1e6 * t:g}us.png", time=t) for t in args.snapshots]
 
 
+def resume(args: argparse.Namespace) -> None:
+    """Repeat the command whose run stored its state in a folder: it goes on from there."""
+    words, directory = stored_command(args.folder)
+    folder = args.folder.absolute()
+    again = args.parse(words)
+    again.words, again.out, again.force = words, folder, False
+    with chdir(directory):
+        again.command(again)
+
+
+def _every(args: argparse.Namespace) -> Every | None:
+    """How often the run stores its state, with the command that repeats it; None if that is not asked for."""
+    if args.checkpoint is None and args.method == "mca":
+        return None
+    return Every.parse(DEFAULT if args.checkpoint is None else args.checkpoint, tuple(args.words))
+
+
 @contextmanager
-def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
-    """Add to an interrupt of a run that its recordings hold the frames until then."""
+def _noting_what_is_left(args: argparse.Namespace) -> Iterator[None]:
+    """Add to an interrupt of a run that its recordings hold the frames until then, or that it can go on."""
     from warp_mca.recorders import FILES
 
     try:
@@ -84,6 +104,8 @@ def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
     except KeyboardInterrupt as stop:
         if any(getattr(args, option) for option, kind in FILES.items() if kind.frames):
             stop.add_note("recordings hold the frames until then")
+        if _every(args):
+            stop.add_note("the same command goes on from the state that was last stored")
         raise
 
 
@@ -93,4 +115,6 @@ def _sweep(args: argparse.Namespace) -> None:
         raise bad_value("--accuracy", args.accuracy, "each scene of a sweep would get a model of its own; leave it out")
     if _recorders(args, Path()):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
+    if args.method != "mca" or args.checkpoint is not None:
+        raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
     sweep.sweep(args, "--sweep", args.sweeps, folders=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -126,6 +126,40 @@ def hand_off(
         chain=chain,
         swing=run,
     )
+
+
+def at_release(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> tuple[HandOff, HandOff]:
+    """Place every body at the release, and say where rigid links will touch.
+
+    The target's body lies where its motion takes it under the tip of rigid links, with `centre_target`.
+
+    Returns:
+        The scene at t = 0, with a chain of the mesh's inertia, and the hand-off of that chain at its touch.
+
+    Raises:
+        RequestError: as in `hand_off`.
+    """
+    assert scene.rigid is not None
+    rigid = replace(scene.rigid, inertia="mesh")
+    touch = hand_off(replace(scene, rigid=rigid), meshes, nodal_masses)
+    assert touch.chain is not None and touch.swing is not None
+    placements = {body.name: _own_placement(body, 0.0) for body in scene.bodies}
+    if isinstance(rigid.target, Surface):
+        name = rigid.target.body
+        moved = touch.placements[name].origin - _own_placement(scene.body(name), touch.swing.t_end).origin
+        placements[name] = replace(placements[name], origin=placements[name].origin + moved)
+    theta, theta_dot = touch.swing.theta_t[0], touch.swing.theta_dot_t[0]
+    placements |= link_placements(touch.chain, theta, theta_dot)
+    positions, velocities = _place(placements, meshes)
+    start = HandOff(
+        positions=positions,
+        velocities=velocities,
+        placements=placements,
+        theta=theta,
+        theta_dot=theta_dot,
+        chain=touch.chain,
+    )
+    return start, touch
 
 
 def _own_placement(body: Body, t: float) -> Placement:

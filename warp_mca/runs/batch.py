@@ -17,7 +17,7 @@ from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
 from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_of, teller
 from warp_mca.runs.settings import settings_of
-from warp_mca.runs.simulation import simulate
+from warp_mca.runs.simulate import simulate
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.scene.options import with_options
 

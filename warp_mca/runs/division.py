@@ -54,6 +54,15 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float, substeps
     return Steps(dt=dt, per_search=per_search, searches=searches, intervals=intervals, intervals_per_search=apart)
 
 
+def coarser(steps: Steps, model: Model, rows: int, intervals: int, speed: float) -> Steps:
+    """The same time step in intervals of so many `rows`, with searches for contact that a `speed` [m/s] needs."""
+    margins = [item.margin for item in model.passes if item.plane is None]
+    needed = SPEED_RESERVE * speed * rows * steps.interval / (0.5 * min(margins)) if margins else 1.0
+    most = rows * steps.searches
+    joined = max(k for k in range(1, most + 1) if most % k == 0 and (k == 1 or most // k >= needed))
+    return Steps(steps.dt, per_search=steps.per_search * joined, searches=most // joined, intervals=intervals)
+
+
 def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, float]:
     """Longest step [s] of a scene, and searches for contact in an output interval [s], fewer than 1 where few suffice.
 

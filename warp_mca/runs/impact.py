@@ -21,9 +21,10 @@ from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.scene_run import SceneRun
 from warp_mca.solve.contact_watch import contact_watch
 from warp_mca.solve.output import Output
+from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
-from warp_mca.solve.steps import Part
+from warp_mca.solve.steps import Part, Steps
 from warp_mca.solve.transfer import Transfer
 from warp_mca.solve.workspace import ROWS
 
@@ -113,13 +114,30 @@ class Impact:
         self.stopped = [None] * len(self.ready)
         self._begin_scenes()
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Store the state, between two calls of `advance`.
+    def save(self, path: str | os.PathLike[str], more: Mapping[str, NDArray] | None = None) -> None:
+        """Store the state, and `more` arrays with it, between two calls of `advance`.
 
         Raises:
             OSError: the file cannot be written.
         """
-        self.state.save(path, self.solver.model, self.solver.dt)
+        self.state.save(path, self.solver.model, self.solver.dt, more)
+
+    def divide_anew(self, steps: Steps) -> list[SceneRecords]:
+        """Go on with other intervals of the same time step: rows begin anew, energies and extremes go on.
+
+        Returns:
+            What each scene has recorded so far.
+        """
+        earlier = self.state.scenes
+        self.state.scenes = [records.without_rows() for records in earlier]
+        self.state.steps = 0
+        self.take(steps)
+        return earlier
+
+    def take(self, steps: Steps) -> None:
+        """Divide the phase, what is done of it included, by intervals of the same time step."""
+        self.steps = steps
+        self._begin_scenes()
 
     @property
     def rows(self) -> int:

@@ -97,9 +97,15 @@ class SceneRun:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
 
-    def result(self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None) -> Result:
-        """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it."""
+    def result(
+        self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None, origin: float = 0.0
+    ) -> Result:
+        """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it.
+
+        Times count from `origin` [s] after the first row.
+        """
         history = self.history()
+        history["time_s"] = history["time_s"] - origin
         names = contact_names(self.ready.scene.contacts)
         contacts = contact_histories(self.ledger, names)
         shares = spring_shares(self.ledger, self.ready.model, names)

@@ -1,23 +1,20 @@
-"""Owns `run`, and what it shares with batches: a run is a batch of one."""
+"""Owns `run`: its arguments, and which kind of run they ask for."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from warp_mca.accuracy.plan import Plan, planned
 from warp_mca.accuracy.request import Accuracy
-from warp_mca.base.errors import GuardError, RequestError, bad_value
+from warp_mca.base import validate
+from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.precision import check_range
-from warp_mca.recorders.recorder import Recorder, RunInfo
-from warp_mca.results.paths import Found
+from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.result import Result
 from warp_mca.results.storage import check_output, hold, write
-from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import (
     Progress,
     check_recorders,
@@ -26,17 +23,14 @@ from warp_mca.runs.arguments import (
     span_of,
     teller,
 )
+from warp_mca.runs.checkpoint import METHOD, Checkpoint, Every, every_of
 from warp_mca.runs.meshing import mesh
-from warp_mca.runs.prepare import Clock, Prepared, prepare
-from warp_mca.runs.rate_groups import grouping
 from warp_mca.runs.settings import Settings, settings_of
+from warp_mca.runs.simulate import simulate
 from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
 
-if TYPE_CHECKING:
-    from warp_mca.runs.impact import Impact
-
-__all__ = ["mesh", "run", "simulate"]
+__all__ = ["mesh", "run"]
 
 
 @one_at_a_time
@@ -56,6 +50,8 @@ def run(
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
+    method: str = "mca",
+    checkpoint: str | Every | None = None,
 ) -> Result:
     """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
 
@@ -79,6 +75,8 @@ def run(
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
+        method: "mca" swings rigid links; "pure-fem" computes the swing by finite elements too.
+        checkpoint: how often `out` gets the state, as `Every.parse` has it, from which the same call goes on.
 
     Returns:
         The result, with histories as float64 arrays.
@@ -92,14 +90,54 @@ def run(
     tell, span = teller(progress), span_of(scene, duration)
     settings = settings_of(device, precision, threads, multi_rate)
     _check_files(recorders, out, force)
+    every = every_of(method, checkpoint, out, scene, recorders)
+    if accuracy is not None and (every or method == METHOD):
+        remedy = "it is for runs of one impact that store nothing on the way; leave it out, or method and checkpoint"
+        raise bad_value("accuracy", validate.brief(accuracy), remedy)
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    result = partial(_result, plan, scene, meshes, span, tell, settings, recorders)
-    if out is None:
-        return result()
+    result = partial(_result, plan, scene, meshes, span, tell, settings, recorders, method)
+    return result(None) if out is None else _kept(result, out, force, every)
+
+
+def _kept(
+    result: Callable[[Checkpoint | None], Result], out: str | os.PathLike[str], force: bool, every: Every | None
+) -> Result:
+    """What came of a run that writes to a folder, which it holds meanwhile; arguments as in `run`.
+
+    Raises:
+        RequestError: the folder cannot be used.
+    """
     with hold(out, force=force) as folder:
-        return write(result(), folder, force=force)
+        store = Checkpoint(folder.path, every, force) if every else None
+        found = write(result(store), folder, force=force)
+        if store:
+            store.remove()
+        return found
+
+
+def _pure(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    store: Checkpoint | None,
+) -> Result:
+    """Finite elements from the release on; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: the run lost its footing, or nothing touched.
+    """
+    from warp_mca.runs.pure_fem import PureRun
+    from warp_mca.runs.pure_result import pure_result
+
+    run = PureRun(scene, meshes, span, settings, tell)
+    run.run(store)
+    tell("impact", 1.0)
+    return pure_result(run)
 
 
 def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None, force: bool) -> None:
@@ -122,6 +160,8 @@ def _result(
     tell: Progress,
     settings: Settings,
     recorders: Sequence[Recorder],
+    method: str,
+    store: Checkpoint | None,
 ) -> Result:
     """One impact, or many in turn, of the scene or what was planned in its place; arguments as in `simulate`.
 
@@ -129,8 +169,10 @@ def _result(
         RequestError: the request cannot be carried out.
         GuardError: the run lost its footing.
     """
+    if method == METHOD:
+        return _pure(scene, meshes, span, tell, settings, store)
     if plan is None:
-        return _single(scene, meshes, span, tell, settings, recorders)
+        return _single(scene, meshes, span, tell, settings, recorders, store)
     settings = replace(settings, **plan.variant.options)
     ready = None if recorders else plan.ready
     return plan.judged(ready or _single(plan.scene, meshes, span, tell, settings, recorders))
@@ -143,6 +185,7 @@ def _single(
     tell: Progress,
     settings: Settings,
     recorders: Sequence[Recorder],
+    store: Checkpoint | None = None,
 ) -> Result:
     """One impact, or many in turn; arguments as in `simulate`.
 
@@ -152,7 +195,7 @@ def _single(
     """
     if scene.t_end is not None:
         return _cycle(scene, meshes, span, tell, settings, recorders)
-    (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
+    (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders, store)
     if found.stopped is not None:
         raise GuardError(found.stopped)
     return found
@@ -180,107 +223,3 @@ def _cycle(
         raise bad_value("Scene.t_end", scene.t_end, remedy)
     setup = begin_cycle(scene, meshes, span, settings, tell)
     return cycle_result(setup, run_cycle(setup))
-
-
-def simulate(
-    scenes: Sequence[Scene],
-    meshes: Sequence[Mapping[str, Mesh]] | None,
-    span: float,
-    tell: Progress,
-    settings: Settings,
-    recorders: Sequence[Recorder] = (),
-) -> list[Result]:
-    """Run scenes side by side.
-
-    Args:
-        scenes: as `run_batch` checks them; a lone one may have `recorders`.
-        meshes: finished meshes by body of each scene, or None.
-        span: of the impact phase [s].
-        tell: told of stages.
-        settings: device, precision and threads.
-        recorders: of a lone scene.
-
-    Returns:
-        The result of each scene; where a guard stopped one, `Result.stopped` says so.
-
-    Raises:
-        RequestError: the request cannot be carried out.
-    """
-    from warp_mca.recorders.frames import Recording, skins
-    from warp_mca.runs.impact import Impact
-
-    clock = Clock()
-    ready = _prepare(scenes, meshes, span, settings, clock, tell)
-    warn(sentence for item in ready for sentence in item.warnings)
-    tell("compile", 0.0)
-    surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
-    needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
-    impact = Impact(ready, span, **settings.solver, skins=surfaces, needs=needs)
-    clock.lap("compile")
-    said: list[str] = []
-    steps, first = impact.steps, ready[0]
-    if recorders:
-        paths = first.probes.position
-        info = RunInfo(first.scene, first.model, surfaces, paths, steps.dt, steps.interval, span, said.append)
-        impact.recording = Recording(recorders, info, steps.intervals, steps.per_interval, impact.solver.output)
-    _advance(impact, tell)
-    clock.lap("fe")
-    failed: tuple[str, ...] = ()
-    if impact.recording:
-        impact.recording.finish(impact.stopped[0] is None)
-        failed = tuple(impact.recording.failed)
-        clock.lap("output")
-    tell("impact", 1.0)
-    results = [
-        item.result(clock.wall, said, stopped) for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)
-    ]
-    return [replace(result, failed=failed) for result in results]
-
-
-def _advance(impact: Impact, tell: Progress) -> None:
-    """The impact phase, with its recorders."""
-    passed = 0  # rows that recorders have
-
-    def told() -> None:
-        nonlocal passed
-        if impact.recording and impact.rows > passed:
-            first, passed = passed, impact.rows
-            impact.recording.history(lambda: impact.scene_runs[0].history(first))
-        tell("impact", impact.rows / (impact.steps.intervals + 1))
-
-    try:
-        impact.advance(told=told)
-    except BaseException:
-        if impact.recording:
-            impact.recording.finish(False)
-        raise
-
-
-def _prepare(
-    scenes: Sequence[Scene],
-    meshes: Sequence[Mapping[str, Mesh]] | None,
-    span: float,
-    settings: Settings,
-    clock: Clock,
-    tell: Progress,
-) -> list[Prepared]:
-    """Every scene at the start of its impact phase."""
-    made: dict[object, Mesh] = {}
-    places: Found = {}
-    ready = []
-    for k, scene in enumerate(scenes):
-        try:
-            own = None if meshes is None else meshes[k]
-            groups = grouping(scene, span, settings.device, settings.multi_rate)
-            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made, groups))
-            check_range(ready[-1].model, settings.precision)
-        except RequestError as error:
-            if len(scenes) == 1:
-                raise
-            raise RequestError(f"scenes[{k}]: {error}") from error
-    return ready
-
-
-def _share(tell: Progress, done: float) -> Progress:
-    """Tells of every stage that this share of the scenes is done with it."""
-    return lambda stage, _: tell(stage, done)

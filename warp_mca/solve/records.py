@@ -65,6 +65,10 @@ class SceneRecords:
         lists = {name: list(getattr(self, name)) for name in _LISTS}
         return replace(self, **lists, peaks=self.peaks.copy(), stiffened=self.stiffened.copy())
 
+    def without_rows(self) -> SceneRecords:
+        """What a run goes on with whose history begins anew: sums and extremes so far, no rows."""
+        return replace(self, sums=[], velocities=[], path_stress=[], peaks=self.peaks.copy(), count=0, records=0)
+
     def arrays(self) -> dict[str, NDArray]:
         """All of it as arrays by name, for a file."""
         found: dict[str, NDArray] = {

@@ -112,20 +112,24 @@ class State:
         pairs = zip(self.scenes, other.scenes, strict=True)
         return found + [f"scenes/{k}/{name}" for k, (a, b) in enumerate(pairs) for name in a.differences(b)]
 
-    def save(self, path: str | os.PathLike[str], model: Model, dt: float) -> None:
+    def save(
+        self, path: str | os.PathLike[str], model: Model, dt: float, more: Mapping[str, NDArray] | None = None
+    ) -> None:
         """Store the state in one file, whole or not at all.
 
         Args:
             path: of the file.
             model: that the state belongs to.
             dt: time step [s].
+            more: arrays that are stored with it; `load` leaves them alone.
 
         Raises:
             OSError: the file cannot be written.
         """
         head = {"format": FORMAT, "model": digest(model), "dt": dt, "steps": self.steps}
         head |= {"scalar": self._scalar, "scenes": len(self.scenes)}
-        arrays: dict[str, Any] = {name: array.numpy() for name, array in self.arrays().items()}
+        arrays: dict[str, Any] = {**(more or {})}
+        arrays |= {name: array.numpy() for name, array in self.arrays().items()}
         for k, records in enumerate(self.scenes):
             arrays |= {f"scenes/{k}/{name}": array for name, array in records.arrays().items()}
         arrays["header"] = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
@@ -221,8 +225,8 @@ def _part(stored: dict[str, NDArray], prefix: str) -> dict[str, NDArray]:
     return {name.removeprefix(prefix): array for name, array in stored.items() if name.startswith(prefix)}
 
 
-def digest(model: Model) -> str:
-    """SHA-256 of all that a model is made of: equal for the same scene and meshes."""
+def digest(model: object) -> str:
+    """SHA-256 of all that a model, or another dataclass, is made of: equal for the same scene and meshes."""
     found = hashlib.sha256()
     for part in _parts(model):
         found.update(part)

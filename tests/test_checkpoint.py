@@ -1,0 +1,131 @@
+"""The state of a run stored on its way: how often, and that the same call goes on to the same bits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.cli.main import main
+from warp_mca.runs.checkpoint import FILE, Checkpoint, Every
+
+BLOCK = mca.Body(
+    name="block",
+    geometry=mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2)),
+    material=mca.Elastic(E=1e9, nu=0.3, rho=1e3),
+    velocity=(0.3, -1.0, 0.0),
+)
+LANDING = mca.Scene(
+    name="landing",
+    bodies=(BLOCK,),
+    contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), mu=0.2),),
+    impact=mca.ImpactPhase(duration=4e-5),
+)
+
+
+class StoppedError(Exception):
+    pass
+
+
+@pytest.fixture(autouse=True)
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing them takes longer than the runs."""
+    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+        monkeypatch.setattr(figure, lambda *_: None)
+
+
+@pytest.fixture
+def stops(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[int]]:
+    """Runs into a folder until the state has been stored so often; gives the steps at which it was."""
+
+    def stop(out: Path, count: int, **settings: Any) -> list[int]:
+        steps, store = [], Checkpoint.store
+
+        def store_and_stop(self: Checkpoint, impact: Any, place: Any, more: Any = None) -> None:
+            store(self, impact, place, more)
+            steps.append(impact.state.steps)
+            if len(steps) == count:
+                raise StoppedError
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Checkpoint, "store", store_and_stop)
+            with pytest.raises(StoppedError):
+                mca.run(LANDING, out=out, threads=1, **settings)
+        return steps
+
+    return stop
+
+
+def test_a_run_goes_on_from_its_last_state(tmp_path: Path, stops: Callable[..., list[int]]):
+    whole = mca.run(LANDING, threads=1)
+    assert whole.F_n.max() > 0.0 and whole["E_friction"][-1] > 0.0
+    assert stops(tmp_path / "out", 2, checkpoint="7") == [7, 14]
+    assert stops(tmp_path / "out", 1, checkpoint="7") == [21]
+    result = mca.run(LANDING, out=tmp_path / "out", threads=1, checkpoint="7")
+    assert all(np.array_equal(result[name], whole[name], equal_nan=True) for name in whole.history)
+    assert result.summary["energy"] == whole.summary["energy"]
+    assert not (tmp_path / "out" / FILE).exists()
+
+
+@pytest.mark.parametrize(("every", "steps"), [("7e-6s", [7, 14]), ("1e-9w", [1, 2]), ("1000w", [])])
+def test_the_state_is_stored_as_often_as_asked(
+    every: str, steps: list[int], tmp_path: Path, stops: Callable[..., list[int]], monkeypatch: pytest.MonkeyPatch
+):
+    assert mca.run(LANDING, threads=1).summary["n_steps"] == 40  # a step a row
+    if steps:
+        assert stops(tmp_path, 2, checkpoint=every) == steps
+    else:
+        monkeypatch.setattr(Checkpoint, "store", None)
+        assert mca.run(LANDING, threads=1, out=tmp_path, checkpoint=every).summary["n_steps"] == 40
+
+
+def test_another_request_is_refused_and_force_begins_anew(tmp_path: Path, stops: Callable[..., list[int]]):
+    stops(tmp_path, 2, checkpoint="7")
+    others: tuple[tuple[dict[str, Any], dict[str, Any], str], ...] = (
+        ({"gravity": (0.0, -9.0, 0.0)}, {}, "model"),
+        ({"impact": replace(LANDING.impact, energy_tolerance=0.02)}, {}, "impact"),
+        ({}, {"duration": 5e-5}, "span"),
+        ({}, {"precision": "float64"}, "precision"),
+    )
+    for change, arguments, what in others:
+        with pytest.raises(mca.RequestError, match=rf"^out = .*of another request \({what}\)"):
+            mca.run(replace(LANDING, **change), out=tmp_path, checkpoint="7", threads=1, **arguments)
+    assert stops(tmp_path, 1, checkpoint="7", force=True) == [7]
+
+
+def test_a_damaged_file_is_refused(tmp_path: Path, stops: Callable[..., list[int]]):
+    stops(tmp_path, 1, checkpoint="7")
+    intact = (tmp_path / FILE).read_bytes()
+    for damaged in (b"", intact[: len(intact) // 2]):
+        (tmp_path / FILE).write_bytes(damaged)
+        with pytest.raises(mca.RequestError, match=r"checkpoint\.npz there is damaged"):
+            mca.run(LANDING, out=tmp_path, checkpoint="7", threads=1)
+
+
+def test_resume_needs_a_command(tmp_path: Path, stops: Callable[..., list[int]], capsys: pytest.CaptureFixture[str]):
+    assert main(["resume", str(tmp_path)]) == 2
+    assert f"there is no {FILE}" in capsys.readouterr().err
+    stops(tmp_path, 1, checkpoint="7")
+    assert main(["resume", str(tmp_path)]) == 2
+    assert "call it again with this out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "0", "1.5", "-2s", "nan", "3 weeks", "s", "infw"])
+def test_what_is_no_frequency_is_refused(text: str):
+    with pytest.raises(mca.RequestError, match=re.escape("100 (steps), 2e-5s")):
+        Every.parse(text)
+
+
+def test_a_run_in_turn_and_a_run_without_a_folder_store_nothing(tmp_path: Path):
+    with pytest.raises(mca.RequestError, match="name one by out"):
+        mca.run(LANDING, checkpoint="7")
+    cycle = mca.make_scene("single_link", t_end=0.1)
+    with pytest.raises(mca.RequestError, match="leave t_end out"):
+        mca.run(cycle, checkpoint="7", out=tmp_path / "out")
+    assert main(["run", "single_link", "--sweep", "mu=0.1,0.2", "--checkpoint", "7", "--out", str(tmp_path / "a")]) == 2
