@@ -51,6 +51,7 @@ def _carry_out(args: argparse.Namespace) -> None:
 
 def _print(report: Report) -> None:
     """How many claims agree, each that does not, and the files."""
+    from warp_mca.paper.page import value_text
     from warp_mca.report.console import console
 
     out = console()
@@ -58,6 +59,7 @@ def _print(report: Report) -> None:
         out.print(f"{sum(verdict.agrees is state for verdict in report.verdicts):3} claims {said}")
     for verdict in report.verdicts:
         if verdict.agrees is False:
-            out.print(f"differs: {verdict.claim.what}: {verdict.ours} ({verdict.why})", soft_wrap=True)
+            claim, ours = verdict.claim, value_text(verdict.ours, verdict.claim.unit)
+            out.print(f"differs: {claim.what}: {ours} ({verdict.why})", soft_wrap=True)
     for file in report.files[:3]:
         out.print(f"wrote {file}", soft_wrap=True)

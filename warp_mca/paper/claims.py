@@ -99,8 +99,10 @@ def _judged(claim: Claim, runs: Runs) -> Verdict:
         return Verdict(claim, None, None, str(missing))
     coarse, softer = (_try(claim, Evidence(runs, variant)) for variant in (MESH, PENALTY))
     agrees, why = _compared(claim, found)
+    changes = _change(found, coarse), _change(coarse, softer)
+    why += _doubt(claim, changes)
     ours = found.text if isinstance(found, Words) else found
-    return Verdict(claim, ours, agrees, why, _change(found, coarse), _change(coarse, softer))
+    return Verdict(claim, ours, agrees, why, *changes)
 
 
 def _try(claim: Claim, evidence: Evidence) -> Found | None:
@@ -113,7 +115,8 @@ def _try(claim: Claim, evidence: Evidence) -> Found | None:
 def _compared(claim: Claim, found: Found) -> tuple[bool, str]:
     """Whether ours agrees, and why that is said."""
     if isinstance(found, Words):
-        agrees, why = found.agrees, "as the paper says" if found.agrees else "not as the paper says"
+        agrees = bool(found.agrees)  # numpy has truth values of its own
+        why = "as the paper says" if agrees else "not as the paper says"
     else:
         assert not isinstance(claim.paper, str), claim.id
         difference = found / claim.paper - 1.0
@@ -122,10 +125,20 @@ def _compared(claim: Claim, found: Found) -> tuple[bool, str]:
     return agrees, why if agrees or not claim.reason else f"{why}: {claim.reason}"
 
 
+def _doubt(claim: Claim, changes: Sequence[float | str | None]) -> str:
+    """What to add where the mesh or the penalty changes ours by more than the tolerance, or turns words round."""
+    moved = [
+        name
+        for name, change in zip(("mesh", "penalty"), changes, strict=True)
+        if (abs(change) > claim.tolerance if isinstance(change, float) else change not in (None, "same"))
+    ]
+    return f"; unsure, as another {' or '.join(moved)} changes it" if moved else ""
+
+
 def _change(first: Found | None, second: Found | None) -> float | str | None:
     """From the first to the second: a share, or the words of the second where they change."""
     if isinstance(first, Words) and isinstance(second, Words):
-        return "same" if first.agrees == second.agrees else second.text
+        return "same" if bool(first.agrees) == bool(second.agrees) else second.text
     if isinstance(first, float) and isinstance(second, float) and first != 0.0:
         return second / first - 1.0
     return None

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from warp_mca.paper.studies import MAIN, Case, Key, Level, cases
+from warp_mca.paper.studies import MAIN, STUDIES, Case, Key, Level, cases
 from warp_mca.results.result import Result
 from warp_mca.results.storage import load
 from warp_mca.runs.arguments import Progress
@@ -58,10 +58,10 @@ class Evidence:
         """
         case = self.runs.cases.get((study, value, self.variant))
         if case is None:
-            raise MissingRunError(f"{study} = {value:g} is not run at this level")
+            raise MissingRunError(f"{_title(study)}: {value:g} is not run at this level")
         row = self.runs.rows[case]
         if row["status"] != DONE:
-            raise MissingRunError(f"{study} = {value:g}: {row['reason']}")
+            raise MissingRunError(f"{_title(study)}, {value:g}: {row['reason']}")
         return _loaded(self.runs.folders[case])
 
     def values(self, study: str) -> list[float]:
@@ -73,7 +73,7 @@ class Evidence:
         keys = [key for key in self.runs.cases if key[0] == study and key[2] == self.variant]
         found = sorted(v for s, v, variant in keys if self.runs.rows[self.runs.cases[s, v, variant]]["status"] == DONE)
         if len(found) < 2:
-            raise MissingRunError(f"fewer than two runs of {study} at this level")
+            raise MissingRunError(f"{_title(study)}: fewer than two runs at this level")
         return found
 
     def results(self, study: str) -> list[Result]:
@@ -83,6 +83,10 @@ class Evidence:
             MissingRunError: there are fewer than two.
         """
         return [self.run(study, value) for value in self.values(study)]
+
+
+def _title(study: str) -> str:
+    return STUDIES[study].title if study in STUDIES else study
 
 
 @lru_cache(maxsize=16)
@@ -123,5 +127,6 @@ def carry_out_runs(
 
 
 def figures_of(row: Row) -> dict[str, Any]:
-    """A row of the sweep without its number and its wall time, which change from run to run."""
-    return {key: value for key, value in row.items() if key not in ("index", "wall") and value is not None}
+    """A row of the sweep without its number and what clocks decide."""
+    left_out = ("index", "wall", "element_steps_per_s")
+    return {key: value for key, value in row.items() if key not in left_out and value is not None}
