@@ -72,6 +72,9 @@ FINEST = {
     "plate_layers": 27,
     "plate_extension": 52,
 }
+# Fewer cells along the rods than pins of this radius resolve; then fewer across them and at the contact, too.
+SMALL = {**BY_HAND, "axial_OA": 24, "axial_AB": 22}
+SMALLEST = {**SMALL, "section": 4, "ring": 2, "focus_size": 0.6e-3, "focus_layers": 4}
 CHEAP = {**BY_HAND, **CUT, "fine_length": 0.027, "rod_section": 4, "rod_ring": 2}
 KNOBS = (
     Knob("none of them"),
@@ -90,6 +93,11 @@ KNOBS = (
     Knob("springs chosen, `penalty=auto`", {"penalty": "auto"}),
     Knob("mesh by hand", BY_HAND),
     Knob("mesh by hand, `--multi-rate auto`", BY_HAND, options={"multi_rate": "auto"}),
+    Knob("mesh by hand, `--mass-scaling 2`", BY_HAND, mass_scaling=2.0),
+    Knob("small mesh, `--mass-scaling 2`", SMALL, mass_scaling=2.0),
+    Knob("small mesh, `--multi-rate auto --mass-scaling 2`", SMALL, None, 2.0, {"multi_rate": "auto"}),
+    Knob("smallest mesh, `--mass-scaling 2`", SMALLEST, mass_scaling=2.0),
+    Knob("smallest mesh, `--multi-rate auto --mass-scaling 2`", SMALLEST, None, 2.0, {"multi_rate": "auto"}),
     Knob("mesh by hand, tied coarse rods, short plate", CHEAP),
     Knob("mesh by hand, tied coarse rods, short plate, `--multi-rate auto`", CHEAP, options={"multi_rate": "auto"}),
 )

@@ -46,17 +46,39 @@ def _approach_angle(
 
 def _bodies(
     links: Sequence[str],
-    rods: Sequence[Mapping[str, Any]],
+    rods: Sequence[mca.Rod],
     materials: Mapping[str, mca.Elastic],
     plate: mca.Body,
 ) -> tuple[mca.Body, ...]:
     """The rods, the last one with its tip, and the plate."""
     *inner, last = (
-        mca.Body(name=link, geometry=mca.Rod(**mesh), material=materials["body"])
-        for link, mesh in zip(links, rods, strict=True)
+        mca.Body(name=link, geometry=rod, material=materials["body"]) for link, rod in zip(links, rods, strict=True)
     )
     tip = replace(last, material={"body": materials["body"], "tip": materials["tip"]})
     return (*inner, tip, plate)
+
+
+def _rods(meshes: Sequence[Mapping[str, Any]], hinge: str) -> list[mca.Rod]:
+    """The rods: plain ones, or with an eye at the inner end of each and a fork for the next one's eye."""
+    if hinge == "plain":
+        return [mca.Rod(**mesh) for mesh in meshes]
+    *inner, last = meshes
+    return [*(mca.LugRod(**mesh, end="fork") for mesh in inner), mca.LugRod(**last)]
+
+
+def _tied_nodes(rod: mca.Rod, joint_nodes: str, pin_radius: float | None) -> dict[str, Any]:
+    """What `mca.Revolute` takes for the nodes of a hinge.
+
+    Raises:
+        RequestError: a pin in a shaft hole has another radius.
+    """
+    if isinstance(rod, mca.LugRod):
+        if pin_radius is not None:
+            raise bad_value("pin_radius", pin_radius, "with hinge=lug a pin fills its hole; leave it out")
+        return {"nodes": "hole", "pin_radius": rod.hole_radius}
+    if joint_nodes == "pin" or pin_radius is not None:  # which other hinges refuse
+        return {"nodes": joint_nodes, "pin_radius": 0.75 * rod.radius if pin_radius is None else pin_radius}
+    return {"nodes": joint_nodes}
 
 
 def _absorbing(which: str) -> tuple[mca.Absorbing, ...]:
@@ -97,6 +119,7 @@ def arm(
     plate: mca.Plate,
     v_plate: float,
     contact: Mapping[str, Any],
+    hinge: str,
     joint_nodes: str,
     pin_radius: float | None,
     rigid_inertia: str,
@@ -121,7 +144,8 @@ def arm(
         plate: with its origin in the middle of the top.
         v_plate: initial velocity of the plate along x [m/s].
         contact: parameters of the contact of tip and plate.
-        joint_nodes, rigid_inertia: as `mca.Revolute` and `mca.RigidPhase` take them.
+        hinge: "plain", of rods that meet on the axis, or "lug", a fork and an eye, whose holes a pin couples.
+        joint_nodes, rigid_inertia: as `mca.Revolute` and `mca.RigidPhase` take them; lugs do without the former.
         pin_radius: of hinges with "pin" [m]; None: 0.75 of the rods' radius.
         impact: the impact phase.
         paths: lines along which stress is recorded.
@@ -140,11 +164,10 @@ def arm(
         velocity=(v_plate, 0.0, 0.0),
     )
     angle = _approach_angle(links, length, radius, H, gravity, theta)
-    shapes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
-    shapes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
-    tied: dict[str, Any] = {"nodes": joint_nodes}
-    if joint_nodes == "pin" or pin_radius is not None:  # which other hinges refuse
-        tied["pin_radius"] = 0.75 * radius if pin_radius is None else pin_radius
+    meshes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
+    meshes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
+    shapes = _rods(meshes, hinge)
+    tied = _tied_nodes(shapes[0], joint_nodes, pin_radius)
     hinges: list[dict[str, Any]] = [{"name": "O", "body": links[0], "at": (0.0, 0.0, 0.0)}]
     hinges += [
         {"name": outer[0], "body": link, "at": (length, 0.0, 0.0), "other": outer} for link, outer in pairwise(links)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import warp_mca as mca
 from warp_mca.base.errors import bad_value
@@ -37,10 +37,12 @@ def with_coarse_rods(scene: mca.Scene, fine_length: float, section: int, ring: i
     share = (fine_length - rod.radius) / (rod.length - rod.radius)
     fine = max(1, round(share * rod.axial))
     rest = rod.length - fine_length
-    coarse = mca.Rod(
+    kind = mca.LugRod if isinstance(rod, mca.LugRod) else mca.Rod  # LugRod has its eye at the start
+    coarse = kind(
         radius=rod.radius, length=rest, tip="flat", section=section, ring=ring, axial=max(1, rod.axial - fine)
     )
-    end = replace(rod, length=fine_length, axial=fine, axial_ratio=1.0)
+    plain = {field.name: getattr(rod, field.name) for field in fields(mca.Rod)}
+    end = mca.Rod(**plain | {"length": fine_length, "axial": fine, "axial_ratio": 1.0})
     parts = (mca.Part(name="rod", geometry=coarse), mca.Part(name="fine", geometry=end, at=(rest, 0.0, 0.0)))
     return _tied(_with_mesh(scene, last.name, mca.Parts(parts=parts)), last.name, "fine.start", "rod.end")
 

@@ -48,6 +48,13 @@ def build(
     sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "mesh",
+    hinge: Annotated[
+        str,
+        Param(
+            "plain: joint_nodes of rods that meet on the axis; lug: fork and eye, with a pin in their holes",
+            choices=("plain", "lug"),
+        ),
+    ] = "plain",
     joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends", "pin"))] = "axis",
     pin_radius: Annotated[
         float | None,
@@ -114,6 +121,7 @@ def build(
         ),
         v_plate=0.0,
         contact={"mu": mu, "penalty": penalty},
+        hinge=hinge,
         joint_nodes=joint_nodes,
         pin_radius=pin_radius,
         rigid_inertia=rigid_inertia,

@@ -93,6 +93,13 @@ def build(
     beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
     plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
     rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
+    hinge: Annotated[
+        str,
+        Param(
+            "plain: joint_nodes of rods that meet on the axis; lug: fork and eye, with a pin in their holes",
+            choices=("plain", "lug"),
+        ),
+    ] = "plain",
     joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends", "pin"))] = "ends",
     pin_radius: Annotated[
         float | None,
@@ -197,6 +204,7 @@ def build(
         plate=plate,
         v_plate=v_plate,
         contact={"mu": mu, "penalty": penalty, "two_way": two_way},
+        hinge=hinge,
         joint_nodes=joint_nodes,
         pin_radius=pin_radius,
         rigid_inertia=rigid_inertia,

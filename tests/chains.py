@@ -13,7 +13,7 @@ from warp_mca.model.cells import nodal_masses
 from warp_mca.results.paths import locate
 from warp_mca.rigid.handback import HandBack, carriage_motion, hand_back
 from warp_mca.rigid.handoff import HandOff, hand_off
-from warp_mca.rigid.scene_chain import pin_radii
+from warp_mca.rigid.scene_chain import pins
 from warp_mca.rigid.swing import Swing, swing_until
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.prepare import Prepared
@@ -82,6 +82,6 @@ def motion_at_end(found: Impact, end: float = START + SPAN) -> HandBack:
     points = {name: mesh.points for name, mesh in item.meshes.items()}
     masses, base = nodal_masses(item.scene, item.meshes), names[0]
     own = (points[base], masses[base], positions[base], velocities[base])
-    carriage = carriage_motion(chain, end, *own, pin_radii(item.scene)[0])
+    carriage = carriage_motion(chain, end, *own, pins(item.scene)[0])
     near = chain.angles(item.start.theta)
     return hand_back(chain, points, masses, positions, velocities, near=near, t=end, carriage=carriage)

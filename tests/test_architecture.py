@@ -16,10 +16,12 @@ from test_style import entries
 
 import warp_mca as mca
 from warp_mca.elements.state import ElementState
+from warp_mca.model.floating import with_floating_frames
 from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.coupling_stage import CouplingState
+from warp_mca.solve.floating_stage import FloatingState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.rigid_stage import RigidState
 from warp_mca.solve.solver import Solver
@@ -133,11 +135,12 @@ def test_stages_of_a_step_are_those_of_the_page_in_this_order():
     pin = mca.Revolute(name="A", body="cart", at=(0.02, 0.0, 0.005), nodes="pin", pin_radius=0.01)
     pinned = replace(everything(), joints=(pin,))
     seen = set()
-    for ready in (prepared(everything()), prepared(pinned), chain_ready(driven)):
-        solver = Solver(ready.model, device="cpu", precision="mixed", dt=1e-8)
+    turning = with_floating_frames(prepared(pinned).model, [pinned], 1.0, "mixed")
+    for model in (prepared(everything()).model, turning, chain_ready(driven).model):
+        solver = Solver(model, device="cpu", precision="mixed", dt=1e-8)
         found = [
             [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
-            for number, group in enumerate(solver.groups, 1)
+            for number, group in enumerate(solver.groups)
             for stage in group
         ]
         assert [cells for cells in page if cells in found] == found
@@ -154,6 +157,7 @@ STATE_PARTS = {
     "loads/": LoadState,
     "absorbing/": AbsorbingState,
     "rigid/": RigidState,
+    "floating/": FloatingState,
 }
 
 

@@ -146,7 +146,7 @@ def test_checks_fill_an_output_interval_with_no_gap_too_long():
     rng = random.Random(0)
     for _ in range(300):
         steps = Steps(10.0 ** rng.uniform(-9.5, -5.0), rng.randint(1, 300), rng.randint(1, 60), 3)
-        parts = list(steps.parts())
+        parts = list(steps.parts(0))
         begin = np.cumsum([0, *(part.count for part in parts)])
         assert begin[-1] == steps.per_interval
         searches = [b for b, part in zip(begin, parts, strict=False) if part.begins_search]
@@ -157,4 +157,6 @@ def test_checks_fill_an_output_interval_with_no_gap_too_long():
         times = [steps.time(steps.checks + k) for k in range(steps.checks)]
         assert times == pytest.approx(steps.interval + steps.dt * checks, rel=1e-12)
         assert len({(part.count, part.begins_check) for part in parts}) <= 3
+    rare = Steps(1e-6 / 40, 40, 1, 10, intervals_per_search=3)
+    assert [sum(part.begins_search for part in rare.parts(k)) for k in range(5)] == [1, 0, 0, 1, 0]
     assert Steps(1e-6 / 40, 40, 1, 10).checks == Steps(1e-7, 10, 2, 10).checks == 1

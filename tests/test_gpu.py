@@ -85,6 +85,61 @@ def test_steps_of_one_launch_give_what_launches_of_each_step_give(precision, pla
     assert sums[0] == pytest.approx(sums[2], rel=1e-4 if precision == "mixed" else 1e-9)
 
 
+def hinged(other: str | None, scaled: float | None) -> mca.Scene:
+    """A bar at small strain on a pin of the ground or of a second bar, which strikes a block as it turns."""
+    from test_pin import bar
+
+    axis = {"at": (0.0, 0.0, 0.0), "nodes": "pin", "pin_radius": 0.008}
+    bodies = [replace(bar("a", (8, 4, 3), angular_velocity=(0.0, 0.0, -20.0)), kinematics="corotational")]
+    if other:
+        bodies.append(replace(bar("b", (7, 6, 2), rotation=(0.0, 0.0, 3.1)), kinematics="corotational"))
+    block = mca.Box(size=(0.02, 0.01, 0.03), divisions=(4, 2, 4), origin=(0.085, -0.0201, -0.015))
+    bodies.append(mca.Body(name="block", geometry=block, material=bodies[0].material))
+    slave, master = mca.Surface(body="a", nodes="ymin"), mca.Surface(body="block", nodes="ymax")
+    return mca.Scene(
+        name="hinged",
+        bodies=tuple(bodies),
+        joints=(mca.Revolute(name="O", body="a", **axis, **({"other": other} if other else {})),),
+        contacts=(mca.Contact(slave=slave, master=master, mu=0.2),),
+        gravity=(0.0, -500.0, 0.0),
+        impact=mca.ImpactPhase(duration=4e-4, output_interval=2e-5, mass_scaling=scaled),
+    )
+
+
+@pytest.mark.parametrize("precision", ["mixed", "float64"])
+@pytest.mark.parametrize("other", [None, "b"], ids=["ground", "two bodies"])
+@pytest.mark.parametrize("scaled", [None, 1.028])
+def test_steps_of_one_launch_take_pins_and_mass_scaling(precision, other, scaled):
+    runs = [begun(hinged(other, scaled), device="cuda:0", precision=precision) for _ in range(3)]
+    assert runs[0].solver.resident is not None
+    runs[2].solver.resident = None
+    for run in runs:
+        run.advance()
+        assert run.stopped == [None]
+    one, again, single = (run.state for run in runs)
+    assert again.differences(one) == []
+    assert runs[0].solver.normal_force.greatest(one.normal_force, 0) > 0.0
+    near = 1e-4 if precision == "mixed" else 1e-9
+    for name in ("u", "v", "couplings/place", "couplings/orientation", "constraints/impulse"):
+        a, b = (state.arrays()[name].numpy() for state in (one, single))
+        assert a == pytest.approx(b, abs=near * np.abs(b).max()), name
+
+
+@pytest.mark.parametrize("scene", [oblique(), hinged(None, None), hinged("b", None)], ids=["block", "ground", "pin"])
+def test_launches_of_many_steps_follow_each_other_without_a_record(scene):
+    scene = replace(scene, contacts=(replace(scene.contacts[0], two_way=False, penalty=1.0),))
+    resident, single = (begun(scene, device="cuda:0", precision="float64") for _ in range(2))
+    assert resident.solver.resident is not None
+    single.solver.resident = None
+    for run in (resident, single):
+        run.advance(until=run.steps.per_interval * 2)
+        for _ in range(20):
+            run.solver.search(run.state)
+            run.solver.step(run.state, 17)
+    u, expected = (run.state.u.numpy() for run in (resident, single))
+    assert u == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
 def test_extremes_are_those_of_the_cpu_and_repeat_bit_for_bit(element):
     scene = oblique()
@@ -266,7 +321,7 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
         monkeypatch.setattr(replay, "launch_early", change)
         held = Held(model, case, "cuda:0", precision)
         if name == "elastic":
-            early = node.integrate_kernel(precision, False, False, False, False, True)
+            early = node.integrate_kernel(precision, False, False, False, False, True, turned=False)
             assert held.solver.nodes.integrate_kernel is early
         for _ in range(10):
             held.advance(20)

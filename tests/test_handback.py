@@ -196,11 +196,11 @@ def test_a_bent_shape_swings_on_with_the_momentum_of_its_nodes():
     bent[:, 1] += 0.3 * (POINTS[:, 0] + 0.1) ** 2  # 12 mm at the end
     chain, points, masses = links(2)
     shapes = dict.fromkeys(points, bent)
-    moved = deformed_chain(chain, points, shapes, masses, (0.0, 0.0))
+    moved = deformed_chain(chain, points, shapes, masses, (None, None))
     np.testing.assert_allclose(moved.links[0].hinge_in, (-0.1, 0.0), atol=1e-15)
     np.testing.assert_allclose(moved.links[0].hinge_out, (0.2, 0.01), atol=1e-15)  # off the mesh's nodes
     on_node = replace(chain, links=tuple(replace(link, hinge_out=(0.2, 0.0)) for link in chain.links))
-    moved = deformed_chain(on_node, points, shapes, masses, (0.0, 0.0))
+    moved = deformed_chain(on_node, points, shapes, masses, (None, None))
     np.testing.assert_allclose(moved.links[0].hinge_out, (0.2, 0.012), atol=1e-15)
     q, v = np.array([0.4, 1.0]), np.array([2.0, -3.0])
     placed = link_placements(moved, q, v)

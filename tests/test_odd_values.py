@@ -29,6 +29,7 @@ SOUND: dict[type, Any] = {
     mca.J2Bilinear: METAL,
     mca.Box: mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1)),
     mca.Rod: mca.Rod(radius=0.01, length=0.05, section=2, ring=1, axial=2, tip_layers=1, focus_layers=1),
+    mca.LugRod: mca.LugRod(radius=0.01, length=0.06, section=4, ring=1, axial=2, tip_layers=1, focus_layers=1),
     mca.Sphere: mca.Sphere(radius=0.01, section=2, ring=1, pole_layers=1),
     mca.Plate: mca.Plate(
         length=0.1, width=0.1, height=0.05, core=(2, 2), core_depth=1, core_size=0.005, layers=2, extension=1

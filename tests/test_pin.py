@@ -183,7 +183,7 @@ def test_what_pins_cannot_do_is_refused():
         ({"pin_radius": None}, r"pin_radius = None: give the radius of the pin"),
         ({"pin_radius": -1.0}, r"pin_radius = -1.0: give a finite number above 0"),
         ({"nodes": "axis"}, r'pin_radius = 0.008: it needs nodes="pin"; leave it out'),
-        ({"nodes": "ball"}, r"nodes = 'ball': choose axis, ends or pin"),
+        ({"nodes": "ball"}, r"nodes = 'ball': choose axis, ends, pin or hole"),
     ):
         with pytest.raises(mca.RequestError, match=words):
             replace(pin, **change)

@@ -37,7 +37,8 @@ from warp_mca.scene import (
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
-    from warp_mca.geometry import Box, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
+    from warp_mca.accuracy.tradeoff import tradeoff
+    from warp_mca.geometry import Box, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -51,6 +52,7 @@ __version__ = "0.1.0"
 
 _LAZY = {
     "Box": "warp_mca.geometry",
+    "LugRod": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
     "NestedPlate": "warp_mca.geometry",
@@ -63,6 +65,7 @@ _LAZY = {
     "make_scene": "warp_mca.scene.catalogue",
     "Result": "warp_mca.results.result",
     "load": "warp_mca.results.storage",
+    "tradeoff": "warp_mca.accuracy.tradeoff",
     "quality_table": "warp_mca.report.quality",
     "mesh": "warp_mca.runs.simulation",
     "run": "warp_mca.runs.simulation",
@@ -98,6 +101,7 @@ __all__ = [
     "ImpactPhase",
     "Box",
     "Rod",
+    "LugRod",
     "Sphere",
     "Plate",
     "MeshFile",
@@ -112,6 +116,7 @@ __all__ = [
     "run",
     "run_batch",
     "sweep",
+    "tradeoff",
     "load",
     "Result",
     "McaError",

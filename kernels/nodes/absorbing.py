@@ -8,7 +8,8 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.node import TOUCHABLE, gather_function, hold, take_contact
+from warp_mca.kernels.nodes.floating import Frames
+from warp_mca.kernels.nodes.node import TOUCHABLE, hold, nodal_force_function, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -46,17 +47,19 @@ def dampen(before: wp.vec3d, free: wp.vec3d, own: wp.vec3d, share: wp.mat33d):
 
 
 @cache
-def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = False, rated: bool = False) -> Any:
+def absorbing_kernel(
+    precision: str, contact: bool, springs: bool, each: bool = False, rated: bool = False, turned: bool = False
+) -> Any:
     """Kernel: advance the nodes that dashpots act on; arguments as in `node.integrate_kernel`.
 
     impulse_out [N s] is what each node has given to what lies beyond the boundary up to t(n), absorbed_out [J] the
     energy that it gave in the frame of the body. As the force at t(n) acts for half a step on either side of
     it, the arrays with `after` hold the same half a step later. With `springs`, stretch_out [m] is u(n) less the way of
-    the body. `rated` as in `gather_function`.
+    the body. `rated`, `turned` as in `nodal_force_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated)
+    nodal_force = nodal_force_function(precision, rated, turned)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_absorbing(
@@ -66,6 +69,7 @@ def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = 
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         dt: wp.float64,
@@ -85,7 +89,7 @@ def absorbing_kernel(precision: str, contact: bool, springs: bool, each: bool = 
         k = wp.tid()
         i = dashpots.node[k]
         own = dashpots.velocity[k]
-        total = gather(first_slots[i], more_slots, force)
+        total = nodal_force(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

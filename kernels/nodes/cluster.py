@@ -18,8 +18,7 @@ in `kernels.nodes.slide`. What one linear solve leaves of order (dt w)^2 is made
 
 import warp as wp
 
-from warp_mca.kernels.nodes.base import Bases, base_velocity
-from warp_mca.kernels.nodes.coupling import Response, inertia_about, joint_impulses, sum_of, turned
+from warp_mca.kernels.nodes.coupling import Response, inertia_about
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -43,6 +42,10 @@ class Clusters:
         axis: of each hinge at the start, a unit vector [-], shape (coupling_count,), vec3d.
         arm: from the mean position of the first and the second cluster to the joint at the start [m], shape
             (coupling_count, 2), vec3d.
+        part: parts of clusters that blocks of threads take: coupling, 0 or 1 for its first or second cluster, and in
+            `node` the first node and the end, shape (part_count,), vec4i; those of a cluster follow each other.
+        first_part: first parts of both clusters of each coupling, and the end of the latter, shape
+            (coupling_count,), vec3i; pins of rigid bodies have no parts.
     """
 
     begin: wp.array(dtype=wp.vec3i)
@@ -52,6 +55,8 @@ class Clusters:
     base: wp.array(dtype=wp.int32)
     axis: wp.array(dtype=wp.vec3d)
     arm: wp.array2d(dtype=wp.vec3d)
+    part: wp.array(dtype=wp.vec4i)
+    first_part: wp.array(dtype=wp.vec3i)
 
 
 @wp.struct
@@ -60,6 +65,7 @@ class Mean:
 
     Attributes:
         mass: sum q [kg]; 0 for the ground.
+        lightness: 1 / sum q [1/kg]; 0 for the ground.
         centre: c, from the place where the joint was [m].
         velocity: V after the free step [m/s].
         spin: w after the free step [rad/s].
@@ -68,6 +74,7 @@ class Mean:
     """
 
     mass: wp.float64
+    lightness: wp.float64
     centre: wp.vec3d
     velocity: wp.vec3d
     spin: wp.vec3d
@@ -114,7 +121,7 @@ def cluster_sums(
     v: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
 ) -> Sums:
-    """Sums over a cluster with arms from `place` at t(n): moments with q and with s q, then momenta; by a block."""
+    """Sums over some nodes with arms from `place` at t(n): moments with q and with s q, then momenta; by a block."""
     total = Sums()
     for k in range(begin + lane, end, wp.block_dim()):
         i = clusters.node[k]
@@ -145,8 +152,8 @@ def cluster_sums(
 
 
 @wp.func
-def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
-    """Mean motion from the sums of a cluster, and its response at the point P, with the same origin [m].
+def mean_response(total: Sums, P: wp.vec3d) -> Mean:
+    """Mean position from the moments of a cluster, and its response at the point P, with the same origin [m].
 
     With h = sum s q r and K = sum s q (r^2 - r r^T) about c, the mean motion answers F and T about c by
 
@@ -154,17 +161,15 @@ def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
     """
     Q = total[0]
     c = wp.vec3d(total[1], total[2], total[3]) / Q
-    p = wp.vec3d(total[20], total[21], total[22])
     H = total[10]
     about = wp.vec3d(total[11], total[12], total[13])
     h = about - H * c
     moment = second_moment(total, 14) - wp.outer(c, about) - wp.outer(about, c) + H * wp.outer(c, c)
     found = Mean()
     found.mass = Q
+    found.lightness = wp.float64(1.0) / Q
     found.centre = c
-    found.velocity = p / Q
     found.inverse = wp.inverse(inertia(second_moment(total, 4)) - inertia_about(Q, c))
-    found.spin = found.inverse * (wp.vec3d(total[23], total[24], total[25]) - wp.cross(c, p))
     # J and T at P are F = J and T + a x J at c, with a = P - c, and P moves with V + w x a
     cross = wp.skew(P - c)
     tilt = (wp.float64(-1.0) / Q) * (wp.skew(h) * found.inverse)
@@ -176,15 +181,19 @@ def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
 
 
 @wp.func
-def point_ahead(mean: Mean, q: wp.quatd, arm: wp.vec3d, dt: wp.float64) -> wp.vec3d:
-    """Where a cluster or the ground, turned by q, carries the joint after the step, from the place where it was [m]."""
-    return mean.centre + dt * mean.velocity + wp.quat_rotate(turned(q, dt * mean.spin), arm)
+def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
+    """Mean motion from the sums of a cluster, and its response at P, see `mean_response`."""
+    found = mean_response(total, P)
+    p = wp.vec3d(total[20], total[21], total[22])
+    found.velocity = p / found.mass
+    found.spin = found.inverse * (wp.vec3d(total[23], total[24], total[25]) - wp.cross(found.centre, p))
+    return found
 
 
 @wp.func
-def axis_ahead(mean: Mean, q: wp.quatd, axis: wp.vec3d, dt: wp.float64) -> wp.vec3d:
-    """Direction of the hinge's axis after the step, as a cluster or the ground carries it."""
-    return wp.quat_rotate(turned(q, dt * mean.spin), axis)
+def spin_after(mean: Mean, free: wp.vec3d, J: wp.vec3d, T: wp.vec3d) -> wp.vec3d:
+    """w of a cluster with the impulse J and the angular impulse T at the point of the joint; `free` without [rad/s]."""
+    return free + wp.transpose(mean.response.mixed) * J + mean.response.turn * T
 
 
 @wp.func
@@ -213,88 +222,3 @@ def pull(
         u_out[i] = u_out[i] + dt * change
         v_out[i] = v_out[i] + change
         keep_speed(i, v_out[i], speed_square_out)
-
-
-@wp.func
-def ground_motion(
-    j: int,
-    clusters: Clusters,
-    bases: Bases,
-    carriage: wp.array(dtype=wp.vec3d),
-    clock: wp.array(dtype=wp.int32),
-    dt: wp.float64,
-) -> Mean:
-    """Motion of the ground or the base that joint j hangs on, without the joint's impulse."""
-    found = Mean()
-    if clusters.base.shape[0] > 0:
-        k = clusters.base[j]
-        if k >= 0:
-            e = bases.direction[k]
-            b = base_velocity(bases, k, (wp.float64(clock[k]) + wp.float64(0.5)) * dt)
-            free = carriage[k] + dt * bases.gravity[k]
-            found.velocity = b + wp.dot(e, free - b) * e
-            if bases.mass[k] > wp.float64(0.0):
-                found.response.point = wp.outer(e, e) / bases.mass[k]
-    return found
-
-
-@wp.kernel(enable_backward=False)
-def couple(
-    clusters: Clusters,
-    bases: Bases,
-    X: wp.array(dtype=wp.vec3d),
-    mass: wp.array(dtype=wp.float64),
-    carriage: wp.array(dtype=wp.vec3d),
-    clock: wp.array(dtype=wp.int32),
-    dt: wp.float64,
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    speed_square_out: wp.array(dtype=wp.float32),
-    impulse_out: wp.array(dtype=wp.vec3d),
-    place_out: wp.array(dtype=wp.vec3d),
-    orientation_out: wp.array2d(dtype=wp.quatd),
-    latest_out: wp.array(dtype=wp.vec3d),
-):
-    """Join the clusters of each coupling, once `constraint.bound_kernel` has advanced their nodes as free ones.
-
-    A block of threads for each coupling. impulse_out [N s] sums J at the first node of the first cluster. place_out
-    follows the joint, where the ground or a base holds it exactly; orientation_out the mean rotation of both clusters.
-    latest_out takes J where some base moves or slides; `bases`, `carriage` and `clock` are as in `base.move_bases`.
-    """
-    j, lane = wp.tid()
-    begin = clusters.begin[j]
-    place = place_out[j]
-    q_a = orientation_out[j, 0]
-    q_b = orientation_out[j, 1]
-    total = cluster_sums(begin[0], begin[1], lane, place, clusters, X, mass, u_out, v_out, dt)
-    P = wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(q_a, clusters.arm[j, 0])
-    a = mean_motion(total, P)
-    b = ground_motion(j, clusters, bases, carriage, clock, dt)
-    if begin[2] > begin[1]:
-        total = cluster_sums(begin[1], begin[2], lane, place, clusters, X, mass, u_out, v_out, dt)
-        b = mean_motion(total, P)
-    gap = point_ahead(a, q_a, clusters.arm[j, 0], dt) - point_ahead(b, q_b, clusters.arm[j, 1], dt)
-    tilt = wp.cross(axis_ahead(b, q_b, clusters.axis[j], dt), axis_ahead(a, q_a, clusters.axis[j], dt))
-    d = wp.quat_rotate(q_a, clusters.axis[j])
-    held = wp.identity(3, dtype=wp.float64) - wp.outer(d, d)
-    J, T = joint_impulses(sum_of(a.response, b.response), gap / dt, tilt / dt, held)
-    arm_P = P - a.centre
-    outer = -(wp.cross(P - b.centre, J) + T)
-    # fmt: off
-    pull(begin[0], begin[1], lane, place, a, J, wp.cross(arm_P, J) + T, clusters, X, dt, u_out, v_out, speed_square_out)
-    if begin[2] > begin[1]:
-        pull(begin[1], begin[2], lane, place, b, -J, outer, clusters, X, dt, u_out, v_out, speed_square_out)
-    # fmt: on
-    if lane == 0:
-        if latest_out.shape[0] > 0:
-            latest_out[j] = J
-        spin = a.spin + wp.transpose(a.response.mixed) * J + a.response.turn * T
-        v = a.velocity + wp.cross(a.spin, arm_P) + a.response.point * J + a.response.mixed * T
-        orientation_out[j, 0] = turned(q_a, dt * spin)
-        spin = b.spin - wp.transpose(b.response.mixed) * J - b.response.turn * T
-        orientation_out[j, 1] = turned(q_b, dt * spin)
-        if begin[2] == begin[1]:
-            v = b.velocity - b.response.point * J
-            P = wp.vec3d()
-        place_out[j] = place + P + dt * v
-        impulse_out[begin[0]] = impulse_out[begin[0]] + J

@@ -8,7 +8,8 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
+from warp_mca.kernels.nodes.floating import Frames
+from warp_mca.kernels.nodes.node import hold, nodal_force_function, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -125,18 +126,24 @@ def move(
 
 @cache
 def bound_kernel(
-    precision: str, contact: bool, each: bool = False, partial: bool = False, skips: bool = False, rated: bool = False
+    precision: str,
+    contact: bool,
+    each: bool = False,
+    partial: bool = False,
+    skips: bool = False,
+    rated: bool = False,
+    turned: bool = False,
 ) -> Any:
     """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
-    rigid bodies, which `rigid_body.advance_kernel` advances. `rated` as in `gather_function`.
+    rigid bodies, which `rigid_body.advance_kernel` advances. `rated`, `turned` as in `nodal_force_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated)
+    nodal_force = nodal_force_function(precision, rated, turned)
 
     @wp.func
     def total_force(
@@ -144,9 +151,10 @@ def bound_kernel(
         first_slots: wp.array(dtype=wp.vec2i),
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
+        frames: Frames,
         contact_force_out: wp.array(dtype=wp.vec3d),
     ):
-        total = gather(first_slots[i], more_slots, force)
+        total = nodal_force(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         return total
@@ -159,6 +167,7 @@ def bound_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         bonds: Bonds,
@@ -179,9 +188,8 @@ def bound_kernel(
         i = bound_node(k, bonds)
         if wp.static(skips) and i < 0:
             return
-        total = total_force(i, first_slots, more_slots, force, contact_force_out)
-        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
-        free = v_out[i] + dt * a
+        total = total_force(i, first_slots, more_slots, force, frames, contact_force_out)
+        free = v_out[i] + dt * hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         u_free = u_out[i] + dt * free
         if v_before_out.shape[0] > 0:
             v_before_out[i] = v_out[i]
@@ -192,7 +200,7 @@ def bound_kernel(
             if j >= 0:
                 if v_before_out.shape[0] > 0:
                     v_before_out[j] = v_out[j]
-                total = total_force(j, first_slots, more_slots, force, contact_force_out)
+                total = total_force(j, first_slots, more_slots, force, frames, contact_force_out)
                 v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
                 u_j = u_out[j] + dt * v_j
                 u = weighted_mean(mass[i], u_free, mass[j], u_j)

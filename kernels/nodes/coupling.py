@@ -31,6 +31,25 @@ class Response:
     turn: wp.mat33d
 
 
+@wp.struct
+class Inverse:
+    """Solves for the impulses of a joint, see `joint_impulses`.
+
+    Attributes:
+        point: inverse of `Response.point` of the relative motion [kg].
+        mixed: `Response.mixed` [1/(kg m)].
+        across: mixed^T point [1/m].
+        turn: inverse of the Schur complement of `Response.point` where rotations are held [kg m^2].
+        held: projector on the rotations that the joint holds [-].
+    """
+
+    point: wp.mat33d
+    mixed: wp.mat33d
+    across: wp.mat33d
+    turn: wp.mat33d
+    held: wp.mat33d
+
+
 @wp.func
 def inertia_about(m: wp.float64, arm: wp.vec3d) -> wp.mat33d:
     """Inertia m (arm^2 - arm arm^T) of a mass at `arm` [kg m^2]."""
@@ -48,18 +67,28 @@ def sum_of(a: Response, b: Response) -> Response:
 
 
 @wp.func
-def joint_impulses(response: Response, v: wp.vec3d, w: wp.vec3d, held: wp.mat33d):
-    """J and T on the first body that take the relative velocities v [m/s] and, where `held`, w [rad/s] away.
+def inverse_of(response: Response, held: wp.mat33d) -> Inverse:
+    """What gives the impulses of a joint for the response of the relative motion; `held` projects on the directions
+    about which it holds rotations.
 
     T comes from the Schur complement of `point`, which the free rotations, those that `held` projects on 0, leave out.
     """
-    inverse_point = wp.inverse(response.point)
+    found = Inverse()
+    found.point = wp.inverse(response.point)
+    found.mixed = response.mixed
+    found.held = held
+    found.across = wp.transpose(response.mixed) * found.point
+    schur = held * (response.turn - found.across * response.mixed) * held
     free = wp.identity(3, dtype=wp.float64) - held
-    across = wp.transpose(response.mixed) * inverse_point
-    schur = held * (response.turn - across * response.mixed) * held
-    scale = wp.trace(response.turn)
-    T = held * (wp.inverse(schur + scale * free) * (held * (across * v - w)))
-    J = -(inverse_point * (v + response.mixed * T))
+    found.turn = wp.inverse(schur + wp.trace(response.turn) * free)
+    return found
+
+
+@wp.func
+def joint_impulses(inverse: Inverse, v: wp.vec3d, w: wp.vec3d):
+    """J and T on the first body that take the relative velocities v [m/s] and, where held, w [rad/s] away."""
+    T = inverse.held * (inverse.turn * (inverse.held * (inverse.across * v - w)))
+    J = -(inverse.point * (v + inverse.mixed * T))
     return J, T
 
 

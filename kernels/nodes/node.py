@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames, turn_function
 from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -73,6 +74,23 @@ def gather_function(precision: str, rated: bool = False) -> Any:
     return gather
 
 
+@cache
+def nodal_force_function(precision: str, rated: bool = False, turned: bool = False) -> Any:
+    """The function that sums the forces of elements on node i as `gather_function` does.
+
+    `turned`: they are those in its floating frame, from which their sum turns to the world's.
+    """
+    vec3, gather, to_world = scalars(precision).vec3, gather_function(precision, rated), turn_function(turned)
+
+    @wp.func
+    def nodal_force(
+        i: int, pair: wp.vec2i, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), frames: Frames
+    ):
+        return to_world(i, gather(pair, more_slots, force), frames)
+
+    return nodal_force
+
+
 @wp.func
 def take_contact(i: int, contact_force_out: wp.array(dtype=wp.vec3d)):
     """The contact force on a node, which is given once."""
@@ -99,6 +117,7 @@ def integrate_kernel(
     bound: bool = False,
     each: bool = False,
     early: bool = False,
+    turned: bool = False,
 ) -> Any:
     """Kernel: central difference with lumped mass. v(n+1/2) = v(n-1/2) + kick a(n); u(n+1) = u(n) + drift v(n+1/2).
 
@@ -107,11 +126,11 @@ def integrate_kernel(
     threads beyond the first range of nodes run `extremes.keep_normal_force`. `fixed`: some axes are at rest; `bound`:
     some nodes are left to `constraint.bound_kernel` or `absorbing.absorbing_kernel`. With `each`, gravity differs
     between the scenes of a batch, and nodes know their scene. `early`: the next kernel takes its places as soon as
-    nodes leave some.
+    nodes leave some. `turned` as in `nodal_force_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision)
+    nodal_force = nodal_force_function(precision, False, turned)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def integrate(
@@ -120,6 +139,7 @@ def integrate_kernel(
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         kick: wp.float64,
@@ -147,7 +167,7 @@ def integrate_kernel(
         if wp.static(bound):
             if int(role[i]) & wp.static(BOUND) != 0:
                 return
-        total = gather(pair, more_slots, force)
+        total = nodal_force(i, pair, more_slots, force, frames)
         if wp.static(contact):
             if int(role[i]) & wp.static(TOUCHABLE) != 0:
                 total += take_contact(i, contact_force_out)

@@ -10,12 +10,13 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.cluster import Clusters, Mean
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, spin_after
 from warp_mca.kernels.nodes.coupling import turned
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.joint_torque import wait_for_block
-from warp_mca.kernels.nodes.node import gather_function, take_contact
+from warp_mca.kernels.nodes.node import nodal_force_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
-from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster, spin_of
+from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
 from warp_mca.kernels.nodes.symmetric import factorise
 from warp_mca.kernels.records.extremes import keep_speed
@@ -26,10 +27,10 @@ Wrench = wp.types.vector(length=6, dtype=wp.float64)  # force and moment
 
 
 @cache
-def load_function(precision: str, contact: bool, rated: bool) -> Any:
+def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any:
     """The function that lets the forces on its nodes act on a body."""
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated)
+    nodal_force = nodal_force_function(precision, rated, seen)
 
     @wp.func
     def load(
@@ -41,6 +42,7 @@ def load_function(precision: str, contact: bool, rated: bool) -> Any:
         first_slots: wp.array(dtype=wp.vec2i),
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
+        frames: Frames,
         contact_force_out: wp.array(dtype=wp.vec3d),
         momentum_out: wp.array(dtype=wp.vec3d),
         spin_out: wp.array(dtype=wp.vec3d),
@@ -50,7 +52,7 @@ def load_function(precision: str, contact: bool, rated: bool) -> Any:
         total = Wrench()
         for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
             i = bodies.node[e]
-            f = gather(first_slots[i], more_slots, force)
+            f = nodal_force(i, first_slots[i], more_slots, force, frames)
             if wp.static(contact):
                 f += take_contact(i, contact_force_out)
             work_out[e] = f
@@ -111,24 +113,24 @@ def count_riders(
 
 
 @cache
-def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
+def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: bool = False) -> Any:
     """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes a group's bodies in turn.
 
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
     Q - I after the step, the other outputs from force_out on are as in `find_motion`, `rigid_rows` and `rigid_pins`.
-    `rated` as in `gather_function`.
+    `rated` and, as `seen`, its `turned` as in `nodal_force_function`.
     """
     vec3 = scalars(precision).vec3
-    load = load_function(precision, contact, rated)
+    load = load_function(precision, contact, rated, seen)
 
     # fmt: off
     @wp.kernel(enable_backward=False, module="unique")
     def advance_rigid(
         bodies: RigidBodies, rows: RigidRows, clusters: Clusters, X: wp.array(dtype=wp.vec3d),
         mass: wp.array(dtype=wp.float64), first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), kick: wp.float64, span: wp.float64,
-        moves: bool, contact_force_out: wp.array(dtype=wp.vec3d), u_out: wp.array(dtype=wp.vec3d),
+        more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), frames: Frames, kick: wp.float64,
+        span: wp.float64, moves: bool, contact_force_out: wp.array(dtype=wp.vec3d), u_out: wp.array(dtype=wp.vec3d),
         v_out: wp.array(dtype=wp.vec3d), speed_square_out: wp.array(dtype=wp.float32),
         centre_out: wp.array(dtype=wp.vec3d), rotation_out: wp.array(dtype=wp.quatd),
         momentum_out: wp.array(dtype=wp.vec3d), spin_out: wp.array(dtype=wp.vec3d),
@@ -147,7 +149,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
         size = rows.begin[k + 1] - begin
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
-            load(b, lane, kick, bodies, rotation_out, first_slots, more_slots, force,
+            load(b, lane, kick, bodies, rotation_out, first_slots, more_slots, force, frames,
                  contact_force_out, momentum_out, spin_out, force_out)
             if lane == 0:
                 find_motion(b, bodies, span, rotation_out, momentum_out, spin_out, turn_out, velocity_out, rate_out)
@@ -175,7 +177,7 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False) -> Any:
                 pull_cluster(p, lane, rows.place[p], clusters, X, span, mean_out, point_out, pin_impulse_out,
                              u_out, v_out, speed_square_out)
                 if lane == 0:
-                    w = spin_of(mean_out[p], pin_impulse_out[p, 0], pin_impulse_out[p, 1])
+                    w = spin_after(mean_out[p], mean_out[p].spin, pin_impulse_out[p, 0], pin_impulse_out[p, 1])
                     orientation_out[p] = turned(orientation_out[p], span * w)
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]

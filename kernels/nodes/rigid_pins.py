@@ -6,7 +6,7 @@
 
 import warp as wp
 
-from warp_mca.kernels.nodes.cluster import Clusters, Mean, cluster_sums, mean_motion, pull
+from warp_mca.kernels.nodes.cluster import Clusters, Mean, cluster_sums, mean_motion, pull, spin_after
 from warp_mca.kernels.nodes.coupling import turned
 
 wp.set_module_options({"enable_backward": False})
@@ -40,12 +40,6 @@ def find_cluster(
 
 
 @wp.func
-def spin_of(mean: Mean, J: wp.vec3d, T: wp.vec3d) -> wp.vec3d:
-    """Angular velocity of a cluster with the impulse J and the angular impulse T at its pin [rad/s]."""
-    return mean.spin + wp.transpose(mean.response.mixed) * J + mean.response.turn * T
-
-
-@wp.func
 def move_pin(
     p: int,
     clusters: Clusters,
@@ -62,7 +56,7 @@ def move_pin(
     J = impulse[p, 0]
     T = impulse[p, 1]
     arm = point[p] - m.centre
-    w = spin_of(m, J, T)
+    w = spin_after(m, m.spin, J, T)
     v = m.velocity + wp.cross(m.spin, arm) + m.response.point * J + m.response.mixed * T - wp.cross(w, arm)
     ahead = turned(orientation[p], dt * w)
     place_out[p] = m.centre + dt * v + wp.quat_rotate(ahead, clusters.arm[p, 0])

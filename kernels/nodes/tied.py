@@ -8,7 +8,8 @@ import warp as wp
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import shared_functions
-from warp_mca.kernels.nodes.node import gather_function, hold, take_contact
+from warp_mca.kernels.nodes.floating import Frames
+from warp_mca.kernels.nodes.node import hold, nodal_force_function, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -40,16 +41,18 @@ class Tied:
 
 
 @cache
-def masters_kernel(precision: str, contact: bool, each: bool = False, rated: bool = False, lanes: int = 1) -> Any:
+def masters_kernel(
+    precision: str, contact: bool, each: bool = False, rated: bool = False, lanes: int = 1, turned: bool = False
+) -> Any:
     """Kernel: central difference of the nodes that carry slaves; arguments as of `node.integrate_kernel`.
 
     M_k a_k = f_k + sum_s N_sk f_s, where M_k holds the slaves' share of mass. Slaves are summed in a fixed order, by so
-    many `lanes` side by side. Contact forces on slaves are read here and reset by `follow`. `rated` as in
-    `gather_function`.
+    many `lanes` side by side. Contact forces on slaves are read here and reset by `follow`. `rated`,
+    `turned` as in `nodal_force_function`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
-    gather = gather_function(precision, rated)
+    nodal_force = nodal_force_function(precision, rated, turned)
     _, exchange = shared_functions("float64")
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
@@ -59,6 +62,7 @@ def masters_kernel(precision: str, contact: bool, each: bool = False, rated: boo
         more_slots: wp.array(dtype=wp.vec4i),
         role: wp.array(dtype=wp.uint8),
         force: wp.array(dtype=vec3),
+        frames: Frames,
         scene: Index,
         gravity: Vector,
         tied: Tied,
@@ -75,7 +79,7 @@ def masters_kernel(precision: str, contact: bool, each: bool = False, rated: boo
         total = wp.vec3d()
         for e in range(tied.first[k] + lane, tied.first[k + 1], wp.static(lanes)):
             s = tied.carried[e]
-            f = gather(first_slots[s], more_slots, force)
+            f = nodal_force(s, first_slots[s], more_slots, force, frames)
             if wp.static(contact):
                 f += contact_force_out[s]
             total += tied.share[e] * f
@@ -85,7 +89,7 @@ def masters_kernel(precision: str, contact: bool, each: bool = False, rated: boo
                     total[c] += exchange(total[c], 1 << step)
         if lane > 0:
             return
-        total += gather(first_slots[i], more_slots, force)
+        total += nodal_force(i, first_slots[i], more_slots, force, frames)
         if wp.static(contact):
             total += take_contact(i, contact_force_out)
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))

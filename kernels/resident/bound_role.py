@@ -90,10 +90,10 @@ def tie_function(partial: bool) -> Any:
 
 
 @cache
-def bound_role(precision: str, partial: bool) -> Any:
+def bound_role(precision: str, partial: bool, turned: bool) -> Any:
     """The function that moves bound nodes and keeps the greatest normal force in each of some steps."""
     vec3 = scalars(precision).vec3
-    gather_held, tie = gather_function(precision), tie_function(partial)
+    gather_held, tie = gather_function(precision, turned), tie_function(partial)
 
     @wp.func
     def move_bound(
@@ -134,10 +134,10 @@ def bound_role(precision: str, partial: bool) -> Any:
             if mine:
                 total = gather_held(held, nodes.more_slots, force)
                 other_total = gather_held(other_held, nodes.more_slots, force)
-                free = next_velocity(held, one.v, total, nodes.gravity, dt)
+                free = next_velocity(held, one.v, total, nodes, dt)
                 one.v = free
                 one.u = one.u + dt * free
-                other.v = next_velocity(other_held, other.v, other_total, nodes.gravity, dt)
+                other.v = next_velocity(other_held, other.v, other_total, nodes, dt)
                 other.u = other.u + dt * other.v
                 if lane < pairs:
                     one, other = tie(lane, one, other, bonds)

@@ -147,10 +147,10 @@ def reaction(i: int, near: Near, faces: Faces, spring: Spring):
 
 
 @cache
-def master_role(precision: str) -> Any:
+def master_role(precision: str, turned: bool) -> Any:
     """The function that gives nodes of master faces their reactions and moves them, in each of some steps."""
     vec3 = scalars(precision).vec3
-    gather_held = gather_function(precision)
+    gather_held = gather_function(precision, turned)
 
     @wp.func
     def move_masters(
@@ -190,7 +190,7 @@ def master_role(precision: str) -> Any:
                     for c in range(3):
                         share[c] += exchange(share[c], 1 << k)
                 if mine:
-                    v = next_velocity(held, v, total + share, nodes.gravity, dt)
+                    v = next_velocity(held, v, total + share, nodes, dt)
                     u = u + dt * v
                     v_out[held.node] = v
                     u_out[held.node] = u

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import TOUCHABLE, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
@@ -24,18 +25,22 @@ class Nodes:
     Attributes:
         mass, inverse_mass: [kg], [1/kg], shape (node_count,), float64.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
+        frames: floating frames.
         first_slots, more_slots: slots of the forces on each node, see `elements.stage.gather_lists`.
         free: nodes that neither belong to a master nor are bound, shape (free_count,), int32.
         gravity: [m/s^2].
+        weight: acceleration of each node by its weight [m/s^2], shape (node_count,), vec3d; empty where it is gravity.
     """
 
     mass: wp.array(dtype=wp.float64)
     inverse_mass: wp.array(dtype=wp.float64)
     role: wp.array(dtype=wp.uint8)
+    frames: Frames
     first_slots: wp.array(dtype=wp.vec2i)
     more_slots: wp.array(dtype=wp.vec4i)
     free: wp.array(dtype=wp.int32)
     gravity: wp.vec3d
+    weight: wp.array(dtype=wp.vec3d)
 
 
 @wp.struct
@@ -46,6 +51,7 @@ class Held:
         node: its number.
         role: as in `Nodes`.
         inverse: of its mass [1/kg].
+        turn: rotation of its floating frame.
         pair: its first slots.
         row0, row1, row2: rows of more slots, -1 where there is none.
         row: of more slots that come after those, and the end of them.
@@ -55,6 +61,7 @@ class Held:
     node: wp.int32
     role: wp.int32
     inverse: wp.float64
+    turn: wp.quatd
     pair: wp.vec2i
     row0: wp.vec4i
     row1: wp.vec4i
@@ -71,6 +78,8 @@ def hold_node(i: int, nodes: Nodes):
     if nodes.role.shape[0] > 0:
         held.role = int(nodes.role[i])
     held.inverse = nodes.inverse_mass[i]
+    if nodes.frames.of_node.shape[0] > 0:
+        held.turn = nodes.frames.rotation[nodes.frames.of_node[i]]
     held.pair = nodes.first_slots[i]
     none = wp.vec4i(-1, -1, -1, 0)
     held.row0 = none
@@ -90,14 +99,17 @@ def hold_node(i: int, nodes: Nodes):
 
 
 @wp.func
-def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, gravity: wp.vec3d, dt: wp.float64):
+def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, nodes: Nodes, dt: wp.float64):
     """As `kernels.nodes.node.integrate_kernel` has it [m/s]."""
+    gravity = nodes.gravity
+    if nodes.weight.shape[0] > 0:
+        gravity = nodes.weight[held.node]
     return v + dt * hold(held.role, held.inverse * total + gravity)
 
 
 @cache
-def gather_function(precision: str) -> Any:
-    """The function that sums the forces of elements on a node."""
+def gather_function(precision: str, turned: bool) -> Any:
+    """The function that sums the forces of elements on a node; `turned`: they are those in its floating frame."""
     vec3 = scalars(precision).vec3
 
     @wp.func
@@ -137,16 +149,18 @@ def gather_function(precision: str) -> Any:
         for k in range(held.row, held.end):
             r = more_slots[k]
             total = add_row(total, r, force_at(r[0], force), force_at(r[1], force), force_at(r[2], force))
+        if wp.static(turned):
+            return wp.quat_rotate(held.turn, total)
         return total
 
     return gather_held
 
 
 @cache
-def total_function(precision: str, contact: bool) -> Any:
+def total_function(precision: str, contact: bool, turned: bool) -> Any:
     """The function that sums all forces on a node, of elements and as a slave; that is given once."""
     vec3 = scalars(precision).vec3
-    gather_held = gather_function(precision)
+    gather_held = gather_function(precision, turned)
 
     @wp.func
     def all_forces(
@@ -170,10 +184,10 @@ def total_function(precision: str, contact: bool) -> Any:
 
 
 @cache
-def free_role(precision: str, contact: bool) -> Any:
+def free_role(precision: str, contact: bool, turned: bool) -> Any:
     """The function that moves free nodes in each of some steps."""
     vec3 = scalars(precision).vec3
-    all_forces = total_function(precision, contact)
+    all_forces = total_function(precision, contact, turned)
 
     @wp.func
     def move_others(
@@ -190,7 +204,7 @@ def free_role(precision: str, contact: bool) -> Any:
         for k in range(begin, nodes.free.shape[0], stride):
             held = hold_node(nodes.free[k], nodes)
             total = all_forces(held, nodes.more_slots, force, contact_force_out)
-            v = next_velocity(held, v_out[held.node], total, nodes.gravity, dt)
+            v = next_velocity(held, v_out[held.node], total, nodes, dt)
             v_out[held.node] = v
             u_out[held.node] = u_out[held.node] + dt * v
             keep_speed(held.node, v, speed_square_out)
@@ -222,7 +236,7 @@ def free_role(precision: str, contact: bool) -> Any:
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             if mine:
                 total = all_forces(held, nodes.more_slots, force, contact_force_out)
-                v = next_velocity(held, v, total, nodes.gravity, dt)
+                v = next_velocity(held, v, total, nodes, dt)
                 u = u + dt * v
                 v_out[held.node] = v
                 u_out[held.node] = u

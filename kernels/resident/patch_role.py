@@ -33,8 +33,10 @@ from warp_mca.kernels.hardware.shared_memory import (
     slot_pools,
     wait_for_copies,
 )
+from warp_mca.kernels.nodes.floating import seen
 from warp_mca.kernels.records.extremes import keep_functions
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
+from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.model.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
@@ -116,8 +118,35 @@ def element_role(precision: str, law_name: str) -> Any:
 
 
 @cache
-def patch_role(precision: str, law_name: str) -> Any:
-    """The function that computes the forces of a patch of `hex8` in each of some steps."""
+def see_function(precision: str, turned: bool) -> Any:
+    """The function that takes displacements that a thread has copied to floating frames; nothing without `turned`."""
+    point = POINT[precision]
+
+    @wp.func
+    def see_slots(
+        lane: int,
+        count: int,
+        X: wp.array(dtype=wp.vec3d),
+        points: wp.array(dtype=point),
+        nodes: Nodes,
+        pool_out: wp.array(dtype=wp.vec3d),
+    ):
+        if wp.static(turned):
+            for k in range(wp.static(ROUNDS)):
+                a = lane + k * wp.static(THREADS)
+                if a < count:
+                    i = points[a][3]
+                    pool_out[a] = seen(X[i], pool_out[a], nodes.frames.rotation[nodes.frames.of_node[i]])
+
+    return see_slots
+
+
+@cache
+def patch_role(precision: str, law_name: str, turned: bool) -> Any:
+    """The function that computes the forces of a patch of `hex8` in each of some steps.
+
+    `turned`, in `mixed`: elements compute in floating frames.
+    """
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     force_pool, _ = shared_functions(precision)
@@ -125,7 +154,7 @@ def patch_role(precision: str, law_name: str) -> Any:
     point, slots, mixed = POINT[precision], SLOTS[precision], precision == "mixed"
     copy_points = copy_functions(precision)[3]
     clear_nowhere, _, _, sum_slot = sum_functions(precision)
-    compute_elements = element_role(precision, law_name)
+    compute_elements, see_slots = element_role(precision, law_name), see_function(precision, turned)
 
     @wp.func
     def compute_patch(
@@ -138,6 +167,7 @@ def patch_role(precision: str, law_name: str) -> Any:
         patches: Patches,
         law: wp.array2d(dtype=R),
         slot: int,
+        nodes: Nodes,
         u: wp.array(dtype=wp.vec3d),
         count_out: wp.array(dtype=wp.int32),
         yielded_out: wp.array(dtype=wp.int32),
@@ -170,6 +200,7 @@ def patch_role(precision: str, law_name: str) -> Any:
                         copy_vector(X, kept_points[a], a, pool)
                         copy_vector(u, kept_points[a], wp.static(slots) + a, pool)
             wait_for_copies()
+            see_slots(lane, slot_count(head), X, kept_points, nodes, pool)
             barrier()
             compute_elements(
                 lane, head, corners, kept_points, pool, patches, law, yielded_out, history_out, extreme_out, forces

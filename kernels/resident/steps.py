@@ -14,6 +14,7 @@ from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.resident.bound_role import bound_role
 from warp_mca.kernels.resident.contact_role import Slaves, contact_role
@@ -21,6 +22,7 @@ from warp_mca.kernels.resident.master_role import Faces, master_role
 from warp_mca.kernels.resident.meeting import leave, together
 from warp_mca.kernels.resident.node_role import Nodes, free_role
 from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS, patch_role
+from warp_mca.kernels.resident.pin_role import pin_role
 
 wp.set_module_options({"enable_backward": False})
 
@@ -33,6 +35,7 @@ class Roles:
         contact: slave nodes.
         master: nodes of master faces.
         bound: bound nodes, and the greatest normal force: one block, or none.
+        pin: nodes of hinges with pins.
         free: other nodes.
         end: number of blocks.
     """
@@ -40,24 +43,34 @@ class Roles:
     contact: wp.int32
     master: wp.int32
     bound: wp.int32
+    pin: wp.int32
     free: wp.int32
     end: wp.int32
 
 
 @cache
 def resident_kernel(
-    precision: str, law_name: str, contact: bool, friction: bool, stress_free: bool, contact_law: str, partial: bool
+    precision: str,
+    law_name: str,
+    turned: bool,
+    contact: bool,
+    friction: bool,
+    stress_free: bool,
+    contact_law: str,
+    partial: bool,
+    coupled: bool,
 ) -> Any:
-    """Kernel: `steps` steps of a model of one block of `hex8`, with a contact pass if `contact`.
+    """Kernel: `steps` steps of a model of one block of `hex8`, with a contact pass if `contact`, pins if `coupled`.
 
     Arguments are those of the kernels that take the same steps one by one: `hex8_patch`, `contact`, `nodes.node`,
-    `nodes.constraint`. count_out are the counts of `meeting`, zero before and after.
+    `nodes.constraint`, `nodes.couple`. `turned`: elements compute in floating frames. count_out are the counts of
+    `meeting`, zero before and after.
     """
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
-    compute_patch, move_free = patch_role(precision, law_name), free_role(precision, contact)
-    touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision)
-    move_bound = bound_role(precision, partial)
+    compute_patch, move_free = patch_role(precision, law_name, turned), free_role(precision, contact, turned)
+    touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision, turned)
+    move_bound, move_pinned = bound_role(precision, partial, turned), pin_role(precision, turned)
 
     @wp.func
     def give_forces(
@@ -70,6 +83,7 @@ def resident_kernel(
         patches: Patches,
         law: wp.array2d(dtype=R),
         slot: int,
+        nodes: Nodes,
         slaves: Slaves,
         master: Master,
         dt: wp.float64,
@@ -89,7 +103,7 @@ def resident_kernel(
         movers = roles.end - roles.master
         if block < roles.contact:
             compute_patch(
-                block, lane, steps, movers, X, points, patches, law, slot, u,
+                block, lane, steps, movers, X, points, patches, law, slot, nodes, u,
                 count_out, yielded_out, history_out, extreme_out, force_out,
             )  # fmt: skip
         elif wp.static(contact):
@@ -107,6 +121,8 @@ def resident_kernel(
         nodes: Nodes,
         faces: Faces,
         bonds: Bonds,
+        clusters: Clusters,
+        X: wp.array(dtype=wp.vec3d),
         dt: wp.float64,
         force: wp.array(dtype=vec3),
         spring: Spring,
@@ -120,9 +136,11 @@ def resident_kernel(
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
         clock_out: wp.array(dtype=wp.int32),
+        place_out: wp.array(dtype=wp.vec3d),
+        orientation_out: wp.array2d(dtype=wp.quatd),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        """Motion of master, bound and free nodes."""
+        """Motion of master, bound, pinned and free nodes."""
         pushers = roles.master
         if block < roles.bound:
             if wp.static(contact):
@@ -130,11 +148,17 @@ def resident_kernel(
                     block - roles.master, lane, steps, pushers, nodes, faces, dt, force, spring,
                     count_out, u_out, v_out, speed_square_out, flag_out,
                 )  # fmt: skip
-        elif block < roles.free:
+        elif block < roles.pin:
             move_bound(
                 lane, steps, pushers, nodes, bonds, dt, force, count_out, normal_force_out, u_out, v_out,
                 speed_square_out, impulse_out, work_out, work_after_out, clock_out,
             )  # fmt: skip
+        elif block < roles.free:
+            if wp.static(coupled):
+                move_pinned(
+                    block - roles.pin, lane, steps, pushers, nodes, clusters, X, dt, force, count_out, u_out, v_out,
+                    speed_square_out, impulse_out, place_out, orientation_out,
+                )  # fmt: skip
         else:
             move_free(
                 block - roles.free, lane, roles.end - roles.free, steps, pushers, nodes, dt, force,
@@ -161,6 +185,7 @@ def resident_kernel(
         master: Master,
         faces: Faces,
         bonds: Bonds,
+        clusters: Clusters,
         dt: wp.float64,
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
@@ -177,21 +202,23 @@ def resident_kernel(
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
         clock_out: wp.array(dtype=wp.int32),
+        place_out: wp.array(dtype=wp.vec3d),
+        orientation_out: wp.array2d(dtype=wp.quatd),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         lane = wp.tid() % wp.static(THREADS)
         block = wp.tid() // wp.static(THREADS)
         if block < roles.master:
             give_forces(
-                block, lane, steps, roles, X, points, patches, law, slot, slaves, master, dt, u_out, v_out, spring,
-                count_out, yielded_out, history_out, extreme_out, force_out, contact_force_out,
+                block, lane, steps, roles, X, points, patches, law, slot, nodes, slaves, master, dt, u_out, v_out,
+                spring, count_out, yielded_out, history_out, extreme_out, force_out, contact_force_out,
                 normal_force_out[wp.static(1 if contact else 0)], flag_out,
             )  # fmt: skip
         else:
             move_nodes(
-                block, lane, steps, roles, nodes, faces, bonds, dt, force_out, spring,
+                block, lane, steps, roles, nodes, faces, bonds, clusters, X, dt, force_out, spring,
                 count_out, contact_force_out, normal_force_out, u_out, v_out, speed_square_out,
-                impulse_out, work_out, work_after_out, clock_out, flag_out,
+                impulse_out, work_out, work_after_out, clock_out, place_out, orientation_out, flag_out,
             )  # fmt: skip
         leave(count_out)
 

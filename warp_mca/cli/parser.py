@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, paper, run, sweep
+from warp_mca.cli import commands, paper, run, sweep, tradeoff
 from warp_mca.elements import ELEMENTS
 
 WELCOME = """\
@@ -21,6 +21,7 @@ elastoplastic finite elements with frictional contact take over.
   warp-mca sweep two_link --grid mu=0.1,0.3 --grid v_plate=0.4,0.8,1.6 --out slip
   warp-mca run my_scene.py                         a scene of your own, in Python
   warp-mca build two_link --preset paper -o paper.mca && warp-mca run paper.mca
+  warp-mca tradeoff two_link --out trade           what each choice of the model costs in error, and in time
   warp-mca scenes                                  scenes, presets and parameters
 
 warp-mca COMMAND --help lists the options; README.md has an example in Python."""
@@ -41,6 +42,7 @@ def make_parser() -> argparse.ArgumentParser:
     add = partial(parser.add_subparsers(metavar="COMMAND").add_parser, allow_abbrev=False)
     _run(add("run", help="run a scene or a built model"))
     _sweep(add("sweep", help="run a scene for each combination of values, and collect a row of figures a run"))
+    _tradeoff(add("tradeoff", help="measure what choices of the model cost in error and in time"))
     _build(add("build", help="make the meshes of a scene and store them with it"))
     _scenes(add("scenes", help="list scenes, presets and parameters"))
     _view(add("view", help="open a recording in the rerun viewer"))
@@ -99,6 +101,19 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     _add_options(parser)
     sweep.add_options(parser)
     parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the table (default: SCENE-PRESET-sweep)")
+
+
+def _tradeoff(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    parser.add_argument("--budget", type=float, metavar="SECONDS", help="time for all runs (default: all variants)")
+    parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
+    parser.add_argument(
+        "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
+    )
+    parser.add_argument("--out", type=_folder, metavar="DIR", required=True, help="folder for the results")
+    parser.add_argument("--force", action="store_true", help="replace a trade-off that the folder holds already")
+    parser.set_defaults(command=tradeoff.tradeoff)
 
 
 def _build(parser: argparse.ArgumentParser) -> None:

@@ -137,7 +137,7 @@ class PatchStage(ElementStage):
         patches = self.patches if level is None or chain is None else self.chains[level, chain]
         most = min(self.blocks, self.beside) if chain else self.blocks
         blocks = min(most, len(patches.head))
-        inputs = [work.X, self.point, patches, work.law, state.u, self.slot, blocks]
+        inputs = [work.X, self.point, patches, work.law, work.displacements(state), self.slot, blocks]
         outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
         wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 

@@ -147,7 +147,7 @@ class ElementStage:
         own = state.elements[self.index]
 
         def launch(part: slice) -> None:
-            inputs = [work.X, self.conn[:, part], self.material[part], work.law, state.u]
+            inputs = [work.X, self.conn[:, part], self.material[part], work.law, work.displacements(state)]
             inputs += [self.slot + part.start, self.count, *self.more(part)]
             outputs = [*self._history(own, part), own.extreme[:, part], work.force]
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
@@ -168,7 +168,7 @@ class ElementStage:
 
         def launch(part: slice) -> None:
             inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
-            inputs += [own.extreme[:, part], state.u, self.block.first + part.start, *self.more(part)]
+            inputs += [own.extreme[:, part], work.displacements(state), self.block.first + part.start, *self.more(part)]
             count = part.stop - part.start
             wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
 

@@ -60,7 +60,7 @@ class Tet4Stage(ElementStage):
         """Forces of each element on its nodes [N], after the dilatation at the pressure nodes; of all alike."""
 
         def grow(part: slice) -> None:
-            count, inputs = part.stop - part.start, [work.X, self.conn[:, part], state.u]
+            count, inputs = part.stop - part.start, [work.X, self.conn[:, part], work.displacements(state)]
             wp.launch(self.dilatation_kernel, count, inputs=inputs, outputs=[self.growth[part]], block_dim=BLOCK_DIM)
 
         def average(part: slice) -> None:

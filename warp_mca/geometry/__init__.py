@@ -1,6 +1,7 @@
 """Owns the import paths of the geometry recipes and of the mesh that they make."""
 
 from warp_mca.geometry.box import Box
+from warp_mca.geometry.lug_rod import LugRod
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.mesh_file import MeshFile
 from warp_mca.geometry.nested_plate import NestedPlate
@@ -10,4 +11,4 @@ from warp_mca.geometry.recipe import Recipe
 from warp_mca.geometry.rod import Rod
 from warp_mca.geometry.sphere import Sphere
 
-__all__ = ["Box", "Mesh", "MeshFile", "NestedPlate", "Part", "Parts", "Plate", "Recipe", "Rod", "Sphere"]
+__all__ = ["Box", "LugRod", "Mesh", "MeshFile", "NestedPlate", "Part", "Parts", "Plate", "Recipe", "Rod", "Sphere"]

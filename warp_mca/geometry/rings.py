@@ -15,8 +15,8 @@ Vector = NDArray[np.float64]
 # The two ends of each outer side; corners 0 and 1 lie in the plane z = 0, where the other half is mirrored on.
 SIDES = ((1, 2), (2, 3), (3, 0))
 
-_CORE_RADIUS = 0.64  # from the axis to the corners of a disc's core [radius]
-_CORE_BULGE = 0.24  # of the core's edges [rad]
+CORE_RADIUS = 0.64  # from the axis to the corners of a disc's core [radius]
+CORE_BULGE = 0.24  # of the core's edges [rad]
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ def disc(blocks: Blocks, x: float, radius: float) -> tuple[Ring, int]:
     centre = blocks.point(origin)
     d = math.sqrt(0.5)
     near, far = np.array([0.0, d, d]), np.array([0.0, -d, d])
-    inner = _CORE_RADIUS * radius
-    core = bowed_face(blocks, origin, inner * near, inner * far, _CORE_BULGE)
+    inner = CORE_RADIUS * radius
+    core = bowed_face(blocks, origin, inner * near, inner * far, CORE_BULGE)
     outer = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]), near, far
     rim = [blocks.point(origin + radius * place) for place in outer]
     for a, b in SIDES:

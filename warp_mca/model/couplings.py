@@ -59,8 +59,11 @@ def _pose(joint: Joint, side: Side, nodes: Index, weights: Array, at: Vec3, axis
     points, X = side.mesh.points[nodes], side.X[nodes]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if len(nodes) > 2 else np.zeros(3)
     if spread[1] <= FLAT * spread[0]:
-        what = f"{len(nodes)} nodes of {side.body} lie within it, on one line or none, and the mean needs more"
-        raise bad_value(f"{joint.title}.pin_radius", getattr(joint, "pin_radius", None), f"{what}; give a larger one")
+        pin = getattr(joint, "pin", None)
+        hole = pin is not None and pin.hole
+        where, remedy = ("on such a hole", "give the hole's radius") if hole else ("within it", "give a larger one")
+        what = f"{len(nodes)} nodes of {side.body} lie {where}, on one line or none, and the mean needs more"
+        raise bad_value(f"{joint.title}.pin_radius", pin and pin.radius, f"{what}; {remedy}")
     a, b, R = mean_pose(points, X, weights)
     return _Pose(b, b + R @ (np.asarray(at) - a), R @ np.asarray(axis) / np.linalg.norm(axis))
 

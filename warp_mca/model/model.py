@@ -13,6 +13,7 @@ from warp_mca.model.assembly import Block
 from warp_mca.model.auto_penalty import ChosenPenalty
 from warp_mca.model.constraints import JointPairs
 from warp_mca.model.couplings import Coupling
+from warp_mca.model.floating import FloatingFrames
 from warp_mca.model.joint_loads import HingeLoad, MovableBase
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
@@ -70,6 +71,7 @@ class Model:
         rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
             in a batch.
         rates: groups of elements that take steps of their own, or None where all take the same.
+        floating: frames that elements compute in, or None where they do in the world frame.
     """
 
     X: Array
@@ -110,6 +112,7 @@ class Model:
     rigid_pins: tuple[RigidPin, ...] = ()
     rigid_blocks: tuple[Block, ...] = ()
     rates: Rates | None = None
+    floating: FloatingFrames | None = None
 
     def owner(self, element: int) -> tuple[str, int]:
         """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""

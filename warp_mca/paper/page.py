@@ -22,7 +22,7 @@ CLAIM_HEAD = ("claim", "where", "paper", "ours", "agrees", "why", "mesh", "penal
 RUN_HEAD = ("command", "elements", "F_n peaks [kN]", "F_t [kN]", "contact [ms]", "energy error")
 SECTIONS = (  # number of each figure, its heading and caption
     *((picture.number, f"Figure {picture.number}", picture.caption) for picture in PICTURES),
-    ("limit", "Limit of fine meshes", "Runs of our own: penalty 1, hinges with pins, two meshes."),
+    ("limit", "Limit of fine meshes", "Runs of our own: penalty 1, hinges of fork and eye, two meshes."),
 )
 
 

@@ -31,6 +31,23 @@ def first_peak(result: Result) -> float:
     return 1e-3 * peak
 
 
+def second_peak(result: Result) -> float:
+    """Of F_n [kN].
+
+    Raises:
+        MissingRunError: there is none.
+    """
+    peaks = result.summary["F_n_peaks"]
+    if len(peaks) < 2:
+        raise MissingRunError("F_n has no second peak")
+    return 1e-3 * peaks[1][1]
+
+
+def impulse(result: Result) -> float:
+    """Of F_n [N s]."""
+    return float(np.sum(result.F_n[1:] * np.diff(result.time)))
+
+
 def greatest_F_t(result: Result) -> float:
     """F_t where it opposes the tip's way along +x most [kN]."""
     return 1e-3 * result.summary["F_t_min"]

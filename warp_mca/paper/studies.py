@@ -132,7 +132,7 @@ STUDIES: dict[str, Study] = {
         _compliance("tip", "16", "Modulus of the tip", "tip"),
         _compliance("body", "17", "Modulus of the rods' cylinders", "body"),
         _compliance("rod", "18", "Modulus of the whole rods", "tip", "body"),
-        Study("limit", ("limit",), "Stiff springs, hinges with pins", common=(("joint_nodes", "pin"), *STIFF)),
+        Study("limit", ("limit",), "Stiff springs, hinges of fork and eye", common=(("hinge", "lug"), *STIFF)),
     )
 }
 MESHES = "meshes"  # name under which the runs of Fig. 7 are found, by number from the coarsest mesh
@@ -147,7 +147,7 @@ class Level:
         note: what the page says about it.
         main, other: meshes of all figures, and of the variants MESH and PENALTY.
         meshes: of Fig. 7, from the coarsest on; the last is `main` or finer.
-        limit: two meshes on which stiff springs and pins are compared, the finer one last; may be empty.
+        limit: two meshes on which stiff springs and hinges as built are compared, the finer one last; may be empty.
         points: values of each study; a study that is not listed is not run.
         ends: of these, values that are run in all variants.
     """

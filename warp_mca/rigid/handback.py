@@ -12,7 +12,7 @@ from warp_mca.base.rotation import mean_pose, point_velocity
 from warp_mca.rigid.body_motion import BodyMotion, body_motion
 from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, mesh_link, perpendicular
 from warp_mca.rigid.placement import Placement, link_placements
-from warp_mca.scene.ties import pin_weights
+from warp_mca.scene.ties import Pin
 
 MAX_ITERATIONS = 50  # of the fit of the angles; elastic shapes need three or four
 
@@ -109,7 +109,7 @@ def hand_back(
 
 
 def carriage_motion(
-    chain: Chain, t: float, points: Array, masses: Array, positions: Array, velocities: Array, pin: float = 0.0
+    chain: Chain, t: float, points: Array, masses: Array, positions: Array, velocities: Array, pin: Pin | None = None
 ) -> Vec2:
     """Way [m] and velocity [m/s] of the carriage along its slide, from the nodes that it carries; 0 without a slide.
 
@@ -119,12 +119,12 @@ def carriage_motion(
         points: of the first link in its body's frame, without deformation [m], shape (node_count, 3), float64.
         masses: lumped masses of its nodes [kg], shape (node_count,), float64.
         positions, velocities: of its nodes in the world [m], [m/s], shape (node_count, 3), float64.
-        pin: radius of the pin on the carriage [m], 0 where nodes on the axis are tied.
+        pin: on the carriage, None where nodes on the axis are tied.
     """
     if chain.slide is None:
         return (0.0, 0.0)
     hinge, placed, e = np.asarray(chain.links[0].hinge_in), chain.moved_to(t), np.array(chain.slide)
-    if pin > 0.0:
+    if pin is not None:
         point, weights = _carried(points, positions, masses, hinge, pin)
         velocity = point_velocity(positions, velocities, weights, point)
     else:
@@ -134,9 +134,9 @@ def carriage_motion(
     return (float(way @ e), float(rate @ e))
 
 
-def _carried(points: Array, positions: Array, masses: Array, hinge: Array, pin: float) -> tuple[Array, Array]:
+def _carried(points: Array, positions: Array, masses: Array, hinge: Array, pin: Pin) -> tuple[Array, Array]:
     """Where a pin's nodes carry a hinge along z [m], shape (3,), and their weights [kg], shape (node_count,)."""
-    weights = masses * pin_weights(points, (float(hinge[0]), float(hinge[1]), 0.0), (0.0, 0.0, 1.0), pin)
+    weights = masses * pin.weights(points, (float(hinge[0]), float(hinge[1]), 0.0), (0.0, 0.0, 1.0))
     centre, moved, R = mean_pose(points, positions, weights)
     return moved + R @ (np.append(hinge, centre[2]) - centre), weights
 
@@ -146,7 +146,7 @@ def deformed_chain(
     reference: Mapping[str, Array],
     points: Mapping[str, Array],
     nodal_masses: Mapping[str, Array],
-    pins: Sequence[float],
+    pins: Sequence[Pin | None],
 ) -> Chain:
     """The chain with each hinge where its nodes have moved in their body's frame.
 
@@ -155,12 +155,12 @@ def deformed_chain(
         reference: shape of each link in its body's frame without deformation [m], each shape (node_count, 3), float64.
         points: the same, deformed.
         nodal_masses: lumped masses by body name [kg], each shape (node_count,), float64.
-        pins: radius of the pin of each link's inbound hinge [m], 0 where it has none (`scene_chain.pin_radii`).
+        pins: pin of each link's inbound hinge, None where it has none (`scene_chain.pins`).
     """
     links = []
     for k, link in enumerate(chain.links):
         nodes = reference[link.body], points[link.body], nodal_masses[link.body]
-        ends = (("in", (0.0, 0.0), pins[k]), ("out", link.hinge_out, pins[k + 1] if k + 1 < len(pins) else 0.0))
+        ends = (("in", (0.0, 0.0), pins[k]), ("out", link.hinge_out, pins[k + 1] if k + 1 < len(pins) else None))
         shift = {end: _moved(*nodes, np.add(link.hinge_in, arm), pin) for end, arm, pin in ends}
         hinge_in, hinge_out = link.hinge_in + shift["in"], link.hinge_out + shift["out"] - shift["in"]
         links.append(replace(link, hinge_in=_pair(hinge_in), hinge_out=_pair(hinge_out)))
@@ -171,12 +171,12 @@ def _pair(vector: Array) -> Vec2:
     return (float(vector[0]), float(vector[1]))
 
 
-def _moved(reference: Array, points: Array, masses: Array, hinge: Array, pin: float) -> Array:
+def _moved(reference: Array, points: Array, masses: Array, hinge: Array, pin: Pin | None) -> Array:
     """Mean displacement of the nodes on a hinge axis [m], shape (2,), float64; 0 if there are none.
 
     That of a pin is that of the axis which follows the mean motion of the nodes around it.
     """
-    if pin > 0.0:
+    if pin is not None:
         return _carried(reference, points, masses, hinge, pin)[0][:2] - hinge
     on_axis = _on_axis(reference, hinge)
     return (points - reference)[on_axis, :2].mean(axis=0) if on_axis.any() else np.zeros(2)

@@ -14,6 +14,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array, Chain, Link, Vec2, mesh_link, slender_link
 from warp_mca.rigid.loads import Loads, Table
 from warp_mca.scene import Revolute, RigidPhase, Scene, Tip, Vec3
+from warp_mca.scene.ties import Pin
 
 
 class _Span(NamedTuple):
@@ -78,10 +79,10 @@ def chain_from_scene(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Map
     )
 
 
-def pin_radii(scene: Scene) -> tuple[float, ...]:
-    """Radius of the pin in each hinge of the scene's chain, from the ground outwards [m]; 0 where it has none."""
-    radii = {joint.name: joint.pin_radius or 0.0 for joint in _hinges(scene)}
-    return tuple(radii[span.joint] for span in _spans(scene))
+def pins(scene: Scene) -> tuple[Pin | None, ...]:
+    """Pin in each hinge of the scene's chain, from the ground outwards; None where it has none."""
+    found = {joint.name: joint.pin for joint in _hinges(scene)}
+    return tuple(found[span.joint] for span in _spans(scene))
 
 
 def release(rigid: RigidPhase) -> tuple[Array, Array]:

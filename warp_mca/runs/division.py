@@ -14,6 +14,7 @@ from warp_mca.solve.steps import Steps
 
 # Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
+MOST_INTERVALS = 4  # of output between two searches: bodies that rest or are slow at first are pushed by contact later
 MAX_ROWS = 10_000_000  # of a history: some 5 GB
 MAX_STEPS = 10_000_000_000  # of a run: more than a week of the smallest model
 
@@ -43,15 +44,18 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float, substeps
     intervals = max(1, round(wanted))
     interval = duration / intervals
     limits = [_limits(scene, model, interval, intervals) for scene, model in parts]
-    stable, searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
+    stable, wanted_searches = min(limit[0] for limit in limits), max(limit[1] for limit in limits)
+    searches = max(1, math.ceil(wanted_searches))
+    apart = int(min(MOST_INTERVALS, 1.0 / wanted_searches)) if 0.0 < wanted_searches < 1.0 else 1
     rates = parts[0][1].rates
     substeps = substeps or (rates.substeps if rates else 1)
     per_search = math.ceil(interval / searches / (stable * substeps))
-    return Steps(dt=interval / (searches * per_search), per_search=per_search, searches=searches, intervals=intervals)
+    dt = interval / (searches * per_search)
+    return Steps(dt=dt, per_search=per_search, searches=searches, intervals=intervals, intervals_per_search=apart)
 
 
-def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, int]:
-    """Longest step [s] of a scene, and how often it must search for contact in an output interval [s].
+def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, float]:
+    """Longest step [s] of a scene, and searches for contact in an output interval [s], fewer than 1 where few suffice.
 
     Raises:
         RequestError: as in `divide`.
@@ -88,4 +92,4 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
     if not searches * intervals <= MAX_STEPS:
         remedy = f"so fast, a run would search for contact more than {MAX_STEPS:.0e} times; check the unit [m/s]"
         raise bad_value("speed of the bodies", max(float(np.abs(model.V).max()), driven), remedy)
-    return stable, max(1, math.ceil(searches))
+    return stable, searches

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.model.batch_model import join_models
+from warp_mca.model.floating import with_floating_frames
 from warp_mca.model.layout import offsets
 from warp_mca.results.paths import join_probes
 from warp_mca.runs.division import divide_alike
@@ -78,6 +79,7 @@ class Impact:
         self.ready = tuple(ready)
         self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
         model = join_models([item.model for item in ready])
+        model = with_floating_frames(model, [item.scene for item in ready], span, precision)
         self.solver = Solver(model, device=device, precision=precision, dt=self.steps.dt, threads=threads)
         probes = join_probes([(item.probes, item.model.node_count) for item in ready])
         if skins or len(probes.corner):
@@ -204,7 +206,7 @@ class _Loop:
     def _interval(self, interval: int, last: int) -> None:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
-        for number, part in enumerate(self.steps.parts()):
+        for number, part in enumerate(self.steps.parts(interval)):
             end = first + part.count
             if self.state.steps < min(end, last):
                 self._part(part, first, min(end, last), interval if number == 0 else None)

@@ -62,10 +62,15 @@ class Ledger:
         kept: what it has taken in so far, a part of the run's state.
     """
 
-    def __init__(self, model: Model, steps: Steps, tolerance: float, precision: str, kept: SceneRecords) -> None:
-        """Go on from what is `kept`; the energy balance may be off by the share `tolerance`."""
+    def __init__(
+        self, model: Model, steps: Steps, tolerance: float, precision: str, kept: SceneRecords, framed: bool = False
+    ) -> None:
+        """Go on from what is `kept`; the energy balance may be off by the share `tolerance`.
+
+        `framed`: elements compute in floating frames.
+        """
         self.model, self.steps, self.tolerance, self.precision = model, steps, tolerance, precision
-        self.kept = kept
+        self.kept, self.framed = kept, framed
         if not len(kept.peaks):
             kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = _spin(model)
@@ -210,7 +215,8 @@ class Ledger:
             found += " or a contact's penalty"
         if self.model.rates:
             found += ", take fewer groups in multi_rate"
-        if self.precision == "mixed" and self.spin * self.steps.time(self.kept.records) > TURNED:
+        turned = self.spin * self.steps.time(self.kept.records)
+        if self.precision == "mixed" and turned > TURNED and not self.framed:
             found += ", choose --precision float64 for bodies that turn so far"
         return found
 

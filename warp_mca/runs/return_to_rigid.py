@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import HandBack, carriage_motion, deformed_chain, hand_back
-from warp_mca.rigid.scene_chain import pin_radii
+from warp_mca.rigid.scene_chain import pins
 from warp_mca.runs.cycle_setup import Setup
 from warp_mca.runs.motion import Motion
 from warp_mca.runs.parts import ImpactPart
@@ -82,14 +82,14 @@ def _fit(
         rest: positions in equilibrium [m].
     """
     points = {name: setup.meshes[name].points for name in now}
-    base, pins = setup.chain.links[0].body, pin_radii(setup.scene)
-    carriage = carriage_motion(setup.chain, t, points[base], setup.masses[base], now[base], velocities[base], pins[0])
+    base, held = setup.chain.links[0].body, pins(setup.scene)
+    carriage = carriage_motion(setup.chain, t, points[base], setup.masses[base], now[base], velocities[base], held[0])
     near = setup.chain.angles(before.theta)
     common = {"near": near, "held": setup.held, "t": t, "carriage": carriage}
     still = {name: np.zeros_like(x) for name, x in rest.items()}
     shapes = hand_back(setup.chain, points, setup.masses, rest, still, **common).displacements
     deformed = {name: points[name] + shapes[name] for name in points}
-    chain = deformed_chain(setup.chain, points, deformed, setup.masses, pins)
+    chain = deformed_chain(setup.chain, points, deformed, setup.masses, held)
     return shapes, hand_back(chain, deformed, setup.masses, now, velocities, **common)
 
 

@@ -60,7 +60,8 @@ class SceneRun:
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         tolerance = ready.scene.impact.energy_tolerance
-        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index])
+        framed = solver.floating.count > 0
+        self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of the solver's records, and hold them to the guards.
@@ -107,7 +108,7 @@ class SceneRun:
             "energy_error_exchanged": ledger.exchange_error,
             "stable_dt": model.stable.dt,
             "joint_impulse": joint_impulses(self.solver, self.state, self.index),
-            "threads": self.solver.threads,
+            **self._solver_facts(),
             "refine": scene.refine,
         }
         if scene.rigid_names:
@@ -150,6 +151,11 @@ class SceneRun:
             theta_dot=tuple(float(x) for x in start.theta_dot),
             more=more,
         )
+
+    def _solver_facts(self) -> dict[str, object]:
+        """Threads that compute, and whether they do so in floating frames."""
+        framed: dict[str, object] = {"floating_frames": True} if self.ledger.framed else {}
+        return {"threads": self.solver.threads, **framed}
 
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""

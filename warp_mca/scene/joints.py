@@ -16,7 +16,7 @@ import numpy as np
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.ties import Clusters, Index, Rails, Side, Ties, coincident, rails_along
+from warp_mca.scene.ties import Clusters, Index, Pin, Rails, Side, Ties, coincident, rails_along
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,34 +65,41 @@ class Revolute(Joint):
         other_at: the same point in the frame of `other` [m].
         axis: direction of the hinge axis in the frame of both bodies [-].
         nodes: "axis" ties every node on the axis; "ends" the two outermost pairs, as the paper does; "pin" ties the
-            mean motion of all nodes near the axis, which need not coincide.
+            mean motion of all nodes near the axis, which need not coincide; "hole" that of the surfaces of shaft holes
+            around the axis.
         pin_radius: distance from the axis up to which "pin" takes nodes [m]; their weight decreases from 1 on the axis
-            to 0 there.
+            to 0 there. With "hole", the radius of the holes.
     """
 
     at: Vec3
     other_at: Vec3 = (0.0, 0.0, 0.0)
     axis: Vec3 = (0.0, 0.0, 1.0)
-    nodes: Literal["axis", "ends", "pin"] = "axis"
+    nodes: Literal["axis", "ends", "pin", "hole"] = "axis"
     pin_radius: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.vectors(self.title, at=self.at, other_at=self.other_at, axis=self.axis)
         _check_direction(f"{self.title}.axis", self.axis)
-        if self.nodes not in ("axis", "ends", "pin"):
-            raise bad_value(f"{self.title}.nodes", self.nodes, "choose axis, ends or pin")
-        if (self.pin_radius is not None) != (self.nodes == "pin"):
-            remedy = "give the radius of the pin [m]" if self.nodes == "pin" else 'it needs nodes="pin"; leave it out'
+        if self.nodes not in ("axis", "ends", "pin", "hole"):
+            raise bad_value(f"{self.title}.nodes", self.nodes, "choose axis, ends, pin or hole")
+        pinned = self.nodes in ("pin", "hole")
+        if (self.pin_radius is not None) != pinned:
+            remedy = f"give the radius of the {self.nodes} [m]" if pinned else 'it needs nodes="pin"; leave it out'
             raise bad_value(f"{self.title}.pin_radius", self.pin_radius, remedy)
         if self.pin_radius is not None:
             validate.positive(self.title, pin_radius=self.pin_radius)
 
+    @property
+    def pin(self) -> Pin | None:
+        """Which nodes around the axis share a mean motion; None where those on it are tied."""
+        return None if self.pin_radius is None else Pin(self.pin_radius, hole=self.nodes == "hole")
+
     def ties(self, first: Side, second: Side | None) -> Ties | Clusters:
         """Nodes on the axis, in the order along it, or those around it."""
-        if self.pin_radius is not None:
-            a = first.around_axis(self.at, self.axis, self.pin_radius)
-            b = (None, None) if second is None else second.around_axis(self.other_at, self.axis, self.pin_radius)
+        if self.pin is not None:
+            a = first.on_pin(self.at, self.axis, self.pin)
+            b = (None, None) if second is None else second.on_pin(self.other_at, self.axis, self.pin)
             return Clusters(*a, self.at, self.axis, *b, self.other_at)
         a = self._nodes(first, self.at)
         if len(a) < 2:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
+ON_HOLE = 1e-3  # distance from the surface of a hole, as a share of its radius
 COINCIDENT = 1e-6  # distance of coincident nodes, as a share of the extent of the joint's first body
 
 
@@ -49,9 +50,9 @@ class Side:
         nodes = np.flatnonzero(away <= self.tolerance)
         return nodes[np.argsort(along[nodes])].astype(np.int32)
 
-    def around_axis(self, at: Vec3, axis: Vec3, radius: float) -> tuple[Index, Array]:
-        """Nodes within a radius [m] of such an axis, and the `pin_weights` of these."""
-        weight = pin_weights(self.mesh.points, at, axis, radius)
+    def on_pin(self, at: Vec3, axis: Vec3, pin: Pin) -> tuple[Index, Array]:
+        """Nodes that a pin on such an axis takes, and the weights of these."""
+        weight = pin.weights(self.mesh.points, at, axis)
         nodes = np.flatnonzero(weight > 0.0)
         return nodes.astype(np.int32), weight[nodes]
 
@@ -111,20 +112,34 @@ class Clusters:
     other_at: Vec3 = (0.0, 0.0, 0.0)
 
 
-def pin_weights(points: Array, at: Vec3, axis: Vec3, radius: float) -> Array:
-    """Weights (1 - (r / radius)^2)^2 of points at the distance r from an axis through `at`, shape (count,); 0 beyond.
+@dataclass(frozen=True)
+class Pin:
+    """Which nodes around an axis share a mean motion.
 
-    The weight and its slope are 0 at the radius, so that sums over the nodes, which lumped masses make quadratures,
-    change smoothly with the mesh.
-
-    Args:
-        points: [m], shape (count, 3), float64.
-        at, axis: in the same frame [m].
-        radius: [m].
+    Attributes:
+        radius: how far from the axis, or of a hole [m].
+        hole: whether it takes the surface of a hole in place of all nodes within the radius.
     """
-    offset, direction = points - np.asarray(at), np.asarray(axis) / np.linalg.norm(axis)
-    square = (offset**2).sum(axis=1) - (offset @ direction) ** 2
-    return np.asarray(np.maximum(1.0 - square / radius**2, 0.0) ** 2, dtype=np.float64)
+
+    radius: float
+    hole: bool = False
+
+    def weights(self, points: Array, at: Vec3, axis: Vec3) -> Array:
+        """Weights of points at the distance r from an axis through `at`, shape (count,); 0 where they are not taken.
+
+        Within a radius (1 - (r / radius)^2)^2: the weight and its slope are 0 there, so that sums over the nodes, which
+        lumped masses make quadratures, change smoothly with the mesh. On the surface of a hole 1: masses are
+        proportional to the surface, so that an impulse acts as an even pressure.
+
+        Args:
+            points: [m], shape (count, 3), float64.
+            at, axis: in the same frame [m].
+        """
+        offset, direction = points - np.asarray(at), np.asarray(axis) / np.linalg.norm(axis)
+        square = (offset**2).sum(axis=1) - (offset @ direction) ** 2
+        if self.hole:
+            return np.where(np.abs(square - self.radius**2) <= 2.0 * ON_HOLE * self.radius**2, 1.0, 0.0)
+        return np.asarray(np.maximum(1.0 - square / self.radius**2, 0.0) ** 2, dtype=np.float64)
 
 
 def coincident(first: Side, a: Index, second: Side, b: Index) -> tuple[Index, Index]:

@@ -62,7 +62,7 @@ class AbsorbingStage:
         self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
         self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
         self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
-        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each, nodes.rated)
+        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each, nodes.rated, nodes.turned)
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
         self.column = absorbing_column(len(model.passes) // layout.count)
@@ -93,7 +93,7 @@ class AbsorbingStage:
         """The nodes that dashpots act on, with forces of elements up to a level, or of all."""
         work, state, own = self.nodes.work, step.state, step.state.absorbing
         inputs = [self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
-        inputs += [work.force, self.nodes.scene, self.nodes.gravity, self.nodes.dt]
+        inputs += [work.force, work.frames(state), self.nodes.scene, self.nodes.gravity, self.nodes.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
         wp.launch(self.kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)

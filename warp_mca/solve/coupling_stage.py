@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from warp_mca.kernels.nodes import cluster
+from warp_mca.kernels.nodes import couple
+from warp_mca.kernels.nodes.cluster import Clusters, Sums
+from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.hinge import Side
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -17,7 +20,9 @@ if TYPE_CHECKING:
     from warp_mca.solve.stage import Step
     from warp_mca.solve.workspace import Workspace
 
-BLOCK = 256  # threads of a GPU for a coupling
+# Threads of a block on a GPU, and nodes of its part of a cluster; a CPU takes clusters whole. Small blocks fit in what
+# patches of elements leave free, see `PatchStage.make_room`.
+BLOCK, PART = 64, 128
 
 
 @dataclass(eq=False)
@@ -35,10 +40,11 @@ class CouplingState:
 
 
 class CouplingStage:
-    """What `kernels.nodes.cluster` reads and writes.
+    """What `kernels.nodes.couple` reads and writes.
 
     Attributes:
         count: number of couplings.
+        clusters: on the device.
     """
 
     def __init__(
@@ -47,13 +53,12 @@ class CouplingStage:
         """Allocate on the current device."""
         self.items, self.count = model.couplings, len(model.couplings)
         self.work, self.loads, self.dt = work, loads, dt
-        self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
         weight = np.zeros(len(model.joint_first))
         for item in self.items:
             weight[item.start : item.end] = item.weight
-        self.clusters = cluster.Clusters()
+        self.clusters = Clusters()
         self.clusters.begin = wp.array([(item.start, item.middle, item.end) for item in self.items], dtype=wp.vec3i)
         self.clusters.node = constraints.bonds.first
         self.clusters.weight = wp.array(weight, dtype=wp.float64)
@@ -63,6 +68,23 @@ class CouplingStage:
         self.clusters.base = wp.array(base if (base >= 0).any() else base[:0], dtype=wp.int32)
         self.clusters.axis = wp.array([item.axis for item in self.items], dtype=wp.vec3d)
         self.clusters.arm = wp.array(np.array([item.arm for item in self.items]), dtype=wp.vec3d)
+        self._make_parts(PART if wp.get_device().is_cuda else None)
+
+    def _make_parts(self, size: int | None) -> None:
+        """Cut clusters in parts of so many nodes; None: leave them whole."""
+        part, first = [], []
+        for j, item in enumerate(self.items):
+            counts = []
+            for side, (begin, end) in enumerate(((item.start, item.middle), (item.middle, item.end))):
+                counts.append(len(part))
+                part += [(j, side, k, min(k + (size or end), end)) for k in range(begin, end, size or end)]
+            first.append((*counts, len(part)))
+        self.clusters.part = wp.array(part, dtype=wp.vec4i)
+        self.clusters.first_part = wp.array(first, dtype=wp.vec3i)
+        self.threads = (len(part), BLOCK if size else 1)
+        self.sums, self.momenta = wp.zeros(len(part), dtype=Sums), wp.zeros(len(part), dtype=couple.Momenta)
+        self.sides, self.inverse = wp.zeros((self.count, 2), dtype=Side), wp.zeros(self.count, dtype=Inverse)
+        self.point, self.place = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.vec3d)
 
     def new_state(self) -> CouplingState:
         """State before the first step, on the current device."""
@@ -75,13 +97,30 @@ class CouplingStage:
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [cluster.couple] if self.count else []
+        return [couple.couple_parts] if self.count else []
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of threads that take part."""
+        return self.threads[0] if self.count else 0
+
+    def find_responses(self, step: Step) -> None:
+        """What impulses need and positions give."""
+        state, own, work = step.state, step.state.couplings, self.work
+        inputs = [self.clusters, work.X, work.mass, own.place, state.u, state.v]
+        wp.launch(couple.sum_moments, self.threads, inputs=inputs, outputs=[self.sums], block_dim=BLOCK)
+        inputs = [self.clusters, self.loads.device_bases, self.sums, own.place, own.orientation]
+        inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
+        outputs = [self.sides, self.inverse, self.point, self.place]
+        threads = (self.count, self.threads[1])
+        wp.launch(couple.find_responses, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
 
     def couple(self, step: Step) -> None:
         """Join the clusters, once all their nodes have moved as free ones."""
-        state, own = step.state, step.state.couplings
-        inputs = [self.clusters, self.loads.device_bases, self.work.X, self.work.mass]
-        inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
+        state, own, work = step.state, step.state.couplings, self.work
+        inputs = [self.clusters, work.X, work.mass, self.place, state.u, state.v, self.dt]
+        wp.launch(couple.sum_momenta, self.threads, inputs=inputs, outputs=[self.momenta], block_dim=BLOCK)
+        inputs = [self.clusters, work.X, self.sides, self.inverse, self.point, self.place, self.momenta, self.dt]
         outputs = [state.u, state.v, state.speed_square, state.constraints.impulse, own.place, own.orientation]
         outputs.append(self.loads.latest)
-        wp.launch(cluster.couple, (self.count, self.lanes), inputs=inputs, outputs=outputs, block_dim=BLOCK)
+        wp.launch(couple.couple_parts, self.threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,7 @@ class NodeStage:
         base: time step of the fastest nodes [s].
         each: whether gravity differs between nodes; then `gravity` and `scene` are arrays.
         touched: whether there is contact.
+        turned: whether elements compute in floating frames.
         rated: whether elements take steps of their own.
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
     """
@@ -53,16 +55,19 @@ class NodeStage:
             each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
+        self.turned = work.frame is not None
         self.each, early = each, rounds >= EARLY_ROUNDS
         self._choose(precision, (self.touched, fixed, early))
 
     def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
         """The kernels of a `kind`: contact, fixed, early as `node.integrate_kernel` has them."""
         (contact, fixed, early), own, each = kind, self.constraints, self.each
-        make = rated_node.integrate_kernel if self.rated else node.integrate_kernel
+        make = rated_node.integrate_kernel if self.rated else partial(node.integrate_kernel, turned=self.turned)
         self.integrate_kernel = make(precision, contact, fixed, own.bound, each, early)
         self.bound_kernel = (
-            constraint.bound_kernel(precision, contact, each, own.partial, own.skips, self.rated) if own.count else None
+            constraint.bound_kernel(precision, contact, each, own.partial, own.skips, self.rated, self.turned)
+            if own.count
+            else None
         )
 
     def kernels(self) -> list[Any]:
@@ -95,8 +100,8 @@ class NodeStage:
     def advance_bound(self, step: Step, level: int | None = None) -> None:
         """Nodes in joints and driven ones, with forces of elements up to a level, or of all."""
         work, state, own = self.work, step.state, step.state.constraints
-        inputs = [work.mass, work.inverse_mass, *self.slots(level), self.constraints.role, work.force, self.scene]
-        inputs += [self.gravity, self.constraints.bonds, self.dt]
+        inputs = [work.mass, work.inverse_mass, *self.slots(level), self.constraints.role, work.force]
+        inputs += [work.frames(state), self.scene, self.gravity, self.constraints.bonds, self.dt]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.work, own.work_after, own.clock]
         wp.launch(self.bound_kernel, self.constraints.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
@@ -126,7 +131,8 @@ class NodeStage:
             scene = 0 if isinstance(self.scene, int) else self.scene[part]
             contact_force = work.contact_force[part] if self.touched else work.contact_force
             inputs = [work.inverse_mass[part], work.first_slots[part], work.more_slots]
-            inputs += [role[part] if len(role) else role, work.force, scene, self.gravity, kick, drift]
+            inputs += [role[part] if len(role) else role, work.force, work.frames(state, part)]
+            inputs += [scene, self.gravity, kick, drift]
             outputs = [contact_force, state.u[part], state.v[part], None if before is None else before[part]]
             keepers = node.KEEPERS if self.touched and part.start == 0 else 0
             outputs += [squares[part] if len(squares) > 1 else squares, state.normal_force if keepers else None]

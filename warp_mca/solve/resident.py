@@ -16,21 +16,32 @@ from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.nodes.cluster import Clusters
+from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.resident.bound_role import MOST_BOUND
 from warp_mca.kernels.resident.contact_role import Slaves
 from warp_mca.kernels.resident.master_role import Faces
 from warp_mca.kernels.resident.meeting import COUNTS
 from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS
+from warp_mca.kernels.resident.pin_role import MOST_PINNED
 from warp_mca.kernels.resident.steps import Roles, resident_kernel
 from warp_mca.model.patches import PATCH
 from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.weight import nodal_gravity
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
     from warp_mca.solve.state import State
 
-STAGES = {"element forces", "contact", "joints, driven nodes", "free nodes"}  # that the kernel knows
+STAGES = {
+    "element forces",
+    "contact",
+    "joints, driven nodes",
+    "free nodes",
+    "couplings: responses",
+    "couplings",
+}  # known
 MOST_FREE = 4  # nodes that a thread moves in turn at most
 
 
@@ -47,21 +58,34 @@ def surface_of(solver: Solver) -> ContactStage | None:
 
 def is_known(solver: Solver) -> bool:
     """Whether the kernel knows all that a model has."""
-    stages = {stage.name for group in solver.groups for stage in group if not stage.only_records}
-    if solver.model.rates or solver.model.scaling:
+    _frames, *groups = solver.groups  # frames it knows
+    stages = {stage.name for group in groups for stage in group if not stage.only_records}
+    if solver.model.rates:
         return False
     if not stages <= STAGES or solver.layout.count > 1 or len(solver.elements) > 1 or len(solver.contacts) > 1:
         return False
     (elements,) = solver.elements
     if not isinstance(elements, PatchStage) or elements.block.element != "hex8":
         return False
-    if solver.constraints.count > MOST_BOUND:
+    if _tied(solver) + solver.constraints.driven > MOST_BOUND or not _pins_fit(solver):
         return False
     contact = surface_of(solver)
     if contact is None:
         return True
     bound = np.concatenate([contact.items[0].master, contact.items[0].slave, _bound(solver)])
     return not contact.on_plane and contact.sides == 1 and len(np.unique(bound)) == len(bound)
+
+
+def _pins_fit(solver: Solver) -> bool:
+    """Whether clusters of pins are small enough, and no pairs of nodes are tied beside them."""
+    pins = solver.couplings.items
+    sizes = [size for pin in pins for size in (pin.middle - pin.start, pin.end - pin.middle)]
+    return not pins or (max(sizes) <= MOST_PINNED and not _tied(solver))
+
+
+def _tied(solver: Solver) -> int:
+    """Tied pairs; those that stand for nodes of pins are none."""
+    return solver.constraints.pairs - sum(pin.end - pin.start for pin in solver.couplings.items)
 
 
 def _bound(solver: Solver) -> np.ndarray:
@@ -88,14 +112,21 @@ class Resident:
         self.kernel = resident_kernel(
             solver.precision,
             block.law,
+            solver.nodes.turned,
             contact is not None,
             friction,
             stress_free,
             contact.law if contact else LINEAR,
-            solver.constraints.partial,
+            solver.constraints.partial and not solver.couplings.count,
+            solver.couplings.count > 0,
         )
         self.count = wp.zeros(COUNTS, dtype=wp.int32)
-        self.nodes = _nodes(solver)
+        self.nodes, self.bonds = _nodes(solver), solver.constraints.bonds
+        self.clusters = solver.couplings.clusters if solver.couplings.count else Clusters()
+        if solver.couplings.count:  # whose nodes are no pairs here
+            own, self.bonds = self.bonds, Bonds()
+            self.bonds.node, self.bonds.begin, self.bonds.end = own.node, own.begin, own.end
+            self.bonds.times, self.bonds.values = own.times, own.values
 
     def kernels(self) -> tuple[list[Any], int]:
         """The kernel, and the threads of its blocks."""
@@ -104,14 +135,15 @@ class Resident:
     def launch(self, state: State, steps: int) -> None:
         """Advance so many steps that record nothing."""
         solver, work, elements = self.solver, self.solver.work, self.solver.elements[0]
-        own, bonds = state.elements[0], state.constraints
+        own, bonds, pins = state.elements[0], state.constraints, state.couplings
         slaves, master, faces, spring = _contact(solver, state)
+        self.nodes.frames = work.frames(state)
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
-        inputs += [slaves, master, faces, solver.constraints.bonds, solver.dt, spring]
+        inputs += [slaves, master, faces, self.bonds, self.clusters, solver.dt, spring]
         outputs = [self.count, own.yielded, own.history, own.extreme, work.force, work.contact_force]
         outputs += [state.normal_force, state.u, state.v, state.speed_square]
-        outputs += [bonds.impulse, bonds.work, bonds.work_after, bonds.clock, state.flag]
+        outputs += [bonds.impulse, bonds.work, bonds.work_after, bonds.clock, pins.place, pins.orientation, state.flag]
         wp.launch(self.kernel, self.blocks * THREADS, inputs=inputs, outputs=outputs, block_dim=THREADS)
 
 
@@ -134,7 +166,8 @@ def roles_of(solver: Solver) -> Any:
     roles.contact = len(elements.patches.head)
     roles.master = roles.contact + (blocks_of(LANES * len(contact.slave)) if contact else 0)
     roles.bound = roles.master + (blocks_of(LANES * len(contact.master)) if contact else 0)
-    roles.free = roles.bound + (1 if contact or constraints.count else 0)
+    roles.pin = roles.bound + (1 if contact or constraints.count else 0)
+    roles.free = roles.pin + solver.couplings.count
     masters = len(contact.master) if contact else 0
     wanted = blocks_of(solver.model.node_count - masters - len(_bound(solver)))
     roles.end = min(most, roles.free + wanted)
@@ -152,6 +185,8 @@ def _nodes(solver: Solver) -> Any:
     found.first_slots, found.more_slots = work.first_slots, work.more_slots
     found.free = wp.array(free, dtype=wp.int32)
     found.gravity = wp.vec3d(*solver.model.gravity[0])
+    if (own := nodal_gravity(solver.model)) is not None:
+        found.weight = wp.array(own, dtype=wp.vec3d)
     return found
 
 

@@ -73,7 +73,7 @@ class RigidStage:
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
-        self.kernel = rigid_body.advance_kernel(precision, nodes.touched, nodes.rated)
+        self.kernel = rigid_body.advance_kernel(precision, nodes.touched, nodes.rated, nodes.turned)
         self.own = own = model.rigid_bodies
         self._make_bodies(model, own)
         self._make_rows(own, model.rigid_rows)
@@ -190,7 +190,7 @@ class RigidStage:
     def _advance(self, state: State, kick: float, span: float, moves: bool, level: int | None = None) -> None:
         work, own = self.work, state.rigid
         inputs = [self.bodies, self.rows, self.clusters, work.X, work.mass]
-        inputs += [*self.nodes.slots(level), work.force, kick, span, moves]
+        inputs += [*self.nodes.slots(level), work.force, work.frames(state), kick, span, moves]
         outputs = [work.contact_force, state.u, state.v, state.speed_square]
         outputs += [own.centre, own.rotation, own.momentum, own.spin, own.orientation, state.constraints.impulse]
         threads = (self.groups, self.lanes)

@@ -23,12 +23,14 @@ from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.records import output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
+from warp_mca.solve import coupling_stage
 from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
 from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
+from warp_mca.solve.floating_stage import FloatingStage
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
@@ -64,6 +66,7 @@ class Solver:
         couplings: joints between clusters of nodes.
         loads: what acts in the joints of chains, and moves their bases.
         rigid: rigid bodies.
+        floating: frames that elements compute in.
         output: what is read off the state for paths and recorders, or None.
     """
 
@@ -95,18 +98,18 @@ class Solver:
         scenes = [model.passes[k * passes : (k + 1) * passes] for k in range(self.layout.count)]
         self.normal_force = NormalForce(scenes if passes else [], self.threads)
         self.contacts = [ContactStage(model.passes[k::passes], model, k, self.normal_force) for k in range(passes)]
-        if self.contacts:
-            blocks = max(stage.blocks for stage in self.contacts)
-            for stage in self.elements:
-                stage.make_room(blocks)
         self.constraints = ConstraintStage(model, self.layout)
         dt = self.dt / model.common_steps
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, dt)
         self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, dt)
+        if blocks := max((stage.blocks for stage in self.contacts), default=0) + self.couplings.blocks:
+            for stage in self.elements:
+                stage.make_room(blocks)
         self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, self._early)
         self.rigid = RigidStage(model, self.nodes, self.precision)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
         self.ties = TieStage(model, self.nodes, self.precision)
+        self.floating = FloatingStage(model, self.work)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.groups = step_groups(self)
         cuda = wp.get_device().is_cuda
@@ -141,13 +144,14 @@ class Solver:
                 loads=self.loads.new_state(),
                 absorbing=self.absorbing.new_state(),
                 rigid=self.rigid.new_state(),
+                floating=self.floating.new_state(),
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
     def forces(self, state: State) -> None:
         """Forces of elements and contacts at the state's displacements, in `work`."""
         with wp.ScopedDevice(self.device):
-            self._streams.run(self.groups[:1], Step(state))
+            self._streams.run(self.groups[:2], Step(state))
 
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
@@ -160,17 +164,20 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
         sums = self.records.kernels() + self.loads.kernels() + self.absorbing.record_kernels()
-        sums += self.couplings.kernels() + self.rigid.kernels()
+        sums += self.rigid.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [watch.watch_nodes] if self.chains and self.contacts else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
+        movers = (self.nodes, self.absorbing, self.ties, self.floating)
+        nodes = [kernel for stage in movers for kernel in stage.kernels()]
         elements = [kernel for stage in self.elements for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (self.nodes.kernels() + self.absorbing.kernels() + self.ties.kernels() + elements, ELEMENT_BLOCK),
+            (nodes + elements, ELEMENT_BLOCK),
             *([self.resident.kernels()] if self.resident else []),
+            (self.couplings.kernels(), coupling_stage.BLOCK),
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
 CONTACT = "contact"  # stage that may be left out
-MAIN, BESIDE, SUMS = "main", "beside", "sums"  # streams of a GPU; on a CPU stages run one after the other
+MAIN, BESIDE, ASIDE, SUMS = "main", "beside", "aside", "sums"  # streams of a GPU; a CPU runs stages one by one
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Stage:
     Attributes:
         name: as docs/architecture.md lists it.
         launch: launches its kernels for a step.
-        stream: MAIN; BESIDE others of its group; SUMS, which nothing waits for before the end of the step.
+        stream: MAIN; BESIDE or ASIDE others of its group; SUMS, which nothing waits for before the end of the step.
         only_records: whether it is launched only in steps that record.
     """
 
@@ -64,7 +64,7 @@ class Streams:
     def __init__(self, cuda: bool) -> None:
         """On the current device. Streams beside the main one have few threads and wait long for memory: they take what
         room there is first."""
-        self.streams: dict[str, Any] = {BESIDE: None, SUMS: None}
+        self.streams: dict[str, Any] = {BESIDE: None, ASIDE: None, SUMS: None}
         if cuda:
             self.streams = {name: wp.Stream(priority=-1) for name in self.streams}
 
@@ -94,5 +94,6 @@ class Streams:
                     wp.wait_event(before)
                     entered.add(stage.stream)
                 stage.launch(step)
-        if BESIDE in used:
-            wp.wait_stream(self.streams[BESIDE])
+        for name in (BESIDE, ASIDE):
+            if name in used:
+                wp.wait_stream(self.streams[name])

@@ -27,6 +27,7 @@ from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
 from warp_mca.solve.contact_stage import ContactState
 from warp_mca.solve.coupling_stage import CouplingState
+from warp_mca.solve.floating_stage import FloatingState
 from warp_mca.solve.load_stage import LoadState
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.rigid_stage import RigidState
@@ -56,6 +57,7 @@ class State:
         loads: of torques in hinges and of movable bases, `LoadState`.
         absorbing: of absorbing boundaries, `AbsorbingState`.
         rigid: of rigid bodies, `RigidState`.
+        floating: of floating frames, `FloatingState`.
         steps: steps taken since the start of the phase [-].
         scenes: what each scene has recorded so far, `records.SceneRecords`.
     """
@@ -72,6 +74,7 @@ class State:
     loads: LoadState
     absorbing: AbsorbingState
     rigid: RigidState
+    floating: FloatingState
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
 

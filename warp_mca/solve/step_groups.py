@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.stage import BESIDE, CONTACT, SUMS, Group, Stage, Step
+from warp_mca.solve.stage import ASIDE, BESIDE, CONTACT, SUMS, Group, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -15,6 +15,7 @@ def step_groups(solver: Solver, level: int | None = None) -> list[Group]:
     rates = solver.model.rates
     common = level is None or rates is None or level >= rates.common
     return [
+        _frames(solver),
         _forces(solver, level, common),
         _energies(solver),
         _sums(solver),
@@ -38,7 +39,7 @@ def chain_groups(solver: Solver, level: int, chain: int) -> tuple[list[Group], l
 
 
 def _forces(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
-    """Forces on nodes.
+    """Forces on nodes, and what couplings need of their places.
 
     Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want it,
     and patches want another division than contact.
@@ -50,6 +51,8 @@ def _forces(solver: Solver, level: int | None, common: bool, chain: int | None =
         Stage(CONTACT, lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
     ]
+    if common and solver.couplings.count:
+        found.append(Stage("couplings: responses", solver.couplings.find_responses, ASIDE))
     return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
 
 
@@ -65,7 +68,7 @@ def _energies(solver: Solver) -> Group:
         Stage("element energies", lambda s, e=e: e.energies(solver.work, s.state, s.split), only_records=True)
         for e in solver.elements
     ]
-    return [Stage("paths, frames: stress", before, only_records=True), *energies]
+    return [Stage("paths, frames: stress", before, BESIDE, only_records=True), *energies]
 
 
 def _sums(solver: Solver) -> Group:
@@ -124,3 +127,16 @@ def _motion(solver: Solver) -> Group:
     if solver.loads.kernels():
         motion.append(Stage("joint and base sums", solver.loads.sums, only_records=True))
     return [*motion, *solver.absorbing.record_stages(solver.records)]
+
+
+def _frames(solver: Solver) -> Group:
+    """Displacements in floating frames, which follow their bodies.
+
+    They do not go with the forces, because contact would begin before the elements.
+    """
+    if not solver.floating.count:
+        return []
+    return [
+        Stage("floating frames", solver.floating.follow, only_records=True),
+        Stage("nodes in floating frames", solver.floating.see),
+    ]

@@ -39,12 +39,14 @@ class Steps:
         per_search: steps between two searches for contact.
         searches: searches in an output interval.
         intervals: output intervals in the run.
+        intervals_per_search: output intervals between two searches, where there is one in an interval at most.
     """
 
     dt: float
     per_search: int
     searches: int
     intervals: int
+    intervals_per_search: int = 1
 
     @property
     def per_interval(self) -> int:
@@ -92,13 +94,14 @@ class Steps:
         search, k = divmod(check, -(-self.per_search // self.per_check))
         return self.per_search * search + self.per_check * k
 
-    def parts(self) -> Iterator[Part]:
-        """The parts of an output interval, in their order."""
+    def parts(self, interval: int) -> Iterator[Part]:
+        """The parts of an output interval, which has this number, in their order."""
         size = min(self.per_search, self.per_check)
+        due = interval % self.intervals_per_search == 0
         for search in range(self.searches):
             checked = search * self.per_search % self.per_check == 0 or size < self.per_search
             for first in range(0, self.per_search, size):
-                yield Part(min(size, self.per_search - first), first == 0, checked)
+                yield Part(min(size, self.per_search - first), due and first == 0, checked)
 
 
 def _fewest(count: int, most: int) -> int:

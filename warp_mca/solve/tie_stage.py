@@ -29,7 +29,8 @@ class TieStage:
         if not self.count:
             return
         ties, self.lanes = model.ties, tied.LANES if wp.get_device().is_cuda else 1
-        self.masters_kernel = tied.masters_kernel(precision, nodes.touched, nodes.each, nodes.rated, self.lanes)
+        kind = (nodes.touched, nodes.each, nodes.rated, self.lanes, nodes.turned)
+        self.masters_kernel = tied.masters_kernel(precision, *kind)
         self.follow_kernel = tied.follow_kernel(nodes.touched)
         entry, corner = np.nonzero(ties.weight)
         master = ties.master[entry, corner]
@@ -53,7 +54,7 @@ class TieStage:
         """Masters, with the forces on their slaves of elements up to a level, or of all."""
         nodes, work, state = self.nodes, self.nodes.work, step.state
         inputs = [work.inverse_mass, *nodes.slots(level), nodes.constraints.role, work.force]
-        inputs += [nodes.scene, nodes.gravity, self.tied, nodes.dt]
+        inputs += [work.frames(state), nodes.scene, nodes.gravity, self.tied, nodes.dt]
         before = work.v_before if step.records else None
         outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
         threads = self.lanes * len(self.tied.master)

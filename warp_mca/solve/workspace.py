@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.records.columns import JACOBIAN, column_count
 from warp_mca.kernels.records.ledger import SUM_WIDTH
 from warp_mca.model.layout import Layout
@@ -13,7 +16,11 @@ from warp_mca.model.model import Model
 from warp_mca.model.precision import limited
 from warp_mca.solve.weight import heavy_mass
 
+if TYPE_CHECKING:
+    from warp_mca.solve.state import State
+
 ROWS = 32  # records kept on the device before the host reads them
+ALL = slice(None)
 
 
 class Workspace:
@@ -26,7 +33,9 @@ class Workspace:
         heavy_mass: those that have weight [kg], shape (node_count,), float64; `mass` itself without mass scaling.
         law: parameters of each material, see `Model.law`, in the scalars of the precision.
         first_slots, more_slots: slots of the forces on each node, see `gather_lists`.
-        force: of each element on its nodes, by slot [N], vec3 in the scalars of the precision.
+        frame: floating frame of each node, shape (node_count,), int32; None where elements compute in the world frame.
+        u_seen: displacement of each node in its frame [m], shape (node_count,), vec3d; empty without frames.
+        force: of each element on its nodes in their frames, by slot [N], vec3 in the scalars of the precision.
         contact_force: other forces on nodes [N], shape (node_count,), vec3d, zero between steps; empty without contact.
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
         energy: of each element at a record, see `ElementStage.energies`, shape (5, element_count).
@@ -48,6 +57,8 @@ class Workspace:
         self.heavy_mass = wp.array(heavy_mass(model), dtype=wp.float64) if model.scaling else self.mass
         self.law = wp.array(limited(model.law, precision), dtype=t.real)
         self.first_slots, self.more_slots = wp.array(first_slots, dtype=wp.vec2i), wp.array(more_slots, dtype=wp.vec4i)
+        self.frame = wp.array(model.floating.frame, dtype=wp.int32) if model.floating else None
+        self.u_seen = wp.zeros(model.node_count if model.floating else 0, dtype=wp.vec3d)
         # one slot more, without force, for nodes without elements
         self.force = wp.zeros(slots + bool(model.rigid_bodies), dtype=t.vec3)
         self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
@@ -60,3 +71,14 @@ class Workspace:
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)
         self.gravity = wp.array(model.gravity, dtype=wp.vec3d)
+
+    def displacements(self, state: State) -> wp.array:
+        """What elements compute with: displacements in the world frame or, with floating frames, in these [m]."""
+        return state.u if self.frame is None else self.u_seen
+
+    def frames(self, state: State, part: slice = ALL) -> Any:
+        """Frames of a range of nodes, as kernels that gather forces take them."""
+        found = Frames()
+        if self.frame is not None:
+            found.of_node, found.rotation = self.frame[part], state.floating.rotation
+        return found

@@ -243,15 +243,15 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "pin_pulls_at_the_mean": Mutation(
         "the impulse of a pin acts at the mean position of a cluster in place of the hinge",
-        "kernels/nodes/cluster.py",
-        "pull(begin[0], begin[1], lane, place, a, J, wp.cross(arm_P, J) + T,",
-        "pull(begin[0], begin[1], lane, place, a, J, T,",
+        "kernels/nodes/couple.py",
+        "where[2], where[3], lane, place[j], one.mean, J, wp.cross(P - one.mean.centre, J) + T,",
+        "where[2], where[3], lane, place[j], one.mean, J, T,",
     ),
     "pin_stays_upright": Mutation(
         "the arm from the mean position of a cluster to its hinge does not turn with the body",
-        "kernels/nodes/cluster.py",
-        "orientation_out[j, 0] = turned(q_a, dt * spin)",
-        "orientation_out[j, 0] = q_a",
+        "kernels/nodes/couple.py",
+        "orientation_out[j, 0] = quickly_turned(orientation_out[j, 0], dt * spin_after(one.mean, a.spin, J, T))",
+        "orientation_out[j, 0] = orientation_out[j, 0]",
     ),
     "beta_swapped": Mutation(
         "isotropic and kinematic hardening are swapped: 1 - beta is taken for beta",

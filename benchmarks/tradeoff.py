@@ -1,0 +1,139 @@
+"""Owns docs/tradeoff.md: tables and pictures of trade-offs, rendered from what `warp-mca tradeoff` wrote.
+
+python -m benchmarks.tradeoff                 write the page and its pictures from docs/tradeoff.*.json
+python -m benchmarks.tradeoff NAME DIR        take DIR/tradeoff.json as docs/tradeoff.NAME.json first
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from benchmarks.report import table
+from warp_mca.accuracy.worth import frontier_rows, knob_rows, reference_lines, words
+
+DOCS = Path(__file__).parent.parent / "docs"
+TEMPLATE = DOCS / "tradeoff.template.md"
+
+# Sections of the page in this order: name of the stored file, heading, command.
+CASES = (
+    (
+        "h100",
+        "`two_link`, `standard`, on an H100",
+        "warp-mca tradeoff two_link --preset standard --device cuda:0 --budget 210 --out DIR",
+    ),
+    (
+        "quick",
+        "`two_link`, `quick`, on 12 CPU cores",
+        "warp-mca tradeoff two_link --threads 12 --budget 210 --out DIR",
+    ),
+    (
+        "standard",
+        "`two_link`, `standard`, on 12 CPU cores",
+        "warp-mca tradeoff two_link --preset standard --threads 12 --budget 500 --out DIR",
+    ),
+    (
+        "coarse",
+        "`two_link`, `quick` with cells 1.4 times larger, on one CPU core",
+        "warp-mca tradeoff two_link --refine 0.7 --duration 5e-4 --threads 1 --out DIR",
+    ),
+    ("hertz_sphere", "`hertz_sphere` on one CPU core", "warp-mca tradeoff hertz_sphere --threads 1 --out DIR"),
+    (
+        "rolling_sphere",
+        "`rolling_sphere` on one CPU core",
+        "warp-mca tradeoff rolling_sphere --threads 1 --out DIR",
+    ),
+    (
+        "single_link",
+        "`single_link` on one CPU core",
+        "warp-mca tradeoff single_link --threads 1 --budget 1500 --out DIR",
+    ),
+)
+
+NOTES = {
+    "coarse": "Cells of this size resolve neither tip nor hinges: what is left of the first peak says so (on 977,616 "
+    "elements it is 3572 N). Stiffer springs and finer cells at the contact are worth most; coarse tied rods and a "
+    "rigid far link spoil the impulse. The plastic strain is that of the contact: the point loads of the hinges, which "
+    "have no limit, take over on finer meshes.",
+    "rolling_sphere": "The ball begins pressed into the plane, to a depth computed for its mesh: its first peak is the "
+    "transient of that start, and little can be said about it; the impulse is what the scene is about.",
+}
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """Trade-offs that the page shows, by name, in its order."""
+    files = {name: DOCS / f"tradeoff.{name}.json" for name, _, _ in CASES}
+    return {name: json.loads(file.read_text(encoding="utf-8")) for name, file in files.items() if file.exists()}
+
+
+def render(found: dict[str, dict[str, Any]]) -> str:
+    """docs/tradeoff.md: its text, and a section for each trade-off."""
+    titles = {name: (heading, command) for name, heading, command in CASES}
+    sections = [_section(name, *titles[name], contents) for name, contents in found.items()]
+    return TEMPLATE.read_text(encoding="utf-8").replace("{sections}", "\n\n".join(sections))
+
+
+def picture(name: str) -> Path:
+    """Where the picture of a trade-off is kept."""
+    return DOCS / "images" / f"tradeoff-{name}.png"
+
+
+def _section(name: str, heading: str, command: str, contents: dict[str, Any]) -> str:
+    runs = [row for row in contents["variants"] if not row["stopped"]]
+    refused = len(contents["variants"]) - len(runs)
+    count = f"{len(runs)} variants in {contents['spent']:.0f} s"
+    count += f", and {refused} that were refused or stopped" if refused else ""
+    lines = [f"## {heading}", "", "```bash", command, "```", "", f"{count}. The reference:", ""]
+    _, *figures = reference_lines(contents)
+    lines += [
+        "- " + reference_lines(contents)[0].removeprefix("reference: "),
+        *("- " + line.strip() for line in figures),
+    ]
+    front, knobs = frontier_rows(contents), knob_rows(contents)
+    lines += [
+        "",
+        f"![Time against error](images/{picture(name).name})",
+        "",
+        "The frontier, errors against the reference:",
+    ]
+    lines += ["", _code_last(front), "", "One knob at a time, changes against the scene as written:", ""]
+    lines += [_code_last(knobs)]
+    if name in NOTES:
+        lines += ["", *textwrap.wrap(NOTES[name], 120)]
+    if contents["left_out"]:
+        lines += ["", "Left out, for the budget: " + "; ".join(f"`{words(r['knobs'])}`" for r in contents["left_out"])]
+    return "\n".join(lines)
+
+
+def _code_last(rows: list[list[str]]) -> str:
+    """A table in Markdown whose last column, knobs or why there are no figures, comes first."""
+    head, *body = ([row[-1], *row[:-1]] for row in rows)
+    return table(head, [[row[0].replace("|", "\\|"), *row[1:]] for row in body])
+
+
+def main() -> None:
+    """Command line."""
+    from warp_mca.accuracy.picture import plot_tradeoff
+    from warp_mca.report.style import save_png
+
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.tradeoff", description=(__doc__ or "").partition("\n")[0]
+    )
+    parser.add_argument("name", nargs="?", choices=[name for name, _, _ in CASES])
+    parser.add_argument("folder", nargs="?", type=Path, help="that holds a tradeoff.json")
+    args = parser.parse_args()
+    if args.folder:
+        text = (args.folder / "tradeoff.json").read_text(encoding="utf-8")
+        (DOCS / f"tradeoff.{args.name}.json").write_text(text, encoding="utf-8")
+    found = stored()
+    (DOCS / "tradeoff.md").write_text(render(found), encoding="utf-8")
+    for name, contents in found.items():
+        if not picture(name).exists() or name == args.name:
+            save_png(plot_tradeoff(contents), picture(name))
+
+
+if __name__ == "__main__":
+    main()

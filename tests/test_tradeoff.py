@@ -1,0 +1,248 @@
+"""Trade-offs: the plan, errors and frontier of made-up runs, a small scene from end to end, requests refused."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import warp_mca as mca
+from warp_mca.accuracy.combine import combinations, merged, spread
+from warp_mca.accuracy.convergence import Limit
+from warp_mca.accuracy.figures import NAMES
+from warp_mca.accuracy.findings import TradeOff
+from warp_mca.accuracy.knobs import BASE, Trial, one_at_a_time
+from warp_mca.accuracy.measure import Bench, Measured, element_steps
+from warp_mca.accuracy.reference import Reference, choose_penalty
+from warp_mca.accuracy.variant import Variant
+from warp_mca.cli.main import main
+from warp_mca.results.result import Result
+
+STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+SCENE = '''
+"""A block bounces off a plane."""
+import warp_mca as mca
+
+
+def build(*, t_end: float | None = None, apart: bool = False) -> mca.Scene:
+    """A block of 512 elements."""
+    block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(8, 8, 8), origin=(0.0, 1e-3 if apart else 0.0, 0.0))
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    return mca.Scene(
+        name="block",
+        bodies=(mca.Body(name="block", geometry=block, material=steel, velocity=(0.0, -1.0, 0.0)),),
+        contacts=(
+            mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), penalty=1.0),
+        ),
+        impact=mca.ImpactPhase(duration=8e-6, output_interval=2e-7, energy_tolerance=0.1),
+    )
+'''
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "block.py").write_text(SCENE, encoding="utf-8")
+    return tmp_path
+
+
+def measured(knob: str, variant: Variant, seconds: float, peak: float | None, stopped: str = "") -> Measured:
+    figures = {"F_n_first_peak": peak, "impulse": None, "contact_duration": 2.0}
+    wall = {"fe": seconds, "whole": seconds + 1.0, "cpu": seconds}
+    return Measured(
+        trial=Trial(knob, variant),
+        figures={} if stopped else figures,
+        elements=100,
+        steps=10,
+        element_steps=100.0 * seconds,
+        wall={} if stopped else wall,
+        stopped=stopped,
+    )
+
+
+def study(*runs: Measured) -> TradeOff:
+    """A trade-off whose first peak is 100 N in the limit, and whose impulse has none."""
+    truth = {name: Limit(None, why="made up") for name in NAMES}
+    truth |= {"F_n_first_peak": Limit(100.0, 0.001), "contact_duration": Limit(2.0, 0.001)}
+    reference = Reference(limits=truth, levels=[], penalty=None, springs={})
+    told = {"scene": "made up", "device": "cpu", "threads": 1, "duration": 1e-3, "budget": None, "clock": "cpu"}
+    return TradeOff(**told, reference=reference, variants=runs)
+
+
+def test_errors_against_the_limit_and_the_frontier():
+    base = measured("as written", Variant(), 8.0, 110.0)
+    coarse = measured("mesh", Variant(refine=0.5), 1.0, 60.0)
+    slow = measured("time step", Variant(time_step_scale=0.5), 16.0, 110.0)
+    light = measured("multi-rate", Variant(multi_rate=2), 4.0, 95.0)
+    refused = measured("mass scaling", Variant(mass_scaling=3.0), 0.0, None, "too much mass")
+    found = study(base, coarse, slow, light, refused)
+    assert found.errors_of(base)["F_n_first_peak"] == pytest.approx(0.1)
+    assert found.errors_of(coarse)["F_n_first_peak"] == pytest.approx(-0.4)
+    assert found.errors_of(base)["impulse"] is None
+    assert found.frontier() == [coarse, light]
+    assert found.frontier("contact_duration") == [coarse]
+    assert found.frontier("impulse") == []
+
+
+def test_combinations_are_foreseen_from_changes_that_multiply():
+    base = measured("as written", Variant(), 8.0, 98.0)
+    runs = [
+        measured("mesh", Variant(refine=0.5), 2.0, 98.0 * 0.99),
+        measured("springs", Variant(penalty=10.0), 16.0, 100.0),
+        measured("multi-rate", Variant(multi_rate=2), 4.0, 98.0),
+        measured("precision", Variant(precision="float64"), 0.0, None, "refused"),
+    ]
+    bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
+    bench.base = base
+    chosen = combinations(bench, runs, {"F_n_first_peak": 100.0}, floor=1e-4)
+    knobs = {tuple(sorted(trial.variant.knobs)): cost for trial, cost in chosen}
+    assert knobs[("multi_rate", "refine")] == pytest.approx(0.125)
+    assert knobs[("multi_rate", "penalty")] == pytest.approx(1.0)
+    assert all(len(names) > 1 and "precision" not in names for names in knobs)
+
+
+def test_knobs_that_a_run_refuses_together_are_not_combined():
+    base = measured("as written", Variant(), 8.0, 100.0)
+    runs = [
+        measured("mass scaling", Variant(mass_scaling=2.0), 4.0, 101.0),
+        measured("far link rigid", Variant(parameters={"rigid_bodies": "OA"}), 2.0, 102.0),
+        measured("element", Variant(element="hex8r"), 1.0, 103.0),
+    ]
+    bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
+    bench.base = base
+    chosen = [trial.variant.knobs for trial, _ in combinations(bench, runs, {"F_n_first_peak": 100.0}, floor=0.0)]
+    assert {"element": "hex8r", "rigid_bodies": "OA"} in chosen
+    assert not any({"mass_scaling", "rigid_bodies"} <= set(knobs) for knobs in chosen)
+
+
+def test_shortcuts_are_not_chosen_because_their_errors_cancel():
+    """The first peak is 10 N too low; a shortcut that adds 10 N does not mend that, finer cells do."""
+    base = measured("as written", Variant(), 8.0, 90.0)
+    runs = [
+        measured("mass scaling", Variant(mass_scaling=2.0), 4.0, 100.0),
+        measured("multi-rate", Variant(multi_rate=2), 4.0, 90.0),
+        measured("mesh", Variant(refine=2.0), 80.0, 100.0),
+    ]
+    bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
+    bench.base = base
+    chosen = [trial.variant.knobs for trial, _ in combinations(bench, runs, {"F_n_first_peak": 100.0}, floor=0.0)]
+    assert {"mass_scaling": 2.0, "multi_rate": 2} not in chosen
+    assert chosen[-1] == {"refine": 2.0, "multi_rate": 2}
+
+
+def test_combinations_are_tried_spread_along_the_frontier():
+    assert spread(9, 3) == [0, 4, 8, 1, 2, 3, 5, 6, 7]
+    assert spread(2, 10) == [0, 1]
+    assert spread(0, 10) == []
+
+
+def test_merged_variants_keep_what_each_changes():
+    found = merged([Variant(refine=0.5), Variant(parameters={"axial_OA": 8}), Variant(multi_rate="auto")])
+    assert found == Variant(refine=0.5, multi_rate="auto", parameters={"axial_OA": 8})
+
+
+def block() -> mca.Scene:
+    """A block on a plane."""
+    box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(8, 8, 8))
+    return mca.Scene(
+        name="block",
+        bodies=(mca.Body(name="block", geometry=box, material=STEEL, velocity=(0.0, -1.0, 0.0)),),
+        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), penalty=1.0),),
+        impact=mca.ImpactPhase(duration=8e-6, output_interval=2e-7, energy_tolerance=0.1),
+    )
+
+
+def test_the_plan_turns_one_knob_at_a_time_and_leaves_the_physics_alone():
+    scene = mca.make_scene("two_link")
+    plan = one_at_a_time(scene)
+    assert len(plan) >= 27
+    assert {trial.knob for trial in plan} >= {"mesh", "springs", "mass scaling", "multi-rate", "far link coarser"}
+    assert [trial for trial in plan if trial.variant.applied(scene) == scene and not trial.variant.options] == []
+    assert [trial.knob for trial in plan[:3]] == ["mesh", "springs", "mass scaling"]
+    physics = {"joint_nodes", "pin_radius", "mu", "sigma_y", "beta", "two_way", "rigid_inertia"}
+    assert not physics & {name for trial in plan for name in trial.variant.knobs}
+
+
+def test_parameters_are_varied_only_where_the_catalogue_builds_the_scene():
+    scene = mca.make_scene("two_link")
+    changed = replace(scene, gravity=(0.0, -1.6, 0.0))
+    assert not any(trial.variant.parameters for trial in one_at_a_time(changed))
+    coarse = replace(scene, refine=0.5)
+    found = [trial.variant.applied(coarse) for trial in one_at_a_time(coarse) if trial.variant.parameters]
+    assert len(found) == 6 and all(item.refine == 0.5 for item in found)
+
+
+def test_the_softest_penalty_is_taken_whose_springs_hold_next_to_nothing():
+    """First peaks of 100 (1 - 0.02 / penalty) N: within 0.5 % from 4 on."""
+    bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
+
+    def note(trial: Trial) -> Measured:
+        penalty = trial.variant.penalty or 1.0
+        assert isinstance(penalty, float)
+        return measured("springs", trial.variant, 1.0, 100.0 * (1.0 - 0.02 / penalty))
+
+    penalty, taken = choose_penalty(bench, lambda variant: True, note)
+    assert penalty == 10.0
+    assert taken["F_n_first_peak"] == pytest.approx(-0.002, abs=1e-6)
+    penalty, _ = choose_penalty(bench, lambda variant: variant.penalty != 10.0, note)
+    assert penalty == 3.0
+
+
+def test_element_steps_of_several_rates():
+    groups = [{"step": 4e-8, "elements": 30}, {"step": 1e-8, "elements": 10}]
+    summary = {"n_elements": 40, "n_steps": 100}
+    assert element_steps(Result(summary, {})) == 4000
+    assert element_steps(Result(summary | {"rate_groups": groups}, {})) == 100 * 30 + 400 * 10
+
+
+def test_cost_is_foreseen_from_counts():
+    bench = Bench(scene=block(), device="cpu", threads=1, duration=None)
+    with pytest.raises(ValueError, match="BASE"):
+        bench.foreseen(Variant())
+    bench.base, bench.beside = measured("as written", Variant(), 8.0, 1.0), 0.01
+    assert bench.foreseen(Variant()) == pytest.approx(8.0 + 1.0)
+    assert bench.foreseen(Variant(refine=2.0)) == pytest.approx(8.0 * 16 + 8.0)
+    assert bench.foreseen(Variant(mass_scaling=2.0)) == pytest.approx(4.0 + 1.0)
+
+
+def test_a_scene_from_end_to_end(here: Path, capsys: pytest.CaptureFixture[str]):
+    """A budget of next to nothing leaves the scene as written and its reference."""
+    command = ["tradeoff", "block.py", "--budget", "0.01", "--threads", "1", "--out", "found"]
+    assert main(command) == 0
+    found = json.loads((here / "found" / "tradeoff.json").read_text(encoding="utf-8"))
+    assert (here / "found" / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
+    assert [row["knob"] for row in found["variants"]] == [BASE.knob] + 3 * ["reference"]
+    assert [level["elements"] for level in found["reference"]["levels"]] == [64, 216, 512]
+    assert found["reference"]["figures"]["max_plastic_strain"] is None
+    assert found["reference"]["why"]["max_plastic_strain"] == "no run has this figure"
+    peak, left = (found["reference"][key]["F_n_first_peak"] for key in ("figures", "left"))
+    impedance = (210e9 * 0.7 / (1.3 * 0.4) * 7850.0) ** 0.5  # of a plane wave in a block held from the sides
+    assert 0.85 * impedance * 1e-4 < peak < impedance * 1e-4  # springs and free sides give way
+    assert 0.0 < left < 0.1
+    base = found["variants"][0]
+    assert base["errors"]["F_n_first_peak"] == pytest.approx(base["figures"]["F_n_first_peak"] / peak - 1.0)
+    assert base["times_faster"] == 1.0 and set(base["wall"]) == {"fe", "whole", "cpu"}
+    assert {"refine": 0.7} in [row["knobs"] for row in found["left_out"]]
+    said = capsys.readouterr().out
+    assert "reference: limit of meshes of 64, 216, 512 elements" in said and "left out" in said
+    assert main(command) == 2
+    assert "it holds a trade-off already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["block.py", "--budget", "0"], "budget = 0.0: give a finite time above 0 s"),
+        (["block.py", "--budget", "nan"], "budget = nan: give a finite time above 0 s"),
+        (["block.py", "--set", "apart=true"], "a run of it has none of the figures"),
+        (["two_link", "--set", "t_end=0.5"], "variants are compared by one impact"),
+        (["block.mca"], "a built model holds finished meshes"),
+        (["block.py", "--threads", "0"], "threads"),
+    ],
+)
+def test_bad_requests(arguments: list[str], words: str, here: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["tradeoff", *arguments, "--out", "found"]) == 2
+    assert words in capsys.readouterr().err
+    assert not (here / "found").exists()

@@ -1,0 +1,52 @@
+"""Owns the headline figures of a run, and their errors against a reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from warp_mca.results.result import Result
+
+Figures = Mapping[str, float | None]  # by name; None where a run has none
+
+BOUND = ("F_n_first_peak", "impulse", "contact_duration")  # [N], [N s], [s]: those that an asked accuracy binds
+NAMES = (*BOUND, "max_plastic_strain", "path_stress")  # [-], [Pa]
+
+
+def figures_of(result: Result) -> Figures:
+    """Headline figures of a run, each None where it has none: a contact without a peak, elastic bodies, no path.
+
+    A contact that is still open when the run ends has no duration.
+    """
+    summary = result.summary
+    lasts = summary.get("contact_open_at_end")
+    peaks = summary["F_n_peaks"]
+    return {
+        "F_n_first_peak": float(peaks[0][1]) if peaks else None,
+        "impulse": normal_impulse(result) or None,
+        "contact_duration": None if lasts else summary["contact_duration"] or None,
+        "max_plastic_strain": summary["max_plastic_strain"] or None,
+        "path_stress": max((float(path.von_mises.max()) for path in result.paths if path.stress.size), default=None),
+    }
+
+
+def normal_impulse(result: Result) -> float:
+    """Impulse of the normal force over the run [N s]: forces are means over their interval."""
+    import numpy as np
+
+    return float(np.sum(result.F_n * np.diff(result.time, prepend=0.0)))
+
+
+def errors(found: Figures, truth: Figures) -> dict[str, float | None]:
+    """Share by which each figure differs from the truth [-], signed; None where either has none."""
+    shares: dict[str, float | None] = {}
+    for name in NAMES:
+        value, true = found.get(name), truth.get(name)
+        shares[name] = None if value is None or not true else value / true - 1.0
+    return shares
+
+
+def worst(shares: Mapping[str, float | None]) -> float:
+    """Greatest size of the errors that an asked accuracy binds [-]; 0 where there are none."""
+    return max((abs(shares[name] or 0.0) for name in BOUND), default=0.0)

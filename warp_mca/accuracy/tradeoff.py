@@ -1,0 +1,159 @@
+"""Owns `tradeoff`: what variants of a scene's model cost and how far their figures are from a reference."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from warp_mca.accuracy.combine import combinations, spread
+from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.files import write_tradeoff, writing_to
+from warp_mca.accuracy.findings import TradeOff
+from warp_mca.accuracy.knobs import BASE, Trial, one_at_a_time
+from warp_mca.accuracy.measure import Bench, Measured
+from warp_mca.accuracy.reference import Reference, choose_penalty, find_reference
+from warp_mca.accuracy.variant import Variant
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.runs.arguments import check_scene, span_of
+from warp_mca.runs.settings import settings_of
+from warp_mca.scene import Scene
+
+REFERENCE_SHARE = 0.45  # of the budget left after the first runs
+COMBINED_SHARE = 0.3  # of the budget left after the reference
+COMBINED = 10  # combinations at most
+
+Progress = Callable[[Measured, str], None]  # what was measured, and what comes next
+
+
+def tradeoff(
+    scene: Scene,
+    *,
+    budget: float | None = None,
+    device: str = "cpu",
+    threads: int | None = None,
+    duration: float | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> TradeOff:
+    """Run variants of a scene's model, and compare each with a reference in the limit of mesh and contact springs.
+
+    Knobs are turned one at a time, then together where that is promising: `knobs.py`, `combine.py`. A budget decides
+    which variants are run, in an order that it does not change, and how fine the meshes of the reference are.
+
+    Args:
+        scene: what to run, one impact of it.
+        budget: wall-clock time for all runs [s], kept as far as their cost can be foreseen; None for all variants.
+        device, threads, duration: as in `warp_mca.run`.
+        out: folder for tradeoff.json and tradeoff.png; nothing is written if None.
+        force: replace those that `out` holds already.
+        progress: called after each run with what was measured and with what comes next.
+
+    Raises:
+        RequestError: the request cannot be carried out; nothing was written.
+        GuardError: a guard stopped the scene as written.
+    """
+    check_scene("scene", scene)
+    span_of(scene, duration)
+    if scene.t_end is not None:
+        raise bad_value("Scene.t_end", scene.t_end, "variants are compared by one impact; leave t_end out")
+    if budget is not None and not (validate.is_number(budget) and budget > 0.0):
+        raise bad_value("budget", validate.brief(budget), "give a finite time above 0 s, or leave it out")
+    settings_of(device, "mixed", threads)
+    with writing_to(out, force) as folder:
+        found = _Study(Bench(scene, device, threads, duration), budget, progress).run()
+        if folder is not None:
+            write_tradeoff(found, folder)
+    return found
+
+
+@dataclass
+class _Study:
+    """A trade-off while it goes on: what was measured, and the time that is left.
+
+    Attributes:
+        bench, budget, progress: see `tradeoff`.
+        begun: when it began [s].
+        runs: variants measured, by their knobs.
+        left_out: variants that there was no time for.
+    """
+
+    bench: Bench
+    budget: float | None
+    progress: Progress | None
+    begun: float = field(default_factory=time.perf_counter)
+    runs: dict[tuple[tuple[str, Any], ...], Measured] = field(default_factory=dict)
+    left_out: list[tuple[Trial, float]] = field(default_factory=list)
+
+    def run(self) -> TradeOff:
+        """All of it, in order."""
+        self.note(BASE)
+        penalty, springs = choose_penalty(self.bench, lambda variant: self.affords(variant, 0.15), self.note)
+        reference = find_reference(self.bench, penalty, springs, REFERENCE_SHARE * self.left, self.note)
+        reserve = COMBINED_SHARE * self.left if self.budget is not None else 0.0
+        single = [BASE, *one_at_a_time(self.bench.scene)]
+        for trial in single:
+            self.try_(trial, self.bench.foreseen(trial.variant), reserve)
+        self.combine(single, reference)
+        return TradeOff(
+            scene=self.bench.scene.name,
+            device=self.bench.name,
+            threads=self.bench.threads,
+            duration=span_of(self.bench.scene, self.bench.duration),
+            budget=self.budget,
+            clock=self.bench.clock,
+            reference=reference,
+            variants=list(self.runs.values()),
+            left_out=self.left_out,
+            spent=time.perf_counter() - self.begun,
+        )
+
+    def combine(self, single: Sequence[Trial], reference: Reference) -> None:
+        """Run promising combinations."""
+        runs = [self.runs[_key(trial)] for trial in single[1:] if _key(trial) in self.runs]
+        known = [reference.limits[name].left for name in BOUND]
+        floor = min((left for left in known if left is not None), default=0.0)
+        base = self.runs[_key(BASE)]
+        found = combinations(self.bench, runs, reference.figures, floor)
+        done = 0
+        for k in spread(len(found), COMBINED)[: 2 * COMBINED]:
+            trial, cost = found[k]
+            if done < COMBINED and self.try_(trial, cost * base.wall["fe"] + self.bench.beside * base.elements, 0.0):
+                done += 1
+
+    def note(self, trial: Trial) -> Measured:
+        """What a variant gave; each is run once."""
+        key = _key(trial)
+        if key not in self.runs:
+            self.runs[key] = self.bench.run(trial)
+            if self.progress:
+                self.progress(self.runs[key], f"{len(self.runs)} runs, {time.perf_counter() - self.begun:.0f} s")
+        return self.runs[key]
+
+    def try_(self, trial: Trial, foreseen: float, reserve: float) -> bool:
+        """Run a variant if what is left of the budget, less a reserve [s], allows for the time foreseen [s].
+
+        Returns:
+            Whether it gave figures.
+        """
+        if _key(trial) in self.runs or foreseen <= self.left - reserve:
+            return not self.note(trial).stopped
+        self.left_out.append((trial, foreseen))
+        return False
+
+    def affords(self, variant: Variant, share: float) -> bool:
+        """Whether a variant takes no more than a share of what is left of the budget."""
+        return self.bench.foreseen(variant) <= share * self.left
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s]."""
+        return float("inf") if self.budget is None else self.budget - (time.perf_counter() - self.begun)
+
+
+def _key(trial: Trial) -> tuple[tuple[str, Any], ...]:
+    return tuple(sorted(trial.variant.knobs.items()))

@@ -1,0 +1,92 @@
+"""Owns the choice whether elements compute in floating frames of their bodies, and the nodes that these frames follow.
+
+In `mixed`, rounding of strains in a body that turns kicks nodes like heat: in N steps of a phase of T seconds its
+kinetic energy grows by about GAIN eps^2 N (c T / L)^2 of itself, whatever the speed at which it turns; c is the speed
+of waves in bars, L the body's length, eps = 2^-24. docs/decisions.md has the measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.scene import Body, Scene
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+GAIN = 3.0  # measured with `hex8`
+ALLOWED = 1e-4  # growth of the kinetic energy that needs no frames [-]
+EPSILON = 2.0**-24  # by which float32 rounds
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloatingFrames:
+    """A frame for each body, those of each scene in turn.
+
+    Attributes:
+        frame: of each node, shape (node_count,), int32.
+        marker: nodes that each frame follows, shape (frame_count, 4), int32.
+    """
+
+    frame: Index
+    marker: Index
+
+
+def with_floating_frames(model: Model, scenes: Sequence[Scene], span: float, precision: str) -> Model:
+    """The model with floating frames, if a body may turn and would be heated in a phase of `span` seconds.
+
+    Elements with steps of their own have none.
+    """
+    if precision != "mixed" or model.rates:
+        return model
+    bodies = [body for scene in scenes for body in scene.bodies]  # as their nodes follow each other
+    start = np.array(list(model.node_start.values()), dtype=np.int64)
+    count = np.diff(start, append=model.node_count)
+    nodes = [slice(first, first + n) for first, n in zip(start, count, strict=True)]
+    marker = np.array([part.start + _markers(model.X[part]) for part in nodes], dtype=np.int32)
+    if not any(
+        _growth(body, model.X[ends], span, model.stable.dt) > ALLOWED and _is_free(model, part)
+        for body, ends, part in zip(bodies, marker, nodes, strict=True)
+        if not body.rigid
+    ):
+        return model
+    frame = np.repeat(np.arange(len(start), dtype=np.int32), count)
+    return replace(model, floating=FloatingFrames(frame=frame, marker=marker))
+
+
+def _markers(X: Array) -> Index:
+    """Four nodes of a body that lie far apart: a third off the line of the first two, a fourth off the plane."""
+    first = int(np.argmax(((X - X[0]) ** 2).sum(axis=1)))
+    away = X - X[first]
+    second = int(np.argmax((away**2).sum(axis=1)))
+    across = np.cross(away, away[second])
+    third = int(np.argmax((across**2).sum(axis=1)))
+    fourth = int(np.argmax(np.abs(away @ across[third])))
+    return np.array([first, second, third, fourth], dtype=np.int32)
+
+
+def _growth(body: Body, ends: Array, span: float, dt: float) -> float:
+    """Growth of a body's kinetic energy by rounding [-]; its length [m] is that between the first two `ends`."""
+    materials = body.material.values() if isinstance(body.material, Mapping) else (body.material,)
+    speed = max(material.wave_speeds["bar"] for material in materials)
+    passes = speed * span / float(np.linalg.norm(ends[1] - ends[0]))
+    return GAIN * EPSILON**2 * (span / dt) * passes * passes
+
+
+def _is_free(model: Model, part: slice) -> bool:
+    """Whether axes at rest and driven ones leave a body of some nodes a rigid motion."""
+    held = (model.fixed_axes[:, None] >> np.arange(3) & 1).astype(bool)
+    held[model.prescribed_node, model.prescribed_axis] = True
+    node, axis = np.nonzero(held[part])
+    X, direction = model.X[part], np.eye(3)[axis]
+    arm = (X[node] - X.mean(axis=0)) / np.ptp(X, axis=0).max()
+    rows = np.concatenate([direction, np.cross(arm, direction)], axis=1)
+    return int(np.linalg.matrix_rank(rows.T @ rows)) < 6
