@@ -22,7 +22,14 @@ from warp_mca.results.storage import load
 DOCS = Path(__file__).parent.parent / "docs"
 COARSE = MeshChoice("quick", refine=0.5)
 SMALL = replace(
-    LEVELS["quick"], main=COARSE, other=COARSE, meshes=(), limit=(), points={"mu": (0.1, 1.5)}, ends={"mu": ()}
+    LEVELS["quick"],
+    main=COARSE,
+    other=COARSE,
+    meshes=(),
+    limit=(),
+    points={"mu": (0.1, 1.5)},
+    ends={"mu": ()},
+    choices=None,
 )
 
 

@@ -102,7 +102,7 @@ def figure_rows(runs: Runs) -> dict[str, list[dict[str, Any]]]:
             row |= {key: summary[key] for key in LISTS}
         by_study.setdefault(study, []).append(row)
     found = {picture.number: by_study.get(picture.study, []) for picture in PICTURES}
-    return found | {"limit": by_study.get("limit", [])}
+    return found | {name: by_study.get(name, []) for name in ("limit", "choices")}
 
 
 def _made(runs: Runs, precision: str) -> str:

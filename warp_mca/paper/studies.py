@@ -133,6 +133,7 @@ STUDIES: dict[str, Study] = {
         _compliance("body", "17", "Modulus of the rods' cylinders", "body"),
         _compliance("rod", "18", "Modulus of the whole rods", "tip", "body"),
         Study("limit", ("limit",), "Stiff springs, hinges of fork and eye", common=(("hinge", "lug"), *STIFF)),
+        Study("choices", ("choices",), "Choices that give the published figures together", common=BASE),
     )
 }
 MESHES = "meshes"  # name under which the runs of Fig. 7 are found, by number from the coarsest mesh
@@ -150,6 +151,7 @@ class Level:
         limit: two meshes on which stiff springs and hinges as built are compared, the finer one last; may be empty.
         points: values of each study; a study that is not listed is not run.
         ends: of these, values that are run in all variants.
+        choices: mesh with which the paper's own words give its figures together, or None.
     """
 
     name: str
@@ -160,6 +162,7 @@ class Level:
     limit: tuple[MeshChoice, ...]
     points: Mapping[str, tuple[float, ...]]
     ends: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    choices: MeshChoice | None = None
 
 
 Key = tuple[str, float, str]  # study, value, variant
@@ -181,6 +184,8 @@ def _cases(level: Level) -> Iterator[tuple[Key, Case]]:
                 yield (name, value, PENALTY), Case(level.other, _replaced(settings, study.other))
     for k, mesh in enumerate(level.meshes):
         yield (MESHES, float(k), MAIN), Case(mesh, BASE)
+    if level.choices is not None:
+        yield ("choices", 0.0, MAIN), Case(level.choices, STUDIES["choices"].common)
     for k, mesh in enumerate(level.limit):
         yield ("limit", float(k), MAIN), Case(mesh, STUDIES["limit"].common)
 
@@ -189,6 +194,10 @@ def _replaced(settings: Settings, changes: Settings) -> Settings:
     return tuple((dict(settings) | dict(changes)).items())
 
 
+# with two pairs of nodes in each hinge and the penalty 0.1, see docs/hinges.md
+CHOICES = MeshChoice(
+    "quick", cells=(("section", 8), ("axial_OA", 20), ("axial_AB", 20), ("focus_size", 0.45e-3), ("focus_layers", 5))
+)
 QUICK, STANDARD, PAPER = (MeshChoice(preset) for preset in ("quick", "standard", "paper"))
 FINER = MeshChoice(
     "paper",
@@ -227,6 +236,7 @@ LEVELS = {
                 "rod": (7.0, 70.0, 700.0),
             },
             ends={"swing": (), "mu": (0.1, 1.5)} | dict.fromkeys(("tip", "body", "rod"), (7.0, 700.0)),
+            choices=CHOICES,
         ),
         Level(
             "full",
@@ -247,6 +257,7 @@ LEVELS = {
             },
             ends={"swing": (), "v_plate": (0.4, 0.8, 4.0), "mu": (0.1, 1.5)}
             | dict.fromkeys(("tip", "body", "rod"), (0.7, 7000.0)),
+            choices=CHOICES,
         ),
     )
 }
