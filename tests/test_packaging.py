@@ -67,7 +67,7 @@ def test_the_wheel_holds_warp_mca_alone(wheel: list[str]):
     tops = {PurePosixPath(name).parts[0] for name in wheel}
     (version,) = (top for top in tops if top.endswith(".dist-info"))
     assert tops == {"warp_mca", version}
-    assert "warp_mca/py.typed" in wheel
+    assert {"warp_mca/py.typed", "warp_mca/accuracy/store.json"} <= set(wheel)
     assert any(name.endswith("licenses/LICENSE") for name in wheel)
 
 

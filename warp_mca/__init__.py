@@ -37,6 +37,7 @@ from warp_mca.scene import (
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
+    from warp_mca.accuracy.request import Accuracy
     from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.geometry import Box, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
     from warp_mca.report.quality import quality_table
@@ -62,6 +63,7 @@ _LAZY = {
     "Rod": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
     "Param": "warp_mca.scene.parameters",
+    "Accuracy": "warp_mca.accuracy.request",
     "make_scene": "warp_mca.scene.catalogue",
     "Result": "warp_mca.results.result",
     "load": "warp_mca.results.storage",
@@ -110,6 +112,7 @@ __all__ = [
     "Parts",
     "Mesh",
     "Param",
+    "Accuracy",
     "make_scene",
     "mesh",
     "quality_table",

@@ -26,12 +26,13 @@ COLLECT = 100_000  # allocations between two garbage collections; at Python's ow
 
 
 class _Warnings(logging.Handler):
-    """Prints warnings on standard error while the command runs; `sys.stderr` may differ from command to command."""
+    """Prints warnings, and what a run chose, on standard error; `sys.stderr` may differ from command to command."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print one line."""
         with suppress(OSError):  # a closed standard error does not stop the run
-            print(f"warning: {record.getMessage()}", file=sys.stderr, flush=True)
+            kind = "warning: " if record.levelno >= logging.WARNING else ""
+            print(f"{kind}{record.getMessage()}", file=sys.stderr, flush=True)
 
 
 class _Terminated(KeyboardInterrupt):

@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import warp_mca as mca
 from warp_mca.cli import commands, paper, run, sweep, tradeoff
+from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.elements import ELEMENTS
 
 WELCOME = """\
@@ -55,6 +56,7 @@ def _run(parser: argparse.ArgumentParser) -> None:
     _add_scene(parser)
     _add_device(parser)
     _add_options(parser)
+    add_accuracy(parser)
     _add_results(parser)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import warp_mca as mca
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.cli import sweep
+from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.request import read_request
 from warp_mca.cli.warp_start import start_warp
 
@@ -37,6 +38,7 @@ def run(args: argparse.Namespace) -> None:
             precision=args.precision,
             threads=args.threads,
             multi_rate=args.multi_rate,
+            accuracy=accuracy_asked(args, request),
             duration=args.duration,
             out=out,
             force=args.force,
@@ -47,7 +49,7 @@ def run(args: argparse.Namespace) -> None:
     written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
     recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
     print_summary(result, [*(str(out / name) for name in written), *recorded])
-    changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling)
+    changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling, args.accuracy)
     as_designed = not args.settings and all(value is None for value in changed)
     if request.source and as_designed:
         for message in request.source.findings(result):
@@ -87,6 +89,8 @@ def _noting_recordings(args: argparse.Namespace) -> Iterator[None]:
 
 def _sweep(args: argparse.Namespace) -> None:
     """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
+    if args.accuracy is not None:
+        raise bad_value("--accuracy", args.accuracy, "each scene of a sweep would get a model of its own; leave it out")
     if _recorders(args, Path()):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
     sweep.sweep(args, "--sweep", args.sweeps, folders=True)

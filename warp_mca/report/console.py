@@ -127,9 +127,25 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         scaling, shares = summary["mass_scaling"], summary["mass_added"].items()
         added = ", ".join(f"{100.0 * share:.2g} % of {name}" for name, share in shares if share > 0.0)
         yield "mass added", f"{added or 'none'}; first peak off by about {100.0 * scaling['F_n_first_peak']:.2g} %"
+    yield from _accuracy(summary)
     rate = summary["element_steps_per_s"]
     if rate is not None:
         yield "rate", f"{rate / 1e6:.2f} M element-steps/s on {summary['device']}, {summary['precision']}"
+
+
+def _accuracy(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """A line with each figure that was to be accurate and its estimated error."""
+    if "accuracy" not in summary:
+        return
+    share = summary["accuracy"]["estimate"]
+    texts = {
+        "F_n_first_peak": lambda: f"first peak {_force(summary['F_n_first_peak'])}",
+        "impulse": lambda: "impulse",
+        "contact_duration": lambda: f"contact {1e3 * summary['contact_duration']:.3f} ms",
+        "max_plastic_strain": lambda: f"plastic strain {summary['max_plastic_strain']:.3g}",
+    }
+    known = [f"{texts[name]()} within about {100.0 * share[name]:.2g} %" for name in texts if share[name] is not None]
+    yield "estimate", ", ".join(known) or "none of the figures has one"
 
 
 def _phases(phases: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.model.surfaces import is_curved_contact
+from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
 POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
+THIN = 0.25  # of a body's thickness from which on nodes of another are said to be deep in it
 BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
 
 
@@ -40,6 +42,8 @@ def resolution_warnings(
             found += _small_patch(contact, model, item, ledger, k)
         if item.plane is not None:
             found += _pushed_through(contact, model, item, depths[k])
+        else:
+            found += _sunk_through(contact, model, item, depths[k])
     return found
 
 
@@ -67,6 +71,29 @@ def _pushed_through(contact: Contact, model: Model, item: ContactPass, depth: Ar
             f"{depth[pushed].max():.3g} m deep: contact cannot move a node whose motion is prescribed, so the force "
             "there is only stiffness times depth; leave these nodes out of the contact's surface, or drive others"
         )
+
+
+def _sunk_through(contact: Contact, model: Model, item: ContactPass, depth: Array) -> Iterator[str]:
+    """Guards stop nodes as deep as half a face; a plate that is thinner than its faces are wide is past by then."""
+    assert not isinstance(contact.master, RigidPlane)
+    slave, master = contact.slave.body, contact.master.body
+    if item.sign < 0.0:
+        slave, master = master, slave
+    thickness = _thickness(model, master)
+    deepest = float(depth.max(initial=0.0))
+    if deepest > THIN * thickness:
+        yield (
+            f"nodes of {slave} sank {deepest:.3g} m deep into {master}, which is {thickness:.3g} m thick: contact "
+            "springs are too soft for a body so thin; raise penalty, or give both bodies smaller cells"
+        )
+
+
+def _thickness(model: Model, name: str) -> float:
+    """Least extent of a body along its principal axes [m]."""
+    first = model.node_start[name]
+    X = model.X[first : min((k for k in model.node_start.values() if k > first), default=model.node_count)]
+    X = X - X.mean(axis=0)
+    return float(np.ptp(X @ np.linalg.eigh(X.T @ X)[1], axis=0).min())
 
 
 def _bound_speed(model: Model, nodes: NDArray[np.int32], normal: Array) -> Array:

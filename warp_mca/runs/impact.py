@@ -15,6 +15,7 @@ from warp_mca.model.batch_model import join_models
 from warp_mca.model.floating import with_floating_frames
 from warp_mca.model.layout import offsets
 from warp_mca.results.paths import join_probes
+from warp_mca.runs.bending import LOOKS
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.scene_run import SceneRun
@@ -206,6 +207,9 @@ class _Loop:
     def _interval(self, interval: int, last: int) -> None:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
+        if interval and interval % max(1, self.steps.intervals // LOOKS) == 0 and self.state.steps == first:
+            for item in self.impact.scene_runs:
+                item.ledger.kept.stiffened = item.look()
         for number, part in enumerate(self.steps.parts(interval)):
             end = first + part.count
             if self.state.steps < min(end, last):

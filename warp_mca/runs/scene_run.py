@@ -13,7 +13,9 @@ from warp_mca.model.cells import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
+from warp_mca.runs.bending import bending_warnings, seen
 from warp_mca.runs.contact_warnings import resolution_warnings
+from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from warp_mca.solve.state import State
     from warp_mca.solve.steps import Steps
 
-COROTATIONAL_STRAIN = 0.1  # beyond this, small strain in a rotated frame is off by a tenth of itself
+Array = NDArray[np.float64]
 
 
 class SceneRun:
@@ -76,6 +78,12 @@ class SceneRun:
             if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
+    def look(self) -> Array:
+        """What `runs.bending` has seen of the bodies, with their shape now; see `SceneRecords.stiffened`."""
+        first, end = self.solver.layout.nodes[self.index : self.index + 2]
+        u = np.asarray(self.state.u.numpy()[first:end], dtype=np.float64)
+        return seen(self.ready.model, u, self.ledger.kept.stiffened)
+
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
@@ -89,7 +97,7 @@ class SceneRun:
         facts = self._facts(wall, shares)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         summary = summarise(history, facts, contacts)
-        warnings = (*self._warnings(shares), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
+        warnings = (*self._warnings(shares, stopped), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
         return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> RunFacts:
@@ -167,17 +175,11 @@ class SceneRun:
             "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _warnings(self, shares: Mapping[str, float | None]) -> list[str]:
+    def _warnings(self, shares: Mapping[str, float | None], stopped: str | None) -> list[str]:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
-        found: list[str] = []
-        small = [body.name for body in scene.bodies if body.kinematics == "corotational"]
-        if small and ledger.kept.max_strain > COROTATIONAL_STRAIN:
-            where = "" if len(small) == len(scene.bodies) else f", if that was in {' or '.join(small)}"
-            found.append(
-                f"strain reached {ledger.kept.max_strain:.2f}; the co-rotational element takes strains as small, "
-                f"expect stresses off by as much where it exceeds {COROTATIONAL_STRAIN}, or choose "
-                f"kinematics='finite'{where}"
-            )
+        found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
+        if stopped is None:
+            found += bending_warnings(self.ready.model, self.look(), ledger.kept.exchanged)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(

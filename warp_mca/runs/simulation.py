@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
+from warp_mca.accuracy.plan import Plan, planned
+from warp_mca.accuracy.request import Accuracy
 from warp_mca.base.errors import GuardError, RequestError, bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.precision import check_range
@@ -49,6 +52,7 @@ def run(
     force: bool = False,
     refine: float | None = None,
     mass_scaling: float | str | None = None,
+    accuracy: float | str | Accuracy | None = None,
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
     progress: Progress | None = None,
@@ -70,6 +74,8 @@ def run(
         refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
         mass_scaling: in place of `ImpactPhase.mass_scaling`: how many times longer the stable step is to be, or that
             step as "2e-8s", by added mass.
+        accuracy: greatest error of the first force peak, the impulse and the contact duration, as 0.02 or "2%": mesh,
+            step and contact springs are then chosen, but those that are given here (docs/accuracy.md).
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
         progress: called with a stage and the share of it that is done.
@@ -81,28 +87,75 @@ def run(
         RequestError: the request cannot be carried out; nothing was written.
         GuardError: the run lost its footing (not-a-number, inverted element, energy, lost contact).
     """
-    from warp_mca.recorders.frames import check_files
-
     check_scene("scene", scene)
     scene = with_options(scene, refine, mass_scaling, meshes)
-    tell = teller(progress)
-    span = span_of(scene, duration)
-    check_recorders(recorders)
+    tell, span = teller(progress), span_of(scene, duration)
     settings = settings_of(device, precision, threads, multi_rate)
-    check_files(recorders, None if out is None else check_output(out, force=force))
-
-    def result() -> Result:
-        if scene.t_end is not None:
-            return _cycle(scene, meshes, span, tell, settings, recorders)
-        (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
-        if found.stopped is not None:
-            raise GuardError(found.stopped)
-        return found
-
+    _check_files(recorders, out, force)
+    typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
+    again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
+    plan = planned(scene, accuracy, typed, device, meshes, again)
+    result = partial(_result, plan, scene, meshes, span, tell, settings, recorders)
     if out is None:
         return result()
     with hold(out, force=force) as folder:
         return write(result(), folder, force=force)
+
+
+def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None, force: bool) -> None:
+    """Refuse what is no recorder, and files that cannot be written.
+
+    Raises:
+        RequestError: so it is.
+    """
+    from warp_mca.recorders.frames import check_files
+
+    check_recorders(recorders)
+    check_files(recorders, None if out is None else check_output(out, force=force))
+
+
+def _result(
+    plan: Plan | None,
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    recorders: Sequence[Recorder],
+) -> Result:
+    """One impact, or many in turn, of the scene or what was planned in its place; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: the run lost its footing.
+    """
+    if plan is None:
+        return _single(scene, meshes, span, tell, settings, recorders)
+    settings = replace(settings, **plan.variant.options)
+    ready = None if recorders else plan.ready
+    return plan.judged(ready or _single(plan.scene, meshes, span, tell, settings, recorders))
+
+
+def _single(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    span: float,
+    tell: Progress,
+    settings: Settings,
+    recorders: Sequence[Recorder],
+) -> Result:
+    """One impact, or many in turn; arguments as in `simulate`.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+        GuardError: the run lost its footing.
+    """
+    if scene.t_end is not None:
+        return _cycle(scene, meshes, span, tell, settings, recorders)
+    (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders)
+    if found.stopped is not None:
+        raise GuardError(found.stopped)
+    return found
 
 
 def _cycle(

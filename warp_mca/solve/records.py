@@ -21,6 +21,8 @@ class SceneRecords:
         path_stress: of the scene's probes [Pa], each shape (row_count, probe_count, 6), float32.
         peaks: of each contact pass at its greatest, sum of normal forces [N] and sum of their squares [N^2], shape
             (pass_count, 2), float64.
+        stiffened: of each body, energy that its cells spent on their own stiffness and its strain energy [J], when that
+            was greatest of a few looks, see `runs.bending`, shape (body_count, 2), float64.
         count: rows so far [-].
         records: check records so far, rows included [-].
         energy_error: greatest imbalance, as a share of initial energy and external work [-].
@@ -42,6 +44,7 @@ class SceneRecords:
     velocities: list[Array] = field(default_factory=list)
     path_stress: list[NDArray[np.float32]] = field(default_factory=list)
     peaks: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    stiffened: Array = field(default_factory=lambda: np.zeros((0, 2)))
     count: int = 0
     records: int = 0
     energy_error: float = 0.0
@@ -60,7 +63,7 @@ class SceneRecords:
     def copy(self) -> SceneRecords:
         """A copy of its own; rows, which never change, are shared."""
         lists = {name: list(getattr(self, name)) for name in _LISTS}
-        return replace(self, **lists, peaks=self.peaks.copy())
+        return replace(self, **lists, peaks=self.peaks.copy(), stiffened=self.stiffened.copy())
 
     def arrays(self) -> dict[str, NDArray]:
         """All of it as arrays by name, for a file."""
@@ -73,14 +76,14 @@ class SceneRecords:
     @staticmethod
     def of(arrays: Mapping[str, NDArray]) -> SceneRecords:
         """The inverse of `arrays`."""
-        found = SceneRecords(peaks=arrays["peaks"])
+        found = SceneRecords(peaks=arrays["peaks"], stiffened=arrays["stiffened"])
         for f in fields(found):
             array = arrays[f.name]
             if f.name in ("sums", "velocities"):
                 setattr(found, f.name, list(array))
             elif f.name == "path_stress":
                 found.path_stress = [array] if len(array) else []
-            elif f.name != "peaks":
+            elif f.name not in ("peaks", "stiffened"):
                 setattr(found, f.name, type(getattr(found, f.name))(array))
         return found
 

@@ -1,0 +1,166 @@
+"""Owns the measurements behind `--accuracy`: the store that choices are made from, and how good the choices are.
+
+python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --workers 10 --deadline 300
+python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 --deadline 350
+python -m benchmarks.accuracy render
+
+`learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store;
+`validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
+docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into docs/accuracy.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import warp_mca as mca
+from benchmarks.accuracy_calibrate import calibrated
+from benchmarks.accuracy_families import FAMILIES, Family, Values
+from benchmarks.accuracy_judge import judged, render
+from benchmarks.accuracy_measure import Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of, warm
+from warp_mca.accuracy.store import OWN
+
+ROOT = Path(__file__).resolve().parents[1]
+JSON = ROOT / "docs" / "accuracy.json"
+PAGE = ROOT / "docs" / "accuracy.md"
+ASKED = (0.02, 0.05)
+LEARN, HELD_OUT = 1, 2  # seeds: choices are never tried on scenes that they were learnt from
+LEARNING = 0.45  # share of the time of `both` that is spent on the store
+GALLERY = 6  # scenes of each other family to learn from; one of each is tried
+
+
+def main() -> None:
+    """Carry out the command."""
+    parser = argparse.ArgumentParser(description="Measure the choices of --accuracy.")
+    parser.add_argument("command", choices=("learn", "validate", "both", "render"))
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--scenes", type=int, default=20, help="of two_link")
+    parser.add_argument("--gallery", type=int, help="scenes of each other family (default: 6 to learn from, 1 to try)")
+    parser.add_argument("--workers", type=int, default=1, help="processes that share the device")
+    parser.add_argument("--deadline", type=float, default=1e9, metavar="SECONDS", help="stop measuring after this")
+    parser.add_argument("--reference", type=float, default=1.0, metavar="SCALE", help="refine of references times this")
+    parser.add_argument("--families", help="names with commas between them (default: all)")
+    parser.add_argument("-o", "--output", type=Path)
+    args = parser.parse_args()
+    if args.command == "render":
+        PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), json.loads(JSON.read_text(encoding="utf-8"))))
+        return
+    until = time.monotonic() + args.deadline
+    wanted = args.families.split(",") if args.families else [family.scene for family in FAMILIES]
+    families = [family for family in FAMILIES if family.scene in wanted]
+    if args.command in ("learn", "both"):
+        share = LEARNING if args.command == "both" else 1.0
+        learn(args, families, until - (1.0 - share) * args.deadline)
+    if args.command in ("validate", "both"):
+        validate(args, families, until)
+
+
+def _scenes(args: argparse.Namespace, family: Family, seed: int, others: int) -> list[Values]:
+    count = args.scenes if family.scene == "two_link" else others if args.gallery is None else args.gallery
+    return sampled(family, seed, count)
+
+
+def _tables(
+    args: argparse.Namespace, scenes: Mapping[str, list[Values]], families: Iterable[Family], until: float
+) -> Iterable[dict[str, dict[int, Table]]]:
+    """All rows so far, by family, scene and variant, after each job."""
+    jobs = [job for f in families for job in jobs_of(f, scenes[f.scene], args.device, args.reference)]
+    tables: dict[str, dict[int, Table]] = {name: {} for name in scenes}
+    for count, (name, scene, variant, row) in enumerate(run_jobs(jobs, args.workers, until), 1):
+        tables[name].setdefault(scene, {})[variant] = row
+        if count % 20 == 0:
+            print(f"{count} runs, {until - time.monotonic():.0f} s left", flush=True)
+            yield tables
+    yield tables
+
+
+def learn(args: argparse.Namespace, families: list[Family], until: float) -> None:
+    """Write the store; families that were not measured stay as they are in it."""
+    target = args.output if args.output and args.command == "learn" else OWN
+    scenes = {family.scene: _scenes(args, family, LEARN, GALLERY) for family in families}
+    before = json.loads(target.read_text(encoding="utf-8"))["families"] if target.exists() else {}
+    found: dict[str, Any] = {}
+    for tables in _tables(args, scenes, families, until):
+        found = {f.scene: stored(f, scenes[f.scene], tables[f.scene]) for f in families}
+        found = {name: item for name, item in found.items() if item["scenes"]}
+        target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
+    known = {name: calibrated(name, item) for name, item in found.items()}
+    target.write_text(json.dumps({"families": {**before, **known}}) + "\n", encoding="utf-8")
+    print({name: len(item["scenes"]) for name, item in found.items()})
+
+
+def validate(args: argparse.Namespace, families: list[Family], until: float) -> None:
+    """Try the accuracies on scenes that were not learnt from."""
+    target = args.output or JSON
+    scenes = {family.scene: _scenes(args, family, HELD_OUT, 1) for family in families}
+    if args.workers > 1:
+        warm([job for f in families for job in jobs_of(f, scenes[f.scene], args.device, args.reference)])
+    begin = time.monotonic()
+    runs = _accurate_runs(args, scenes, until - 0.5 * (until - begin))
+    print(f"{len(runs)} runs with an accuracy in {time.monotonic() - begin:.0f} s", flush=True)
+    found: list[dict[str, Any]] = []
+    for tables in _tables(args, scenes, families, until):
+        found = []
+        for family in families:
+            for k, values in enumerate(scenes[family.scene]):
+                table = tables[family.scene].get(k, {})
+                truth = truth_of(family, table)
+                own = [run for run in runs if (run["scene"], run["number"]) == (family.scene, k)]
+                if truth is not None and own:
+                    found.append(judged(family, values, table, truth, own, args.device))
+        data = {"device": args.device, "version": mca.__version__, "reference": args.reference, "scenes": found}
+        target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    print(f"{len(found)} scenes judged")
+
+
+def _accurate_runs(args: argparse.Namespace, scenes: Mapping[str, list[Values]], until: float) -> list[dict[str, Any]]:
+    tasks = [
+        (name, k, values, asked, args.device)
+        for name, items in scenes.items()
+        for k, values in enumerate(items)
+        for asked in ASKED
+    ]
+    if args.workers < 2:
+        return [accurate_run(task) for task in tasks if time.monotonic() < until]
+    found: list[dict[str, Any]] = []
+    with multiprocessing.get_context("spawn").Pool(args.workers) as pool:
+        pending = pool.imap_unordered(accurate_run, tasks)
+        try:
+            for _ in tasks:
+                found.append(pending.next(timeout=max(until - time.monotonic(), 0.01)))
+        except multiprocessing.TimeoutError:
+            pool.terminate()
+    return found
+
+
+def accurate_run(task: tuple[str, int, Values, float, str]) -> dict[str, Any]:
+    """One run with an accuracy: its figures, estimates, and what deciding took of its time."""
+    name, number, values, asked, device = task
+    begin = time.perf_counter()
+    entry = {"scene": name, "number": number, "asked": asked}
+    try:
+        result = mca.run(mca.make_scene(name, **values), accuracy=asked, device=device, threads=1)
+    except Exception as error:  # which must not end the runs of others
+        return {**entry, "refused": f"{type(error).__name__}: {error}"}
+    wall = time.perf_counter() - begin
+    accuracy = result.summary["accuracy"]
+    return {
+        **entry,
+        **row_of(result),
+        "estimate": accuracy["estimate"],
+        "chosen": accuracy["chosen"],
+        "why": accuracy["why"],
+        "deciding": accuracy["deciding"] / wall,
+        "wall": wall,
+        "fe": result.summary["wall"]["fe"],
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""Owns how choices of `--accuracy` are judged: true errors, estimates, cost over the cheapest variant; their table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from benchmarks.accuracy_families import Family, Values
+from benchmarks.accuracy_measure import COMPUTED, FINE, Row, Table, errors_of
+from warp_mca.accuracy.choice import cost_of
+from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.store import Size
+from warp_mca.runs.rate_groups import COSTS, StepCost
+
+START, END = "<!-- accuracy: measured -->", "<!-- accuracy: end -->"  # around what is rendered
+LOW, HIGH, SMALL = 0.5, 3.0, 0.2  # of estimates over true errors; share of what was asked below which both are small
+
+
+def judged(
+    family: Family, values: Values, table: Table, truth: Sequence[float | None], runs: Sequence[Row], device: str
+) -> dict[str, Any]:
+    """What came of the runs of one scene."""
+    bound = [k for k, name in enumerate(BOUND) if name not in family.no_limit]
+    rows = []
+    for run in sorted(runs, key=lambda item: item["asked"]):
+        if "refused" in run:
+            rows.append(dict(run))
+            continue
+        errors = errors_of(run["figures"], truth)
+        within = [
+            (cost(row, device), number)
+            for number, row in table.items()
+            if number != FINE and _worst(errors_of(row["figures"], truth), bound) <= run["asked"]
+        ]
+        rows.append(
+            {
+                **run,
+                "errors": errors,
+                "worst": _worst(errors, bound),
+                "cost": cost(run, device),
+                "cheapest": min(within, default=(None, None)),
+            }
+        )
+    return {"scene": family.scene, "parameters": values, "truth": list(truth), "runs": rows}
+
+
+def cost(row: Row, device: str) -> float:
+    """Time of the steps of a run by what the device's steps cost [s]; measured times of small runs say little."""
+    computed = row["computed"] or (COMPUTED if device == "cpu" else 1.0)
+    step: StepCost = COSTS["cpu" if device == "cpu" else "H100"]
+    return cost_of(Size(row["elements"], row["steps"], computed), step, cpu=True)
+
+
+def _worst(errors: Sequence[float | None], bound: Iterable[int]) -> float:
+    found = [abs(error) for k in bound if (error := errors[k]) is not None]
+    return max(found, default=0.0)
+
+
+def counts(data: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
+    """How many of how many cases meet each aim."""
+    runs = [run for scene in data["scenes"] for run in scene["runs"] if "errors" in run]
+    estimates = [item for run in runs for item in _estimates(run)]
+    costs = [run["cost"] <= 2.0 * run["cheapest"][0] for run in runs if run["cheapest"][0] is not None]
+    return {
+        "true errors within what was asked": _count(run["worst"] <= run["asked"] for run in runs),
+        "true errors within twice that": _count(run["worst"] <= 2.0 * run["asked"] for run in runs),
+        "deciding took a fifth of the time at most": _count(run["deciding"] <= 0.2 for run in runs),
+        "estimates 0.5 to 3 times the true error, or both below a fifth of what was asked": _count(estimates),
+        "cost at most twice that of the cheapest variant within": _count(costs),
+    }
+
+
+def _estimates(run: Row) -> list[bool]:
+    """Whether the estimate of each figure is right."""
+    found = []
+    for name, error in zip(BOUND, run["errors"], strict=True):
+        share = run["estimate"][name]
+        if share is None or error is None:
+            continue
+        small = max(share, abs(error)) < SMALL * run["asked"]
+        found.append(small or LOW * abs(error) <= share <= HIGH * abs(error))
+    return found
+
+
+def _count(items: Iterable[bool]) -> tuple[int, int]:
+    found = list(items)
+    return sum(found), len(found)
+
+
+def cost_ratio(data: Mapping[str, Any]) -> float | None:
+    """Mean cost of the coarser accuracy over that of the finer one [-]."""
+    pairs = [[run["cost"] for run in scene["runs"] if "cost" in run] for scene in data["scenes"]]
+    ratios = [pair[1] / pair[0] for pair in pairs if len(pair) == 2]
+    return sum(ratios) / len(ratios) if ratios else None
+
+
+def render(page: str, data: Mapping[str, Any]) -> str:
+    """The page with the tables of `docs/accuracy.json` in place of what stands between the marks."""
+    before, rest = page.split(START)
+    after = rest.split(END)[1]
+    return "".join([before, START, "\n\n", "\n".join(_lines(data)), "\n\n", END, after])
+
+
+def _lines(data: Mapping[str, Any]) -> list[str]:
+    ratio = cost_ratio(data)
+    lines = ["| aim | met |", "|---|---|"]
+    lines += [f"| {name} | {met} of {count} |" for name, (met, count) in counts(data).items()]
+    if ratio is not None:
+        lines.append(f"| cost of 5 % over that of 2 %, mean | {ratio:.2f} |")
+    head = ("scene", "asked", "first peak", "impulse", "duration", "elements", "deciding", "cost over the cheapest's")
+    lines += ["", f"Device: {data['device']}.", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    for scene in data["scenes"]:
+        lines += [_row(scene, run) for run in scene["runs"]]
+    return lines
+
+
+def _row(scene: Mapping[str, Any], run: Row) -> str:
+    shown = ("mu", "v_plate", "H", "radius", "E_tip", "E_body", "v", "E_ratio", "nu", "length", "ratio")
+    own = ", ".join(f"{key}={scene['parameters'][key]:g}" for key in shown if key in scene["parameters"])
+    name = f"`{scene['scene']}` {own}"
+    if "refused" in run:
+        return f"| {name} | {run['asked']:.0%} | refused: {run['refused']} | | | | | |"
+    pairs = zip(BOUND, run["errors"], strict=True)
+    errors = [_percent(error, run["estimate"][figure]) for figure, error in pairs]
+    cheapest = run["cheapest"][0]
+    beside = f"{run['cost'] / cheapest:.2f}" if cheapest else "none within"
+    cells = [name, f"{run['asked']:.0%}", *errors, f"{run['elements']:,}", f"{run['deciding']:.0%}", beside]
+    return f"| {' | '.join(cells)} |"
+
+
+def _percent(error: float | None, estimate: float | None) -> str:
+    if error is None:
+        return "none"
+    return f"{100.0 * error:+.1f} %" + (f" (est. {100.0 * estimate:.1f} %)" if estimate is not None else "")

@@ -1,0 +1,232 @@
+"""Owns measurements for the store of accuracies: variants and references of many scenes, in batches and processes.
+
+Each process takes jobs in turn: a reference alone, or a variant of some scenes of equal duration in one batch.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import random
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+import warp_mca as mca
+from benchmarks.accuracy_families import FAMILIES, Family, Values
+from warp_mca.accuracy.figures import BOUND, figures_of
+from warp_mca.accuracy.variant import Variant
+
+BATCH = 10  # scenes side by side
+COMPUTED = 0.4  # share of the elements that a step computes on a CPU with several rates, where it was not measured
+FINE = -1  # number of the reference among the variants
+
+Row = dict[str, Any]  # figures, elements, steps, refine, computed
+Table = dict[int, Row]  # by number of the variant
+FAMILY = {family.scene: family for family in FAMILIES}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One variant of some scenes.
+
+    Attributes:
+        family: name of its scene.
+        variant: number, or FINE.
+        scenes: numbers of the scenes.
+        values: parameters of each.
+        device: to run on.
+        scale: of the reference's refine [-]; below 1 to try the benchmark with less.
+    """
+
+    family: str
+    variant: int
+    scenes: tuple[int, ...]
+    values: tuple[Values, ...]
+    device: str
+    scale: float
+
+
+def variant_of(family: Family, number: int, scale: float = 1.0) -> Variant:
+    """A variant with all parameters of the mesh, as the store has them."""
+    found = family.fine if number == FINE else family.variants[number]
+    if number == FINE and scale != 1.0:
+        assert found.refine is not None
+        axial = {name: round(value / scale) for name, value in found.parameters.items() if name.startswith("axial")}
+        found = replace(found, refine=found.refine * scale, parameters={**found.parameters, **axial})
+    return replace(found, parameters={**family.base(), **found.parameters})
+
+
+def sampled(family: Family, seed: int, count: int) -> list[Values]:
+    """Parameters of random scenes; equal seeds give equal scenes."""
+    rng = random.Random(f"{family.scene} {seed}")
+    return [{**family.fixed, **family.sample(rng)} for _ in range(count)]
+
+
+def row_of(result: mca.Result) -> Row:
+    """What is kept of a run."""
+    summary = result.summary
+    groups = summary.get("rate_groups")
+    shortest = groups[0]["step"] if groups else 0.9 * summary["stable_dt"]
+    steps = summary["simulated_time"] / shortest
+    work = sum(item["elements"] * shortest / item["step"] for item in groups) if groups else None
+    figures = figures_of(result)
+    return {
+        "figures": [figures[name] for name in BOUND],
+        "elements": summary["n_elements"],
+        "steps": round(steps),
+        "refine": summary["refine"],
+        "computed": work / summary["n_elements"] if work else None,
+    }
+
+
+def measured(job: Job) -> list[tuple[str, int, int, Row]]:
+    """Rows of a job: family, scene, variant, row; scenes that fail are left out."""
+    family = FAMILY[job.family]
+    variant = variant_of(family, job.variant, job.scale)
+    scenes = [variant.applied(mca.make_scene(job.family, **values)) for values in job.values]
+    options = {"device": job.device, "threads": 1}
+    results: list[mca.Result | None] = []
+    if len(scenes) > 1:
+        try:
+            results = [item if item.stopped is None else None for item in mca.run_batch(scenes, **options)]
+        except mca.McaError:
+            results = []
+    if not results:
+        results = [_alone(scene, variant, options) for scene in scenes]
+    pairs = zip(job.scenes, results, strict=True)
+    return [(job.family, scene, job.variant, row_of(result)) for scene, result in pairs if result is not None]
+
+
+def _alone(scene: mca.Scene, variant: Variant, options: Mapping[str, Any]) -> mca.Result | None:
+    try:
+        return mca.run(scene, **{**options, **variant.options})
+    except mca.McaError as error:
+        print(f"left out: {scene.name}: {error}", flush=True)
+        return None
+
+
+def jobs_of(family: Family, scenes: Sequence[Values], device: str, scale: float) -> list[Job]:
+    """Jobs of a family, some scenes after the others, so that the first ones are complete first.
+
+    On a GPU scenes of `two_link` of equal duration share a batch; references are alone.
+    """
+    together = BATCH if device != "cpu" and family.scene == "two_link" else 1
+    order = sorted(range(len(scenes)), key=lambda k: (scenes[k].get("duration", 0.0), _stiffness(scenes[k])))
+    parts: list[tuple[int, list[int]]] = []
+    for _, group in groupby(order, key=lambda k: scenes[k].get("duration")):
+        members = list(group)
+        parts += [(i, members[i : i + together]) for i in range(0, len(members), together)]
+    jobs = []
+    for _, part in sorted(parts):
+        pieces = [(FINE, [k]) for k in part] + [(number, part) for number in range(len(family.variants))]
+        jobs += [
+            Job(family.scene, number, tuple(piece), tuple(scenes[k] for k in piece), device, scale)
+            for number, piece in pieces
+        ]
+    return jobs
+
+
+def _stiffness(values: Values) -> float:
+    """Greatest modulus of a scene [Pa]: scenes of a batch take the shortest step of all."""
+    return max((values[name] for name in ("E_tip", "E_body") if name in values), default=70e9)
+
+
+def attempted(job: Job) -> list[tuple[str, int, int, Row]]:
+    """As `measured`; a job that breaks, for lack of memory say, has no rows and does not end the others."""
+    try:
+        return measured(job)
+    except Exception as error:
+        print(f"left out: {job.family}, variant {job.variant}: {type(error).__name__}: {error}", flush=True)
+        return []
+
+
+def warm(jobs: Sequence[Job]) -> None:
+    """Compile kernels before many processes would do it at once: of a batch, a run alone, and one of several rates."""
+    first = next((job for job in jobs if job.variant != FINE), None)
+    if first is None:
+        return
+    attempted(replace(first, scenes=first.scenes[:2], values=first.values[:2]))
+    attempted(replace(first, scenes=first.scenes[:1], values=first.values[:1]))
+    variant = replace(variant_of(FAMILY[first.family], first.variant), multi_rate=2)
+    scene = variant.applied(mca.make_scene(first.family, **first.values[0]))
+    _alone(scene, variant, {"device": first.device, "threads": 1, "duration": 1e-5})
+
+
+def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[str, int, int, Row]]:
+    """Rows as they come, until all are there or the clock (`time.monotonic`) says `until`."""
+    if workers < 2:
+        for job in jobs:
+            if time.monotonic() > until:
+                return
+            yield from attempted(job)
+        return
+    warm(jobs)
+    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+        pending = pool.imap_unordered(attempted, jobs)
+        for _ in jobs:
+            try:
+                yield from pending.next(timeout=max(until - time.monotonic(), 0.01))
+            except multiprocessing.TimeoutError:
+                pool.terminate()
+                return
+
+
+def truth_of(family: Family, table: Table) -> list[float | None] | None:
+    """Limits of the figures, extrapolated from the reference and its partner; None without the reference.
+
+    f0 = f + (f - f_c) h^p / (h_c^p - h^p) with the order p of the family.
+    """
+    if FINE not in table:
+        return None
+    fine = table[FINE]
+    partner = table.get(family.partner)
+    if partner is None:
+        return fine["figures"]
+    ratio = fine["refine"] / partner["refine"]
+    if ratio <= 1.1:
+        return fine["figures"]
+    factor = 1.0 / (ratio**family.order - 1.0)
+    both = zip(fine["figures"], partner["figures"], strict=True)
+    return [None if f is None else f if c is None else f + factor * (f - c) for f, c in both]
+
+
+def errors_of(figures: Sequence[float | None], truth: Sequence[float | None]) -> list[float | None]:
+    """Signed errors [-]."""
+    return [None if f is None or not t else f / t - 1.0 for f, t in zip(figures, truth, strict=True)]
+
+
+def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]) -> dict[str, Any]:
+    """The family as the store has it; scenes without a reference are left out."""
+    entries = []
+    for k, values in enumerate(scenes):
+        table = tables.get(k, {})
+        truth = truth_of(family, table)
+        if truth is None:
+            continue
+        runs = [
+            {
+                "variant": number,
+                "errors": [None if e is None else round(e, 5) for e in errors_of(row["figures"], truth)],
+                "elements": row["elements"],
+                "steps": row["steps"],
+                "computed": round(row["computed"] or COMPUTED, 3),
+            }
+            for number, row in sorted(table.items())
+            if number != FINE
+        ]
+        entries.append({"parameters": values, "truth": truth, "runs": runs})
+    return {
+        "features": dict(family.features),
+        "mesh": family.base(),
+        "any_value": list(family.any_value),
+        "no_limit": dict(family.no_limit),
+        "variants": [_plain(item) for item in family.variants],
+        "scenes": entries,
+    }
+
+
+def _plain(variant: Variant) -> dict[str, Any]:
+    own = {key: value for key, value in variant.knobs.items() if key not in variant.parameters and key != "multi_rate"}
+    return {**own, "parameters": dict(variant.parameters)}

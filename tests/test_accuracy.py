@@ -1,0 +1,213 @@
+"""Tests `--accuracy`: what is asked, foreseen, chosen and estimated, and that runs can be repeated."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.accuracy import store
+from warp_mca.accuracy.choice import choices
+from warp_mca.accuracy.hinges import without_limit
+from warp_mca.accuracy.pilots import LEVELS, run_pilots
+from warp_mca.accuracy.prediction import NOISE, gaussian_process
+from warp_mca.accuracy.request import Accuracy, accuracy_of
+from warp_mca.cli.main import main
+from warp_mca.runs.rate_groups import COSTS
+
+BOUND = ("F_n_first_peak", "impulse", "contact_duration")
+REFINES = (0.5, 0.7, 1.0, 1.4)
+
+
+def test_shares_are_read_as_users_write_them():
+    assert accuracy_of("2%").share == accuracy_of(0.02).share == accuracy_of("0.02").share == 0.02
+    for wrong in ("two", 0.0, "80%", float("nan")):
+        with pytest.raises(mca.RequestError, match="2%"):
+            accuracy_of(wrong)
+
+
+def test_a_process_keeps_to_what_was_measured_and_knows_nothing_far_away():
+    points = np.linspace(-2.0, 2.0, 9)[:, None]
+    errors = 0.03 * np.sin(points[:, 0])
+    between = gaussian_process(points, errors, np.array([0.25]))
+    assert between.mean == pytest.approx(0.03 * math.sin(0.25), abs=2.0 * NOISE)
+    assert between.spread < 2.0 * NOISE
+    far = gaussian_process(points, errors, np.array([100.0]))
+    assert far.mean == pytest.approx(errors.mean(), abs=1e-6)
+    assert far.spread == pytest.approx(math.hypot(errors.std(), math.sqrt(2.0) * NOISE), rel=1e-3)
+
+
+@pytest.fixture
+def known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> store.Family:
+    """A family of `rod_on_wall` in the user's folder, with errors of 4 % v / R^2."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(store, "_own", dict)
+    speeds = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
+
+    def run(k: int, v: float) -> dict[str, object]:
+        R = REFINES[k]
+        return {
+            "variant": k,
+            "errors": [0.04 * v / R**2, 0.001, None],
+            "elements": 600 * R**3,
+            "steps": 200 * R,
+            "computed": 1.0,
+        }
+
+    family = {
+        "features": {"v": "log"},
+        "mesh": {"axial": 40, "section": 4},
+        "any_value": [],
+        "no_limit": {"contact_duration": "of the test"},
+        "variants": [{"refine": R, "parameters": {"penalty": 2.0}} for R in REFINES],
+        "scenes": [{"parameters": {"v": v}, "runs": [run(k, v) for k in range(len(REFINES))]} for v in speeds],
+    }
+    folder = store.user_folder()
+    folder.mkdir(parents=True)
+    (folder / "mine.json").write_text(json.dumps({"families": {"rod_on_wall": family}}))
+    found = store.family_of(mca.make_scene("rod_on_wall", v=1.5))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("v", "asked", "refine"), [(1.0, 0.05, 1.0), (1.0, 0.09, 0.7), (2.0, 0.09, 1.0), (2.0, 0.2, 0.7)]
+)
+def test_the_cheapest_variant_within_the_bound_is_chosen(known: store.Family, v: float, asked: float, refine: float):
+    found = choices(known, {"v": v}, Accuracy(share=asked), BOUND[:2], COSTS["cpu"], True)
+    assert [item.variant.refine for item in found] == list(REFINES)
+    within = [item for item in found if item.greatest <= asked]
+    assert within[0].variant.refine == refine
+    error = within[0].errors["F_n_first_peak"]
+    assert error is not None
+    assert error.size == pytest.approx(0.04 * v / refine**2, rel=0.2)
+
+
+def test_what_was_typed_stays(known: store.Family):
+    def offered(**typed: object) -> list[float | None]:
+        asked = Accuracy(share=0.05, typed=typed)
+        return [item.variant.refine for item in choices(known, {}, asked, BOUND[:2], COSTS["cpu"], True)]
+
+    assert offered(refine=1.4) == [1.4]
+    assert offered(penalty=2.0, v=3.0) == list(REFINES)
+    assert offered(penalty=0.1) == []
+
+
+def test_scenes_that_differ_in_more_than_the_family_does_are_none_of_it(known: store.Family):
+    scene = mca.make_scene("rod_on_wall", v=3.0)
+    assert store.family_of(scene) == known
+    assert store.family_of(replace(scene, gravity=(0.0, -9.8, 0.0))) is None
+    assert store.family_of(mca.make_scene("rod_on_wall", rho=1000.0)) is None
+
+
+def test_files_of_the_store_that_cannot_be_read_are_named(known: store.Family):
+    (store.user_folder() / "other.json").write_text("{}")
+    with pytest.raises(mca.RequestError, match=r"other\.json"):
+        store.families()
+
+
+def test_the_package_has_measurements_of_its_own():
+    for family in store._read(store.OWN).values():
+        assert len(family.sizes) == len(family.variants)
+        assert min(size.steps * size.elements * size.computed for size in family.sizes) > 0.0
+        for variant in family.variants:
+            variant.applied(mca.make_scene(family.scene))
+
+
+def test_point_and_line_loads_have_no_limit():
+    assert without_limit(mca.make_scene("two_link", joint_nodes="pin")) == {}
+    for nodes in ("ends", "axis"):
+        found = without_limit(mca.make_scene("two_link", joint_nodes=nodes))
+        assert set(found) == {"impulse", "contact_duration", "max_plastic_strain"}
+
+
+def fake(scene: mca.Scene, order: float = 1.5, share: float = 0.0, **options: object) -> mca.Result:
+    """A run whose first peak is 100 N (1 + 0.02 / R^order), whose other figures are exact, with a share of springs."""
+    peak = 100.0 * (1.0 + 0.02 * scene.refine**-order)
+    summary = {
+        "F_n_peaks": [[1e-4, peak]],
+        "contact_duration": 1e-3,
+        "max_plastic_strain": 0.0,
+        "contact_spring_share": {"it": share},
+        "n_elements": 100,
+        "n_steps": 100,
+    }
+    return mca.Result(summary, {"time_s": np.array([1e-3]), "F_n_N": np.array([50.0])})
+
+
+@pytest.mark.parametrize("asked", [0.005, 0.01, 0.02])
+def test_pilots_find_the_mesh_and_the_error(asked: float):
+    scene = mca.make_scene("rod_on_wall")
+    found = run_pilots(scene, Accuracy(share=asked), BOUND, fake)
+    refine = found.variant.refine
+    assert refine is not None
+    true = 0.02 * refine**-1.5
+    assert 0.25 * asked < true < asked
+    estimate = found.estimate(fake(found.variant.applied(scene)))
+    assert estimate["F_n_first_peak"] == pytest.approx(true, rel=0.05)
+    assert estimate["impulse"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_second_pilot_is_the_run_where_it_is_accurate_enough():
+    found = run_pilots(mca.make_scene("rod_on_wall"), Accuracy(share=0.2), BOUND, fake)
+    assert found.variant.refine == LEVELS[1]
+    assert found.result is not None
+
+
+def test_what_cannot_be_had_is_refused_with_what_can():
+    scene = mca.make_scene("rod_on_wall")
+    with pytest.raises(mca.RequestError, match=r"about 0\.3% can be had"):
+        run_pilots(scene, Accuracy(share=0.001), BOUND, fake)
+    with pytest.raises(mca.RequestError, match=r"refine = 0\.5"):
+        run_pilots(scene, Accuracy(share=0.01, typed={"refine": 0.5}), BOUND, fake)
+    soft = Accuracy(share=0.02, typed={"penalty": 0.1})
+    with pytest.raises(mca.RequestError, match=r"penalty = 0\.1"):
+        run_pilots(scene, soft, BOUND, lambda scene, **options: fake(scene, share=0.5))
+
+
+def test_springs_are_made_stiffer_than_the_accuracy_needs():
+    def springs(scene: mca.Scene, **options: object) -> mca.Result:
+        return fake(scene, share=0.1 / float(scene.contacts[0].penalty or 1.0))  # pyright: ignore[reportArgumentType]
+
+    found = run_pilots(mca.make_scene("rod_on_wall", penalty=1.0), Accuracy(share=0.02), BOUND, springs)
+    assert found.variant.parameters["penalty"] == pytest.approx(0.3 * 0.1 / (0.3 * 0.02), rel=0.02)
+
+
+def test_a_run_tells_its_error_and_can_be_repeated(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Pilots of a coarse ball; then the command that the summary gives."""
+    first, second = tmp_path / "first", tmp_path / "second"
+    settings = ["--set", "nu=0.31", "--set", "rho=7000"]
+    assert main(["run", "hertz_sphere", *settings, "--accuracy", "12%", "--out", str(first), "--threads", "1"]) == 0
+    said = capsys.readouterr()
+    assert "accuracy 0.12: refine" in said.err
+    assert "no body yields" in said.err
+    assert "estimate" in said.out
+    accuracy = json.loads((first / "summary.json").read_text())["accuracy"]
+    assert accuracy["asked"] == 0.12
+    assert 0.0 <= accuracy["estimate"]["F_n_first_peak"] < 0.12
+    assert accuracy["estimate"]["max_plastic_strain"] is None
+    words = shlex.split(accuracy["command"])[1:]
+    assert main([*words, "--out", str(second), "--threads", "1"]) == 0
+    assert (first / "history.csv").read_bytes() == (second / "history.csv").read_bytes()
+
+
+def test_accuracy_is_refused_where_it_means_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    out = ["--out", str(tmp_path / "out")]
+    for words, told in (
+        (["run", "two_link", "--accuracy", "0%"], "accuracy = "),
+        (["run", "two_link", "--model", "full"], "--model"),
+        (["run", "two_link", "--accuracy", "2%", "--set", "t_end=1.0"], "t_end"),
+        (["run", "two_link", "--accuracy", "2%", "--sweep", "mu=0.1,0.2"], "--accuracy"),
+        (["run", "ringing_bar", "--accuracy", "2%"], "contacts"),
+    ):
+        assert main([*words, *out]) == 2
+        assert told in capsys.readouterr().err
+    scene = mca.make_scene("rod_on_wall")
+    with pytest.raises(mca.RequestError, match="finished meshes"):
+        mca.run(scene, accuracy=0.02, meshes=mca.mesh(scene))

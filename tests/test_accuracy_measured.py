@@ -1,0 +1,87 @@
+"""Tests how choices of `--accuracy` are measured and judged, and that docs/accuracy.md shows what was measured."""
+
+from __future__ import annotations
+
+import json
+import random
+from typing import Any
+
+import pytest
+
+import warp_mca as mca
+from benchmarks.accuracy import JSON, PAGE
+from benchmarks.accuracy_calibrate import calibrated
+from benchmarks.accuracy_families import FAMILIES
+from benchmarks.accuracy_judge import cost_ratio, counts, judged, render
+from benchmarks.accuracy_measure import FAMILY, FINE, sampled, stored, truth_of, variant_of
+from warp_mca.geometry.refinement import refined
+
+ROD = FAMILY["rod_on_wall"]  # extrapolated with order 1, its first peak has no limit
+
+
+def row(refine: float, error: float = 0.0, **more: Any) -> dict[str, Any]:
+    """A run with an impulse of 2 (1 + 0.1 / R + error) N s."""
+    size = {"elements": int(600 * refine**3), "steps": int(200 * refine), "computed": 1.0, "refine": refine}
+    return {"figures": [None, 2.0 * (1.0 + 0.1 / refine + error), 1e-3], **size, **more}
+
+
+TABLE = {FINE: row(5.0), **{k: row(item.refine or 1.0) for k, item in enumerate(ROD.variants)}}
+
+
+def run(refine: float, asked: float, estimate: float, deciding: float = 0.1) -> dict[str, Any]:
+    shares = {"F_n_first_peak": None, "impulse": estimate, "contact_duration": None}
+    return row(refine, asked=asked, estimate=shares, deciding=deciding)
+
+
+def test_references_are_extrapolated_with_the_order_of_the_family():
+    truth = truth_of(ROD, TABLE)
+    assert truth is not None
+    assert truth[0] is None
+    assert truth[1:] == pytest.approx([2.0, 1e-3], rel=1e-12)
+    assert truth_of(ROD, {0: row(0.5)}) is None
+
+
+def test_choices_are_judged_by_true_errors_estimates_and_cost():
+    good, poor = run(2.8, 0.06, 0.04), run(1.0, 0.06, 0.02, deciding=0.5)
+    scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
+    other = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [poor, run(2.8, 0.1, 0.9)], "cuda:0")
+    assert scene["runs"][0]["worst"] == pytest.approx(0.1 / 2.8)
+    assert scene["runs"][0]["cheapest"][1] == 4  # refine 2.0: 0.1 / 2.0 is within 6 %, 0.1 / 1.4 is not
+    found = list(counts({"scenes": [scene, other]}).values())
+    assert found == [(2, 3), (3, 3), (2, 3), (1, 3), (2, 3)]
+    assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
+
+
+def test_what_is_stored_can_be_chosen_from():
+    """Errors of 10 % / R, equal in all scenes: no care is needed beyond the least."""
+    scenes = sampled(ROD, 1, 6)
+    data = stored(ROD, scenes, dict.fromkeys(range(6), TABLE))
+    assert [item["errors"][1] for item in data["scenes"][0]["runs"]] == pytest.approx(
+        [0.1 / (item.refine or 1.0) for item in ROD.variants], abs=1e-5
+    )
+    json.dumps(data)
+    found = calibrated("rod_on_wall", data)
+    assert found["spreads"] == 0.3
+    assert 0.5 <= found["scale"] <= 1.4
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.scene)
+def test_families_are_made_of_scenes_and_variants_that_exist(family: Any):
+    values = {**family.fixed, **family.sample(random.Random(3))}
+    scene = mca.make_scene(family.scene, **values)
+    for number in (FINE, 0, family.partner):
+        made = variant_of(family, number).applied(scene)
+        assert all(hasattr(refined(body.name, body.geometry, made.refine), "build") for body in made.bodies)
+
+
+def test_the_page_shows_what_was_measured():
+    page = PAGE.read_text(encoding="utf-8")
+    if JSON.exists():
+        assert page == render(page, json.loads(JSON.read_text(encoding="utf-8")))
+    data = {
+        "device": "it",
+        "scenes": [judged(ROD, {"v": 1.5}, TABLE, [None, 2.0, 1e-3], [run(2.8, 0.05, 0.04)], "cpu")],
+    }
+    shown = render(page, data)
+    assert "| `rod_on_wall` v=1.5 | 5% | none | +3.6 % (est. 4.0 %) | +0.0 % |" in shown
+    assert render(shown, data) == shown

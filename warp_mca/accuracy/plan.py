@@ -1,0 +1,227 @@
+"""Owns what a run with an accuracy does: the model that was chosen, why, and the errors that are estimated after it."""
+
+from __future__ import annotations
+
+import logging
+import shlex
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from warp_mca.accuracy.catalogued import source_of
+from warp_mca.accuracy.choice import Choice, choices
+from warp_mca.accuracy.figures import BOUND, figures_of
+from warp_mca.accuracy.hinges import without_limit
+from warp_mca.accuracy.pilots import Pilots, run_pilots
+from warp_mca.accuracy.request import Accuracy, accuracy_of
+from warp_mca.accuracy.store import Family, family_of
+from warp_mca.accuracy.variant import Variant
+from warp_mca.base.errors import bad_value
+from warp_mca.runs.advice import LOGGER
+from warp_mca.runs.rate_groups import cost_of
+from warp_mca.scene import Scene
+from warp_mca.scene.materials import Elastic, J2Bilinear
+
+if TYPE_CHECKING:
+    from warp_mca.results.result import Result
+
+FIGURES = (*BOUND, "max_plastic_strain")  # of `accuracy.estimate` in summary.json
+NAMES = {
+    "F_n_first_peak": "first peak of F_n",
+    "impulse": "impulse",
+    "contact_duration": "contact duration",
+    "max_plastic_strain": "greatest plastic strain",
+}
+STRAIN = "it grows without bound at the edge of the contact as cells shrink"
+
+Run = Callable[..., "Result"]  # a scene, and options of `warp_mca.run`
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """The model of a scene that was chosen for an accuracy.
+
+    Attributes:
+        scene: as modelled.
+        variant: what was chosen.
+        asked: accuracy.
+        why: it was chosen, in one sentence.
+        reasons: figures that the accuracy does not bind, with the reason.
+        expected: error of each bound figure of the family [-]; empty with pilots.
+        pilots: coarse runs of the scene, or None.
+        wall: that deciding took [s].
+    """
+
+    scene: Scene
+    variant: Variant
+    asked: Accuracy
+    why: str
+    reasons: Mapping[str, str]
+    expected: Mapping[str, float] = field(default_factory=dict)
+    pilots: Pilots | None = None
+    wall: float = 0.0
+
+    @property
+    def ready(self) -> Result | None:
+        """The result, if the finest pilot is accurate enough."""
+        return self.pilots.result if self.pilots else None
+
+    def judged(self, result: Result) -> Result:
+        """The result with `accuracy` in its summary: estimated errors, what was chosen, and how to run it again."""
+        found = figures_of(result)
+        estimate = self.pilots.estimate(result) if self.pilots else self.expected
+        share: dict[str, float | None] = dict.fromkeys(FIGURES)
+        reasons = dict(self.reasons)
+        for name in FIGURES:
+            value = estimate.get(name, "it was not measured")
+            if name in reasons:
+                continue
+            if found[name] is None:
+                reasons[name] = "the run has no such figure"
+            elif isinstance(value, str):
+                reasons[name] = value
+            else:
+                share[name] = value
+        precision, groups = result.summary["precision"], result.summary.get("multi_rate")
+        accuracy = {
+            "asked": self.asked.share,
+            "estimate": share,
+            "reasons": reasons,
+            "chosen": {**self.variant.knobs, "multi_rate": groups, "precision": precision},
+            "why": self.why,
+            "deciding": self.wall,
+            "command": command(self.scene, precision, groups, result.summary),
+        }
+        return replace(result, summary={**result.summary, "accuracy": accuracy})
+
+
+def planned(
+    scene: Scene,
+    accuracy: float | str | Accuracy | None,
+    typed: Mapping[str, object],
+    device: str,
+    meshes: object,
+    run: Run,
+) -> Plan | None:
+    """Choose how to model a scene, and say so; None without an accuracy.
+
+    Args:
+        scene: as its user wrote it.
+        accuracy: as `warp_mca.run` takes it.
+        typed: options of the run that must stay, unless they are None.
+        device: as "cpu" or "cuda:0".
+        meshes: finished ones that the run is given, or None.
+        run: makes coarse runs of the scene.
+
+    Raises:
+        RequestError: what is asked cannot be had, or contradicts what was typed.
+    """
+    if accuracy is None:
+        return None
+    begin, asked = time.perf_counter(), accuracy_of(accuracy).keeping(**typed)
+    _check(scene, asked, meshes is not None)
+    reasons = {**without_limit(scene), **_without_strain(scene)}
+    family = family_of(scene)
+    reasons = {**(family.no_limit if family else {}), **reasons}
+    bound = [name for name in BOUND if name not in reasons]
+    found = _from_family(family, scene, asked, reasons, bound, device) if family else None
+    found = found or _from_pilots(scene, asked, reasons, bound, run)
+    logger = logging.getLogger(LOGGER)
+    logger.info("%s", f"accuracy {asked.share:.3g}: {found.why}")
+    for name, why in found.reasons.items():
+        logger.info("%s", f"accuracy {asked.share:.3g} does not bind the {NAMES[name]}: {why}")
+    own = found.pilots.wall if found.pilots and found.ready else 0.0  # the pilot that is the run did not decide
+    return replace(found, wall=time.perf_counter() - begin - own)
+
+
+def _check(scene: Scene, asked: Accuracy, finished_meshes: bool) -> None:
+    if scene.t_end is not None:
+        raise bad_value("Scene.t_end", scene.t_end, "an accuracy is that of one impact; leave one of the two out")
+    fixed = [body.name for body in scene.bodies if not hasattr(body.geometry, "refined")]
+    if fixed or finished_meshes:
+        what = f"cells of {', '.join(fixed) or 'finished meshes'} cannot be made smaller or larger"
+        raise bad_value("accuracy", asked.share, f"{what}; give recipes such as warp_mca.Rod, or leave accuracy out")
+    if not scene.contacts:
+        raise bad_value("accuracy", asked.share, "it binds figures of contacts, and the scene has none; leave it out")
+
+
+def _without_strain(scene: Scene) -> Mapping[str, str]:
+    yields = any(isinstance(item, J2Bilinear) for body in scene.bodies for item in _materials(body.material))
+    return {"max_plastic_strain": STRAIN if yields else "no body yields"}
+
+
+def _materials(material: Elastic | Mapping[str, Elastic]) -> Sequence[Elastic]:
+    return list(material.values()) if isinstance(material, Mapping) else [material]
+
+
+def _from_family(
+    family: Family, scene: Scene, asked: Accuracy, reasons: Mapping[str, str], bound: Sequence[str], device: str
+) -> Plan | None:
+    """By what scenes of the same family have shown; None where no variant is accurate enough."""
+    cpu = device.startswith("cpu")
+    found = choices(family, scene.parameters, asked, bound, cost_of(device), cpu)
+    within = [item for item in found if item.greatest <= asked.share]
+    if not within:
+        return None
+    chosen = within[0]
+    variant = replace(chosen.variant, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
+    return Plan(
+        scene=variant.applied(scene),
+        variant=variant,
+        asked=asked,
+        why=_why(chosen, found, len(family.scenes), family.sizes[chosen.number].elements),
+        reasons=reasons,
+        expected={name: family.scale * error.size for name, error in chosen.errors.items() if error is not None},
+    )
+
+
+def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float) -> str:
+    """One sentence: what is chosen among which variants, the errors expected, and the next cheaper one's."""
+    errors = ", ".join(f"{NAMES[name]} {error.size:.1%}" for name, error in chosen.errors.items() if error)
+    cheaper = found[: found.index(chosen)]
+    beside = ""
+    if cheaper and any(cheaper[-1].errors.values()):
+        name, error = max(
+            cheaper[-1].errors.items(), key=lambda item: item[1].bound(chosen.spreads) if item[1] else 0.0
+        )
+        if error is not None:
+            beside = f"; the next cheaper one may miss the {NAMES[name]} by {error.bound(chosen.spreads):.1%}"
+    return (
+        f"refine {chosen.variant.refine:.3g} with {elements:,.0f} elements is the cheapest of {len(found)} variants "
+        f"that {scenes} scenes like this one allow; errors expected: {errors}{beside}"
+    )
+
+
+def _from_pilots(scene: Scene, asked: Accuracy, reasons: Mapping[str, str], bound: Sequence[str], run: Run) -> Plan:
+    """By coarse runs of the scene itself.
+
+    Raises:
+        RequestError: what is asked cannot be had, or contradicts what was typed.
+    """
+    found = run_pilots(scene, asked, bound, run)
+    made = found.variant.applied(scene)
+    return Plan(scene=made, variant=found.variant, asked=asked, why=found.why, reasons=reasons, pilots=found)
+
+
+def command(scene: Scene, precision: str, groups: int | None, summary: Mapping[str, Any]) -> str | None:
+    """The command that gives the run again without `--accuracy`; None for scenes that the catalogue does not have."""
+    source = source_of(scene)
+    if source is None:
+        return None
+    words = ["warp-mca", "run", scene.name]
+    plain = source.resolve(None)
+    for name, value in scene.parameters.items():
+        if value != plain.get(name):
+            words += ["--set", f"{name}={value}"]
+    more = {
+        "refine": scene.refine,
+        "mass-scaling": scene.impact.mass_scaling,
+        "multi-rate": groups,
+        "precision": precision,
+        "device": str(summary["device"]).split(" ")[0],
+    }
+    words += [word for name, value in more.items() if value is not None for word in (f"--{name}", str(value))]
+    if abs(summary["simulated_time"] / scene.impact.duration - 1.0) > 1e-9:
+        words += ["--duration", str(summary["simulated_time"])]
+    return shlex.join(words)

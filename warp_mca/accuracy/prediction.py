@@ -1,0 +1,109 @@
+"""Owns what measured scenes tell of another one: expected errors of each variant there, and how uncertain they are.
+
+Errors of one figure of one variant are a Gaussian process over the features x of a scene (Rasmussen and Williams,
+Gaussian Processes for Machine Learning, 2.2 and 5.4.2): with the mean m of all scenes and their variance s^2,
+
+    k(x, y) = s^2 exp(-|x - y|^2 / (2 l^2)),  K = k(X, X) + n^2 I,
+    e(x) = m + k(x, X) K^-1 (e - m),   var(x) = s^2 - k(x, X) K^-1 k(X, x) + n^2
+
+with the length l under which each measured scene would have been foreseen best from the others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.accuracy.store import Family
+
+Array = NDArray[np.float64]
+
+NOISE = 2e-3  # error of the references themselves [-]
+LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
+FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
+NEAR = 0.02  # distance from the median within which it is none [-]
+FEWEST = 4  # scenes from which anything is foreseen
+
+
+@dataclass(frozen=True)
+class Expected:
+    """An error that is expected.
+
+    Attributes:
+        mean: signed [-].
+        spread: standard deviation [-].
+    """
+
+    mean: float
+    spread: float
+
+    @property
+    def size(self) -> float:
+        """Root of the expected square [-]."""
+        return math.hypot(self.mean, self.spread)
+
+    def bound(self, spreads: float) -> float:
+        """Size of the error that many standard deviations from the mean [-]."""
+        return abs(self.mean) + spreads * self.spread
+
+
+def expected_errors(
+    family: Family, parameters: Mapping[str, object], variant: int, figures: Sequence[str]
+) -> dict[str, Expected | None]:
+    """Error of each figure of a variant in a scene of the family; None where too few scenes tell."""
+    return {name: _expected(family, parameters, variant, name) for name in figures}
+
+
+def _expected(family: Family, parameters: Mapping[str, object], variant: int, figure: str) -> Expected | None:
+    rows = [(scene, (scene.errors.get(variant) or {}).get(figure)) for scene in family.scenes]
+    known = [(scene, error) for scene, error in rows if error is not None]
+    if len(known) < FEWEST:
+        return None
+    points = np.array([family.coordinates(scene.parameters) for scene, _ in known])
+    here = np.array(family.coordinates(parameters))
+    scale = np.maximum(points.std(axis=0), 1e-12 + 1e-3 * np.abs(points).max(axis=0))
+    return gaussian_process(points / scale, np.array([error for _, error in known]), here / scale)
+
+
+def gaussian_process(points: Array, errors: Array, here: Array) -> Expected:
+    """What values at scaled points tell of another point.
+
+    Args:
+        points: features of the measured scenes [-], shape (count, feature_count).
+        errors: measured there [-], shape (count,).
+        here: features of the scene in question [-], shape (feature_count,).
+    """
+    errors = _without_outliers(errors)
+    middle = float(np.mean(errors))
+    about = errors - middle
+    variance = float(np.mean(about**2)) + NOISE**2
+    squares = ((points[:, None] - points[None]) ** 2).sum(axis=2)
+    lengths = [scale * math.sqrt(points.shape[1]) for scale in LENGTHS]
+    length = max(lengths, key=lambda item: _likelihood(squares, about, variance, item))
+    K = _covariance(squares, variance, length)
+    k = variance * np.exp(-((points - here) ** 2).sum(axis=1) / (2.0 * length**2))
+    weights = np.linalg.solve(K, k)
+    left = max(variance - float(k @ weights), 0.0) + NOISE**2
+    return Expected(middle + float(weights @ about), math.sqrt(left))
+
+
+def _without_outliers(errors: Array) -> Array:
+    """Errors; those far off, where another peak was taken for the first, say, are moved to the edge of the others."""
+    middle = float(np.median(errors))
+    reach = max(FAR * 1.4826 * float(np.median(np.abs(errors - middle))), NEAR)  # 1.4826: of a normal distribution
+    return np.clip(errors, middle - reach, middle + reach)
+
+
+def _covariance(squares: Array, variance: float, length: float) -> Array:
+    return variance * np.exp(-squares / (2.0 * length**2)) + NOISE**2 * np.eye(len(squares))
+
+
+def _likelihood(squares: Array, about: Array, variance: float, length: float) -> float:
+    """Logarithm of the probability of each value, given all others, summed up (Rasmussen and Williams, 5.10)."""
+    inverse = np.linalg.inv(_covariance(squares, variance, length))
+    own = 1.0 / np.diag(inverse)
+    return float(-0.5 * (np.log(own) + (inverse @ about) ** 2 * own).sum())

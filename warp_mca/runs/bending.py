@@ -1,0 +1,145 @@
+"""Owns what the shape of bodies says of bending in a run: strain energy that cells too long or too few spend on it.
+
+A trilinear hexahedron of all integration points cannot bend without shear: displacements u_j = q xi_j xi_k along its
+edge j give the strain q xi_k / a_j that bending asks for, and a shear q xi_j / a_k that it does not. Linear tetrahedra
+bend in steps: their strain jumps from cell to cell about the mean of neighbours.
+Parasitic shear: Hughes, The Finite Element Method (1987), section 4.4; jumps about recovered strain: Zienkiewicz and
+Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.geometry.hexahedron import CORNERS
+from warp_mca.geometry.tetrahedron import gradients, volumes
+
+if TYPE_CHECKING:
+    from warp_mca.model.assembly import Block
+    from warp_mca.model.model import Model
+
+Array = NDArray[np.float64]
+
+SHARE = 0.2  # of a body's strain energy from which on a word is said: bending frequencies are then 12 % too high
+SAMPLE = 4096  # hexahedra of a body that are looked at, evenly spread
+MOST = 200_000  # tetrahedra of a body that are looked at: of more, none
+LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
+LOOKS = 8  # in a run, besides that at its end
+
+
+def seen(model: Model, u: Array, before: Array) -> Array:
+    """Energies of each body as `SceneRecords.stiffened` has them, of the shape with more strain energy.
+
+    Args:
+        model: of the scene alone.
+        u: displacements [m], shape (node_count, 3), float64.
+        before: what was seen before, shape (body_count, 2), float64, or empty.
+    """
+    found = _energies(model, u)
+    before = before if len(before) else np.zeros_like(found)
+    return np.where(found[:, 1:] > before[:, 1:], found, before)  # not-a-number is not greater
+
+
+def bending_warnings(model: Model, stiffened: Array, exchanged: float) -> Iterator[str]:
+    """A sentence for each body whose cells bend too stiffly, of the scene alone, which exchanged so much energy [J]."""
+    element = {name: block.element for block in model.blocks for name in _bodies(model, block)}
+    for name, (wasted, energy) in zip(model.element_start, stiffened, strict=True):
+        if energy > LEAST * exchanged and wasted > SHARE * energy:
+            yield (
+                f"{wasted / energy:.0%} of the strain energy of {name} lay {_WHERE[element[name]]} when it was "
+                "greatest: the body is about that much too stiff, as it moved then; choose hex8r, or smaller cells"
+            )
+
+
+def _bodies(model: Model, block: Block) -> list[str]:
+    """Names of the bodies that have elements in a block."""
+    names = np.array(list(model.element_start))
+    return names[np.unique(_body_of(model, block))].tolist()
+
+
+def _body_of(model: Model, block: Block) -> NDArray[np.intp]:
+    """Number of the body of each element of a block, in the order of `Model.element_start`."""
+    own = model.element_of[block.first : block.first + block.conn.shape[1]]
+    start = np.array(list(model.element_start.values()))
+    order = np.argsort(start, kind="stable")
+    return order[np.searchsorted(start[order], own, side="right") - 1]
+
+
+@np.errstate(all="ignore")  # what is not a number is not above a share
+def _energies(model: Model, u: Array) -> Array:
+    """Of each body, energy that its cells spend so and strain energy of those looked at [J], shape (body_count, 2)."""
+    found = np.zeros((len(model.element_start), 2))
+    if not np.isfinite(u).all():
+        return found
+    for block in model.blocks:
+        if block.element not in _ENERGIES:
+            continue
+        body = _body_of(model, block)
+        for k, material in np.unique(np.column_stack([body, block.material]), axis=0):
+            part = (body == k) & (block.material == material)
+            K, G = model.law[material, :2]
+            found[k] += _ENERGIES[block.element](model.X, u, block.conn[:, part].T, K, G)
+    return found
+
+
+def _turned_back(F: Array) -> tuple[Array, Array]:
+    """Rotation R of each gradient F of the motion and the strain of R^T F, shape (count, 3, 3) both."""
+    W, _, V = np.linalg.svd(F)
+    R = W @ V
+    stretch = R.transpose(0, 2, 1) @ F
+    return R, 0.5 * (stretch + stretch.transpose(0, 2, 1)) - np.eye(3)
+
+
+def _hexahedra(X: Array, u: Array, conn: NDArray[np.int32], K: float, G: float) -> tuple[float, float]:
+    """Energy in parasitic shear and all strain energy [J] of cells of one material."""
+    count = len(conn)
+    conn = conn[:: -(-count // SAMPLE)]
+    before, after = X[conn], X[conn] + u[conn]
+    linear = CORNERS.T / 8.0
+    T = (linear @ before).transpose(0, 2, 1)  # columns: halves of the edges
+    R, strain = _turned_back((linear @ after).transpose(0, 2, 1) @ np.linalg.inv(T))
+    half = np.linalg.norm(T, axis=1)
+    edge = T / half[:, None]
+    theta = np.trace(strain, axis1=1, axis2=2)
+    energy = 0.5 * K * theta**2 + G * ((strain**2).sum(axis=(1, 2)) - theta**2 / 3.0)
+    wasted = np.zeros(len(conn))
+    E = 9.0 * K * G / (3.0 * K + G)
+    for j, k in ((0, 1), (1, 2), (2, 0)):
+        mode = CORNERS[:, j] * CORNERS[:, k] / 8.0
+        q = np.einsum("eij,ei->ej", R, mode @ after) - mode @ before
+        for a, b in ((j, k), (k, j)):
+            along = (q * edge[:, :, a]).sum(axis=1)
+            energy += E * (along / half[:, a]) ** 2 / 6.0  # 1 / 2 of the mean over the cell of (strain xi)^2
+            wasted += G * (along / half[:, b]) ** 2 / 6.0
+    volume = 8.0 * np.abs(np.linalg.det(T)) * (count / len(conn))
+    return float((volume * wasted).sum()), float((volume * (energy + wasted)).sum())
+
+
+def _tetrahedra(X: Array, u: Array, conn: NDArray[np.int32], K: float, G: float) -> tuple[float, float]:
+    """Energy in jumps of strain between cells and all strain energy [J] of cells of one material."""
+    if len(conn) > MOST:
+        return 0.0, 0.0
+    volume = np.abs(volumes(X[conn]))
+    _, strain = _turned_back(np.eye(3) + np.einsum("eai,eaj->eij", u[conn], gradients(X[conn])))
+    theta = np.trace(strain, axis1=1, axis2=2)
+    deviator = strain - theta[:, None, None] / 3.0 * np.eye(3)
+    node, corner = np.unique(conn, return_inverse=True)
+    corner = corner.reshape(conn.shape)
+    total, weight = np.zeros((len(node), 3, 3)), np.zeros(len(node))
+    for k in range(4):
+        np.add.at(total, corner[:, k], volume[:, None, None] * strain)
+        np.add.at(weight, corner[:, k], volume)
+    mean = (total / weight[:, None, None])[corner].mean(axis=1)
+    theta = np.trace(mean, axis1=1, axis2=2)  # tet4 takes the mean dilatation around its nodes
+    mean -= theta[:, None, None] / 3.0 * np.eye(3)
+    energy = 0.5 * K * theta**2 + G * (deviator**2).sum(axis=(1, 2))
+    wasted = G * ((deviator - mean) ** 2).sum(axis=(1, 2))
+    return float((volume * wasted).sum()), float((volume * energy).sum())
+
+
+_ENERGIES = {"hex8": _hexahedra, "tet4": _tetrahedra}
+_WHERE = {"hex8": "in shear that long cells of hex8 add to bending", "tet4": "in jumps of strain between cells of tet4"}
