@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, run, sweep, tradeoff
+from warp_mca.cli import commands, paper, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.elements import ELEMENTS
 from warp_mca.runs.checkpoint import METHODS
@@ -49,6 +49,7 @@ def make_parser() -> argparse.ArgumentParser:
     _build(add("build", help="make the meshes of a scene and store them with it"))
     _scenes(add("scenes", help="list scenes, presets and parameters"))
     _view(add("view", help="open a recording in the rerun viewer"))
+    _paper(add("paper", help="run the published study again, and put its claims beside ours"))
     _verify(add("verify", help="measure the engine against known answers"))
     return parser
 
@@ -150,6 +151,11 @@ def _scenes(parser: argparse.ArgumentParser) -> None:
 def _view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", metavar="DIR_OR_FILE", type=Path, help=".rrd file, or a folder that holds some")
     parser.set_defaults(command=commands.view)
+
+
+def _paper(parser: argparse.ArgumentParser) -> None:
+    _add_device(parser)
+    paper.add_options(parser)
 
 
 def _verify(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,150 @@
+"""The report on the published study: runs, claims, pictures and pages, in a small form of its levels."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from warp_mca.base.errors import RequestError
+from warp_mca.cli.main import main
+from warp_mca.paper import studies
+from warp_mca.paper.claim_table import CLAIMS
+from warp_mca.paper.claims import Claim, Words, judge
+from warp_mca.paper.evidence import MissingRunError, Runs
+from warp_mca.paper.page import Page, as_html, as_markdown
+from warp_mca.paper.pictures import PICTURES
+from warp_mca.paper.report import Report, make_report
+from warp_mca.paper.studies import LEVELS, MAIN, MESH, PENALTY, STUDIES, MeshChoice, cases
+from warp_mca.results.storage import load
+
+DOCS = Path(__file__).parent.parent / "docs"
+COARSE = MeshChoice("quick", refine=0.5)
+SMALL = replace(
+    LEVELS["quick"],
+    main=COARSE,
+    other=COARSE,
+    meshes=(),
+    limit=(),
+    points={"mu": (0.1, 1.5)},
+    ends={"mu": ()},
+    choices=None,
+)
+
+
+def runs_of(level: studies.Level) -> Runs:
+    """No run of a level."""
+    return Runs(level, {}, {}, {}, "cpu")
+
+
+def report_of(level: studies.Level, out: Path) -> Report:
+    """A report on runs of the study of friction that end after 10 us."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(STUDIES, "mu", replace(STUDIES["mu"], common=(("duration", 10e-6),)))
+        return make_report(level, out, workers=1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("paper")
+    report = report_of(SMALL, out)
+    assert [row["status"] for row in report.rows] == ["done", "done"]
+    return out
+
+
+def test_json_has_every_claim_and_figure(folder: Path):
+    found = json.loads((folder / "paper.json").read_text(encoding="utf-8"))
+    assert [claim["id"] for claim in found["claims"]] == [claim.id for claim in CLAIMS]
+    assert {"id", "what", "paper", "ours", "unit", "agrees", "why"} <= set(found["claims"][0])
+    assert {picture.number for picture in PICTURES} <= set(found["figures"])
+    assert [row["mu"] for row in found["figures"]["14"]] == [0.1, 1.5]
+    assert all(
+        claim["ours"] is None and claim["agrees"] is None for claim in found["claims"] if "Table 2" in claim["source"]
+    )
+
+
+def test_the_command_of_a_row_gives_it_again(folder: Path, tmp_path: Path):
+    row = json.loads((folder / "paper.json").read_text(encoding="utf-8"))["figures"]["14"][0]
+    assert main([*row["command"].split()[1:], "--out", str(tmp_path / "again")]) == 0
+    again = load(tmp_path / "again").summary
+    assert {key: row[key] for key in ("F_n_max", "F_t_min", "n_steps")} == {
+        key: again[key] for key in ("F_n_max", "F_t_min", "n_steps")
+    }
+
+
+def test_it_continues_in_its_folder(folder: Path):
+    table, before = folder / "runs" / "sweep.csv", (folder / "paper.json").read_bytes()
+    lines = table.read_text(encoding="utf-8").splitlines(keepends=True)
+    table.write_text("".join(lines[:2]) + lines[2][:40], encoding="utf-8")  # killed while it wrote the second row
+    kept = (folder / "runs" / "0" / "summary.json").stat().st_mtime_ns
+    report_of(SMALL, folder)
+    assert (folder / "paper.json").read_bytes() == before
+    assert (folder / "runs" / "0" / "summary.json").stat().st_mtime_ns == kept
+
+
+def test_another_level_needs_another_folder(folder: Path):
+    with pytest.raises(RequestError, match="out"):
+        report_of(replace(SMALL, points={"mu": (0.1, 1.0)}), folder)
+
+
+def test_the_pages_show_the_same_and_need_nothing_else(folder: Path):
+    page, text = ((folder / name).read_text(encoding="utf-8") for name in ("paper.html", "paper.md"))
+    assert "<img" in page and not re.search(r'(src|href)="(?!data:)', page)
+    for name in re.findall(r"\]\((images/\S+)\)", text):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    for claim in CLAIMS:
+        assert f"| {claim.what} |" in text
+
+
+def test_a_number_agrees_within_its_tolerance():
+    def claim(ours: float) -> Claim:
+        return Claim("c", "s", "w", 2.0, lambda e: ours if e.variant == MAIN else 1.2 * ours, "N", 0.1, "soft springs")
+
+    near, far = judge([claim(2.1), claim(2.3)], runs_of(SMALL))
+    assert (near.agrees, near.why) == (True, "+5.0 %, within 10 %; unsure, as another mesh changes it")
+    assert (far.agrees, far.why) == (False, "+15.0 %, beyond 10 %: soft springs; unsure, as another mesh changes it")
+    assert near.mesh_change == pytest.approx(0.2)
+    assert near.penalty_change == pytest.approx(0.0)
+
+
+def test_words_that_change_with_the_mesh_are_shown():
+    claim = Claim("c", "s", "w", "rises", lambda e: Words(e.variant, e.variant == MAIN))
+    (verdict,) = judge([claim], runs_of(SMALL))
+    assert (verdict.ours, verdict.agrees, verdict.mesh_change, verdict.penalty_change) == (MAIN, True, MESH, "same")
+
+
+def test_a_claim_without_its_run_neither_agrees_nor_differs():
+    def missing(evidence: object) -> float:
+        raise MissingRunError("μ = 3 is not run at this level")
+
+    (verdict,) = judge([Claim("c", "s", "w", 2.0, missing)], runs_of(SMALL))
+    assert (verdict.ours, verdict.agrees, verdict.why) == (None, None, "μ = 3 is not run at this level")
+
+
+def test_texts_are_escaped():
+    verdicts = judge([Claim("c", "s", "a < b | c", "<", lambda e: Words("<i>", True))], runs_of(SMALL))
+    page = Page(SMALL, "", verdicts, {}, {})
+    assert '<td class="">a &lt; b | c' in as_html(page) and "<i>" not in as_html(page)
+    assert "| a < b \\| c |" in as_markdown(page)
+
+
+@pytest.mark.parametrize("level", LEVELS.values(), ids=LEVELS)
+def test_levels_run_what_the_figures_show(level: studies.Level):
+    assert {picture.study for picture in PICTURES} == {*level.points, studies.MESHES}
+    for name, values in level.points.items():
+        assert set(level.ends.get(name, values)) <= set(values)
+    found = cases(level)
+    penalties = {variant: dict(found["mu", 0.1, variant].settings).get("penalty", 0.1) for variant in (MAIN, PENALTY)}
+    assert penalties == {MAIN: 0.1, PENALTY: 0.3}
+    assert found["mu", 0.47, MAIN] == found["base", 0.0, MAIN]  # one run for both
+
+
+def test_claims_are_told_apart():
+    ids = [claim.id for claim in CLAIMS]
+    assert len(ids) == len(set(ids))
+
+
+def test_the_page_in_docs_has_every_claim():
+    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+    assert [claim.id for claim in CLAIMS if f"| {claim.what} | {claim.source} |" not in text] == []

@@ -1,0 +1,65 @@
+"""Owns the command `paper`: the published study run again, with its claims beside ours."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warp_mca.base.errors import GuardError
+from warp_mca.cli.warp_start import start_warp
+
+if TYPE_CHECKING:
+    from warp_mca.paper.report import Report
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those that it has beside device and precision."""
+    parser.add_argument(
+        "--level",
+        default="quick",
+        choices=("quick", "full"),
+        help="quick: coarse meshes, three points a figure, minutes on a CPU; full: all of it, for a GPU "
+        "(default: %(default)s)",
+    )
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one for each core or GPU)")
+    parser.add_argument("--force", action="store_true", help="start again, in place of going on with what DIR holds")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the report (default: paper-LEVEL)")
+    parser.set_defaults(command=_carry_out)
+
+
+def _carry_out(args: argparse.Namespace) -> None:
+    from warp_mca.paper.report import level_named, make_report
+    from warp_mca.report.console import progress_bar
+
+    start_warp()
+    with progress_bar() as progress:
+        report = make_report(
+            level_named(args.level),
+            args.out or Path(f"paper-{args.level}"),
+            device=args.device,
+            precision=args.precision,
+            workers=args.workers,
+            force=args.force,
+            prepare=start_warp,
+            progress=progress,
+        )
+    _print(report)
+    if failed := [row for row in report.rows if row["status"] != "done"]:
+        raise GuardError(f"{len(failed)} of {len(report.rows)} runs have no figures: {failed[0]['reason']}")
+
+
+def _print(report: Report) -> None:
+    """How many claims agree, each that does not, and the files."""
+    from warp_mca.paper.page import value_text
+    from warp_mca.report.console import console
+
+    out = console()
+    for said, state in (("agree", True), ("differ", False), ("not run at this level", None)):
+        out.print(f"{sum(verdict.agrees is state for verdict in report.verdicts):3} claims {said}")
+    for verdict in report.verdicts:
+        if verdict.agrees is False:
+            claim, ours = verdict.claim, value_text(verdict.ours, verdict.claim.unit)
+            out.print(f"differs: {claim.what}: {ours} ({verdict.why})", soft_wrap=True)
+    for file in report.files[:3]:
+        out.print(f"wrote {file}", soft_wrap=True)
