@@ -127,7 +127,7 @@ def test_mesh_file_refusals(tmp_path: Path, capfd):
 
     box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
     cases = {
-        "tetra10": [("hexahedron", box.hexahedra), ("tetra10", [[0, 1, 2, 4, 3, 5, 6, 7, 0, 1]])],
+        "tetra20": [("hexahedron", box.hexahedra), ("tetra20", [[*range(8), *range(8), 0, 1, 2, 3]])],
         "no volume cells": [("quad", box.surface("xmin")[0])],
         "nodes beyond its 8 points": [("hexahedron", box.hexahedra + 1)],
     }

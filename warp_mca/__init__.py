@@ -37,7 +37,7 @@ from warp_mca.scene import (
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
-    from warp_mca.geometry import Box, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
+    from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -51,6 +51,7 @@ __version__ = "0.1.0"
 
 _LAZY = {
     "Box": "warp_mca.geometry",
+    "Cad": "warp_mca.geometry",
     "LugRod": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
@@ -59,6 +60,7 @@ _LAZY = {
     "Parts": "warp_mca.geometry",
     "Plate": "warp_mca.geometry",
     "Rod": "warp_mca.geometry",
+    "Select": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
     "Param": "warp_mca.scene.parameters",
     "make_scene": "warp_mca.scene.catalogue",
@@ -103,6 +105,8 @@ __all__ = [
     "Sphere",
     "Plate",
     "MeshFile",
+    "Cad",
+    "Select",
     "NestedPlate",
     "Part",
     "Parts",
