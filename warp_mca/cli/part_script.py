@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -26,7 +27,7 @@ import warp_mca as mca
 
 def build(*, height: float = 0.5, mu: float = 0.2) -> mca.Scene:
     steel = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, E_t=1e9)
-    part = {part}
+    part = {part}  # {unit}
     floor, gravity = mca.RigidPlane(normal=(0.0, 0.0, 1.0)), (0.0, 0.0, -9.81)
     body = mca.Body(name="part", geometry=part, material=steel).place_on(floor, gap=1e-6).drop(height, gravity)
     return mca.Scene(
@@ -54,15 +55,20 @@ def part_script(name: str) -> str:
     """
     from warp_mca.geometry.cad import UNITS, Cad, extent
     from warp_mca.geometry.mesh_file import MeshFile
+    from warp_mca.runs.unit_warnings import LONGEST
 
     path = Path(name).resolve()
-    if path.suffix.lower() in UNITS:
-        diagonal = extent(path)
-        size = float(f"{diagonal / CELLS:.2g}")
-        mesh, part = Cad(path, size=size).build(), f"mca.Cad({str(path)!r}, size={size:g})  # scale=1e-3: millimetres"
+    is_cad = path.suffix.lower() in UNITS
+    scale = UNITS.get(path.suffix.lower(), 1.0)
+    diagonal = extent(path) if is_cad else math.hypot(*np.ptp(MeshFile(path).build().points, axis=0))
+    if scale == 1.0 and diagonal > LONGEST:  # the file names no unit
+        scale, diagonal = 1e-3, 1e-3 * diagonal
+    if is_cad:
+        part = Cad(path, size=float(f"{diagonal / CELLS:.2g}"), scale=scale)
+        code = f"mca.Cad({json.dumps(str(path))}, size={part.size:g}, scale={scale:g})"
     else:
-        mesh, part = MeshFile(path).build(), f"mca.MeshFile({str(path)!r}, scale=1.0)  # scale=1e-3: millimetres"
-        diagonal = math.hypot(*np.ptp(mesh.points, axis=0))
+        part, code = MeshFile(path, scale=scale), f"mca.MeshFile({json.dumps(str(path))}, scale={scale:g})"
+    mesh = part.build()
     centres = {key: mesh.points[nodes].mean(axis=0) for key, nodes in mesh.node_sets.items() if len(nodes)}
     rows = [f"#   {key} ({x:.4g}, {y:.4g}, {z:.4g})" for key, (x, y, z) in list(centres.items())[:SHOWN]]
     rows += [f"#   and {len(centres) - SHOWN} more"] if len(centres) > SHOWN else []
@@ -70,7 +76,8 @@ def part_script(name: str) -> str:
     return _SCRIPT.format(
         name=path.name,
         sets="\n".join(rows or ["#   none"]),
-        part=part,
+        part=code,
+        unit="millimetres" if scale == 1e-3 else "metres",
         duration=duration,
         interval=float(f"{duration:.2g}") / ROWS,
     )

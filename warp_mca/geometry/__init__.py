@@ -13,4 +13,18 @@ from warp_mca.geometry.rod import Rod
 from warp_mca.geometry.selection import Select
 from warp_mca.geometry.sphere import Sphere
 
-__all__ = ["Box", "Cad", "LugRod", "Mesh", "MeshFile", "NestedPlate", "Part", "Parts", "Plate", "Recipe", "Rod", "Select", "Sphere"]
+__all__ = [
+    "Box",
+    "Cad",
+    "LugRod",
+    "Mesh",
+    "MeshFile",
+    "NestedPlate",
+    "Part",
+    "Parts",
+    "Plate",
+    "Recipe",
+    "Rod",
+    "Select",
+    "Sphere",
+]

@@ -28,6 +28,7 @@ from warp_mca.geometry.selection import Select, check_selections, with_selection
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
 _HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest slivers
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
+_GENERIC = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
 _KEPT = 4  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
 
 
@@ -75,7 +76,7 @@ class Cad:
             RequestError: there is no such file, gmsh cannot read or mesh it, or it has no solid.
         """
         try:
-            found = os.stat(self.path)
+            found = Path(self.path).stat()
         except OSError as error:
             raise bad_value("Cad.path", str(self.path), f"{error.strerror or error}; check the path") from error
         scale = self.scale or UNITS[Path(self.path).suffix.lower()]
@@ -100,7 +101,8 @@ def extent(path: str | Path, scale: float | None = None) -> float:
 @lru_cache(maxsize=_KEPT)
 def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mesh:
     """The mesh of a file that was changed last at `stamp`: time [ns] and size [byte]."""
-    options = {"Mesh__Algorithm3D": _HXT, "Mesh__MeshSizeMax": size / scale, "Mesh__MeshSizeMin": 0.0}
+    # without a least size gmsh divides the part in ten
+    options = {"Mesh__Algorithm3D": _HXT, "Mesh__MeshSizeMax": size / scale, "Mesh__MeshSizeMin": size / scale}
     with gmsh_session(**options) as gmsh, _explained(path):
         _draw(gmsh, path)
         x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(-1, -1)
@@ -182,7 +184,9 @@ def _read(model: ModuleType, scale: float) -> Mesh:
     solids = [tag for _, tag in model.getEntities(3)]
     blocks = [model.mesh.getElementsByType(TETRAHEDRON.gmsh, tag)[1].reshape(-1, 4) for tag in solids]
     if not all(map(len, blocks)):
-        raise RequestError("gmsh left a solid without tetrahedra: repair the part in the CAD program or take another size")
+        raise RequestError(
+            "gmsh left a solid without tetrahedra: repair the part in the CAD program or take another size"
+        )
     tags, coordinates, _ = model.mesh.getNodes()
     order = np.argsort(tags)
     tags, points = tags[order], scale * coordinates.reshape(-1, 3)[order]
@@ -206,4 +210,4 @@ def _read(model: ModuleType, scale: float) -> Mesh:
 def _name(model: ModuleType, dim: int, tag: int) -> str:
     """Name of a face or a solid in the file, without those of the assemblies that it lies in; "" without one."""
     name = model.getEntityName(dim, tag).rpartition("/")[2].strip()
-    return "" if name.startswith("Open CASCADE") else name
+    return "" if name in _GENERIC or name.startswith("Open CASCADE") else name

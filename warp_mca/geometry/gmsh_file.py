@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,7 +35,8 @@ def read_by_gmsh(path: Path) -> meshio.Mesh:
         model = gmsh.model
         tags, coordinates, _ = model.mesh.getNodes()
         order = np.argsort(tags)
-        owners, cells = [], []
+        owners: list[tuple[int, int]] = []
+        cells: list[Any] = []
         for entity in [*model.getEntities(2), *model.getEntities(3)]:
             for kind, nodes in _cells(model, entity):
                 owners.append(entity)
@@ -46,8 +47,11 @@ def read_by_gmsh(path: Path) -> meshio.Mesh:
             groups.setdefault(name, []).extend((dim, int(e)) for e in model.getEntitiesForPhysicalGroup(dim, tag))
         groups = groups or {f"part_{tag}": [(dim, tag)] for dim, tag in model.getEntities(3)}
         none = np.zeros(0, dtype=np.int64)
-        sets = {
-            name: [np.arange(len(data)) if owner in members else none for owner, (_, data) in zip(owners, cells, strict=True)]
+        sets: dict[str, Any] = {
+            name: [
+                np.arange(len(data)) if owner in members else none
+                for owner, (_, data) in zip(owners, cells, strict=True)
+            ]
             for name, members in groups.items()
         }
         return meshio.Mesh(coordinates.reshape(-1, 3)[order], cells, cell_sets=sets)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,11 +52,15 @@ def read_keywords(path: Path) -> meshio.Mesh:
             _READERS[name](deck, lines)
     index = {number: k for k, number in enumerate(deck.nodes)}
     try:
-        cells = [(kind, np.array([[index[n] for n in nodes] for nodes in rows])) for kind, rows in deck.solids.items()]
-        point_sets = {name: np.array([index[n] for n in members]) for name, members in deck.sets.items() if members}
+        cells: list[Any] = [
+            (kind, np.array([[index[n] for n in nodes] for nodes in rows])) for kind, rows in deck.solids.items()
+        ]
+        point_sets: dict[str, Any] = {
+            name: np.array([index[n] for n in members]) for name, members in deck.sets.items() if members
+        }
     except KeyError as error:
         raise ValueError(f"node {error.args[0]} is used but not in *NODE") from error
-    cell_sets: dict[str, list[np.ndarray]] = {}
+    cell_sets: dict[str, Any] = {}
     for number in sorted({part for parts in deck.parts_of.values() for part in parts}):
         by_block = [np.flatnonzero(np.array(parts) == number) for parts in deck.parts_of.values()]
         before = cell_sets.get(name := deck.titles.get(number) or f"part_{number}")
@@ -74,7 +79,7 @@ def _blocks(path: Path) -> Iterator[tuple[str, list[str]]]:
             if line.startswith("*"):
                 yield keyword, lines
                 words = line[1:].upper().split() or [""]
-                if words[0][-1:] in "+%" and words[0] or (words[0] == "KEYWORD" and "LONG=" in line.upper()):
+                if words[0].endswith(("+", "%")) or (words[0] == "KEYWORD" and "LONG=" in line.upper()):
                     raise ValueError("its cards have long fields: write it in the standard format")
                 keyword, lines = words[0], []
                 if keyword == "END":
@@ -90,7 +95,7 @@ def _fields(line: str, widths: tuple[int, ...] = (10,) * 8) -> Card:
         found = line.split(",")
     else:
         ends = np.cumsum((0, *widths))
-        found = [line[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        found = [line[a:b] for a, b in pairwise(ends)]
     found = [entry.strip() for entry in found]
     while found and not found[-1]:
         found.pop()

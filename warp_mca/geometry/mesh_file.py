@@ -120,7 +120,9 @@ class MeshFile:
         count = sum(len(block.data) for block in read.cells if block.type in QUADRATIC)
         if count:
             kinds = ", ".join(sorted({block.type for block in read.cells if block.type in QUADRATIC}))
-            what = f"{self.path}: {count} quadratic cells ({kinds}) are taken as linear ones, without the nodes in edges"
+            what = (
+                f"{self.path}: {count} quadratic cells ({kinds}) are taken as linear ones, without the nodes in edges"
+            )
             logging.getLogger("warp_mca").warning("%s", what)
         for block in read.cells:
             if block.type in QUADRATIC:

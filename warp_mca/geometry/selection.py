@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 
 Vec3 = tuple[float, float, float]
+_VECTORS = ("low", "high", "point", "normal")
 _TOLERANCE = 1e-6  # share of the part's extent within which nodes count as on a plane or in a box
 
 
@@ -35,20 +36,20 @@ class Select:
     normal: Vec3 | None = None
 
     def __post_init__(self) -> None:
-        faces = (self.faces,) if isinstance(self.faces, str | int) else tuple(self.faces)
-        object.__setattr__(self, "faces", faces)
-        vectors = {key: getattr(self, key) for key in ("low", "high", "point", "normal")}
-        for key in (key for key, value in vectors.items() if value is not None):
-            validate.vectors("Select", **{key: vectors[key]})
-            object.__setattr__(self, key, tuple(float(x) for x in vectors[key]))
+        validate.plain(self)
+        if isinstance(self.faces, str | int):
+            object.__setattr__(self, "faces", (self.faces,))
         validate.texts("Select", name=self.name)
         if not self.name:
             raise bad_value("Select.name", self.name, "give the node set a name")
-        box, plane = (tuple(vectors[key] is not None for key in pair) for pair in (("low", "high"), ("point", "normal")))
-        if sum((bool(faces), any(box), any(plane))) != 1 or any(box) != all(box) or any(plane) != all(plane):
+        validate.kind_of("Select.faces", self.faces, tuple, "give names or numbers of faces")
+        for face in self.faces:
+            if not isinstance(face, str | int) or isinstance(face, bool):
+                raise bad_value("Select.faces", validate.brief(face), "give names or numbers of faces")
+        given = {key: value for key in _VECTORS if (value := getattr(self, key)) is not None}
+        validate.vectors("Select", **given)
+        if set(given) not in (({"low", "high"}, {"point", "normal"}) if not self.faces else (set(),)):
             raise bad_value("Select", self.name, "give faces, or low and high of a box, or point and normal of a plane")
-        for face in faces:
-            validate.kind_of("Select.faces", face, (str, int), "give names or numbers of faces")
         if self.normal is not None and not any(self.normal):
             raise bad_value("Select.normal", self.normal, "give a direction other than zero")
 
@@ -62,12 +63,13 @@ class Select:
             names = [f"face_{face}" if isinstance(face, int) else face for face in self.faces]
             return np.unique(np.concatenate([mesh.nodes(name) for name in names]))
         tolerance = _TOLERANCE * np.ptp(mesh.points, axis=0).max()
-        if self.low is not None:
+        if self.low is not None and self.high is not None:
             inside = (mesh.points >= np.array(self.low) - tolerance) & (mesh.points <= np.array(self.high) + tolerance)
             found = np.flatnonzero(inside.all(axis=1))
         else:
-            unit = np.array(self.normal) / np.linalg.norm(self.normal)
-            found = np.flatnonzero(np.abs((mesh.points - np.array(self.point)) @ unit) <= tolerance)
+            point, normal = np.array(self.point, dtype=np.float64), np.array(self.normal, dtype=np.float64)
+            height = (mesh.points - point) @ (normal / np.linalg.norm(normal))
+            found = np.flatnonzero(np.abs(height) <= tolerance)
         if not len(found):
             low, high = (np.array2string(f(mesh.points, axis=0), precision=4) for f in (np.min, np.max))
             raise bad_value("Select", self.name, f"no node lies there; the part lies between {low} and {high} m")

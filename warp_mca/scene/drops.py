@@ -24,11 +24,12 @@ def resting_place(body: Body, plane: RigidPlane, gap: float) -> Vec3:
     Raises:
         RequestError: the gap is below 0, or the body cannot be meshed.
     """
+    from warp_mca.geometry.mesh import Mesh
+
     _check("place_on: gap", gap, "give 0 or a distance above it, in metres")
     if not (hasattr(plane, "normal") and hasattr(plane, "point")):
         raise bad_value("place_on: plane", validate.brief(plane), "give a RigidPlane")
-    geometry = body.geometry
-    mesh = geometry.build() if hasattr(geometry, "build") else geometry
+    mesh = body.geometry if isinstance(body.geometry, Mesh) else body.geometry.build()
     normal = np.array(plane.normal) / math.hypot(*plane.normal)
     position = np.array(body.position)
     placed = position + mesh.points @ rotation_matrix(np.array(body.rotation)).T
