@@ -13,7 +13,7 @@ MESHES = ("msh", "unv", "bdf", "inp", "key")
 def write_parts(folder: Path) -> None:
     """Write part.* in every format, in millimetres, with the surface "foot" at z = 0 and the volume "metal".
 
-    quadratic.* are meshes with nodes within edges.
+    quadratic.* are meshes with nodes within edges, ball.stl is a ball of 10 mm radius.
     """
     import gmsh
 
@@ -40,5 +40,12 @@ def write_parts(folder: Path) -> None:
         model.mesh.setOrder(2)
         for suffix in ("msh", "unv", "bdf", "key"):
             gmsh.write(str(folder / f"quadratic.{suffix}"))
+        gmsh.clear()
+        gmsh.option.setNumber("Mesh.ElementOrder", 1)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 3.0)
+        shapes.addSphere(0, 0, 0, 10)
+        shapes.synchronize()
+        model.mesh.generate(2)
+        gmsh.write(str(folder / "ball.stl"))
     finally:
         gmsh.finalize()

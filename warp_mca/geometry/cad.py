@@ -26,6 +26,7 @@ from warp_mca.geometry.selection import Select, check_selections, with_selection
 
 # Metres for one unit of the coordinates that gmsh gives: of STEP and IGES files, which name their unit, it gives mm.
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
+_UNIT = "Geometry.OCCTargetUnit"  # gmsh's option: unit of what it reads from STEP and IGES
 _HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest slivers
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
 _GENERIC = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
@@ -130,10 +131,14 @@ def _explained(path: str) -> Iterator[None]:
 
 def _draw(gmsh: ModuleType, path: str) -> None:
     """Reads the part into gmsh's model; sews the faces of a file without solids together."""
-    stl = Path(path).suffix.lower() == ".stl"
-    with _quiet():
-        gmsh.merge(path)
-    if stl:
+    unit = gmsh.option.getString(_UNIT)
+    try:
+        gmsh.option.setString(_UNIT, "MM")
+        with _quiet():
+            gmsh.merge(path)
+    finally:
+        gmsh.option.setString(_UNIT, unit)
+    if Path(path).suffix.lower() == ".stl":
         try:
             _part_faces(gmsh, False)
         except Exception:  # closed faces, as a whole sphere, cannot be flattened
