@@ -36,6 +36,8 @@ SOUND: dict[type, Any] = {
     ),
     mca.NestedPlate: mca.NestedPlate(length=0.1, width=0.1, height=0.05, core_size=0.002),
     mca.MeshFile: mca.MeshFile("none.vtu"),
+    mca.Cad: mca.Cad("none.step", size=0.002),
+    mca.Select: mca.Select("foot", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 0.0)),
     mca.Point: mca.Point(body="low", at=(0.0, 0.0, 0.0)),
     mca.Line: LINE,
     mca.Path: mca.Path(name="p", lines=(LINE,), spacing=0.005),
@@ -147,7 +149,9 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (dataclasses.replace(low, geometry=mca.Parts(parts=(item,))), up)}
         case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.NestedPlate() | mca.Parts():
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
-        case mca.MeshFile() | mca.Mesh():
+        case mca.Select():
+            return scene_with(dataclasses.replace(SOUND[mca.MeshFile], select=(item,)))
+        case mca.MeshFile() | mca.Cad() | mca.Mesh():
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():
             change = {"bodies": (item, up)}

@@ -127,13 +127,16 @@ def test_mesh_file_refusals(tmp_path: Path, capfd):
 
     box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
     cases = {
-        "tetra10": [("hexahedron", box.hexahedra), ("tetra10", [[0, 1, 2, 4, 3, 5, 6, 7, 0, 1]])],
         "no volume cells": [("quad", box.surface("xmin")[0])],
         "nodes beyond its 8 points": [("hexahedron", box.hexahedra + 1)],
     }
     for message, cells in cases.items():
         with pytest.raises(RequestError, match=message):
             read_back(tmp_path / "case.vtu", meshio.Mesh(box.points, cells))
+    tags = {name: [np.array([1])] for name in ("gmsh:physical", "gmsh:geometrical")}
+    cubic = meshio.Mesh(np.eye(20, 3), [("tetra20", [np.arange(20)])], cell_data=tags)
+    with pytest.raises(RequestError, match="it holds tetra20; save it with linear cells"):
+        read_back(tmp_path / "case.msh", cubic, file_format="gmsh22")
     with pytest.raises(RequestError, match="not finite"):
         read_back(tmp_path / "case.vtu", meshio.Mesh(box.points * math.nan, [("hexahedron", box.hexahedra)]))
     with pytest.raises(RequestError, match="no such file"):

@@ -39,7 +39,7 @@ from warp_mca.scene.materials import Elastic, J2Bilinear
 if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
     from warp_mca.accuracy.tradeoff import tradeoff
-    from warp_mca.geometry import Box, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Sphere
+    from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
     from warp_mca.report.quality import quality_table
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -53,6 +53,7 @@ __version__ = "0.1.0"
 
 _LAZY = {
     "Box": "warp_mca.geometry",
+    "Cad": "warp_mca.geometry",
     "LugRod": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
@@ -61,6 +62,7 @@ _LAZY = {
     "Parts": "warp_mca.geometry",
     "Plate": "warp_mca.geometry",
     "Rod": "warp_mca.geometry",
+    "Select": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
     "Param": "warp_mca.scene.parameters",
     "Accuracy": "warp_mca.accuracy.request",
@@ -107,6 +109,8 @@ __all__ = [
     "Sphere",
     "Plate",
     "MeshFile",
+    "Cad",
+    "Select",
     "NestedPlate",
     "Part",
     "Parts",

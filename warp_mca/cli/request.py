@@ -10,6 +10,7 @@ from pathlib import Path
 
 import warp_mca as mca
 from warp_mca.base.errors import bad_value
+from warp_mca.cli import part_script
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.scene.model_file import SUFFIX, Origin
 from warp_mca.scene.options import with_options
@@ -43,6 +44,8 @@ def read_request(args: argparse.Namespace) -> Request:
 
 def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]]) -> list[Request]:
     """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
+    if part_script.is_part(args.scene):
+        raise part_script.explain(args.scene)
     if Path(args.scene).suffix != SUFFIX:
         source = catalogue.load_source(args.scene)
         return [_of_source(args, source, more) for more in settings]

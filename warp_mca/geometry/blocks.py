@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-import signal
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from types import ModuleType
 
 import numpy as np
@@ -15,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.cell_types import HEXAHEDRON
+from warp_mca.geometry.gmsh_session import gmsh_session
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import check_size
 
@@ -25,8 +22,6 @@ _EDGES = [
     [(a, b) if side[a] < side[b] else (b, a) for a, b in HEXAHEDRON.edges if side[a] != side[b]] for side in _SIDE.T
 ]
 FINEST = 1e-8  # smallest edge of a cell, as a share of the extent of all blocks
-_LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
-_one_at_a_time = threading.Lock()  # gmsh keeps one global state
 
 
 def growth(length: float, count: int, before: float) -> float:
@@ -129,7 +124,7 @@ class Blocks:
             RequestError: gmsh cannot be loaded, or cannot mesh these blocks.
         """
         self._check_cells()
-        with _gmsh() as gmsh:
+        with gmsh_session() as gmsh:
             try:
                 surfaces, volumes = self._draw(gmsh.model.geo)
                 gmsh.model.geo.synchronize()
@@ -218,54 +213,3 @@ def _outwards(points: np.ndarray, hexahedra: np.ndarray) -> np.ndarray:
     u, v, w = (p[:, high].sum(1) - p[:, low].sum(1) for low, high in zip(_LOW, _HIGH, strict=True))
     left_handed = np.einsum("ij,ij->i", np.cross(u, v), w) < 0.0
     return np.where(left_handed[:, None], np.roll(hexahedra, 4, axis=1), hexahedra)
-
-
-@contextmanager
-def _signals_kept() -> Iterator[None]:
-    """Restore signal handlers: gmsh resets SIGTERM and others when it starts, and Python is not told.
-
-    In C, because Python takes signals in the main thread only, and knows no handler of a library.
-    """
-    sigaction = ctypes.CDLL(None).sigaction
-    kept = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # more than the struct
-    for number, action in kept.items():
-        sigaction(int(number), None, action)
-    try:
-        yield
-    finally:
-        for number, action in kept.items():
-            sigaction(int(number), action, None)
-
-
-@contextmanager
-def _gmsh() -> Iterator[ModuleType]:
-    """gmsh without output and with an empty model; a session that the caller has open is not changed."""
-    try:
-        import gmsh
-    except ImportError as error:
-        raise RequestError(f"gmsh cannot be imported ({error}): install it with pip install gmsh") from error
-    except OSError as error:
-        raise RequestError(
-            f"gmsh lacks a system library ({error}): install them with apt-get install {_LIBRARIES}"
-        ) from error
-    with _one_at_a_time:
-        mine = not gmsh.isInitialized()
-        if mine:
-            with _signals_kept():
-                gmsh.initialize(readConfigFiles=False, interruptible=False)  # signal handlers need the main thread
-        before = None if mine else gmsh.model.getCurrent()
-        options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.ElementOrder": 1}
-        saved = {name: gmsh.option.getNumber(name) for name in options}
-        try:
-            for name, value in options.items():
-                gmsh.option.setNumber(name, value)
-            gmsh.model.add("warp_mca")
-            yield gmsh
-        finally:
-            if mine:
-                gmsh.finalize()
-            else:
-                gmsh.model.remove()
-                gmsh.model.setCurrent(before)
-                for name, value in saved.items():
-                    gmsh.option.setNumber(name, value)

@@ -118,6 +118,18 @@ CELL_TYPES = {cell.name: cell for cell in (HEXAHEDRON, WEDGE, PYRAMID, TETRAHEDR
 STORED_TYPES = {name: cell for name, cell in CELL_TYPES.items() if cell.stored_as == name}
 MAX_CORNERS = max(cell.corners for cell in CELL_TYPES.values())
 
+# Cells with nodes within their edges, whose first nodes are the corners: meshio's name and gmsh's code of each, with
+# meshio's name of the linear cell and its number of corners.
+QUADRATIC = {
+    "tetra10": (11, "tetra", 4),
+    "hexahedron20": (17, "hexahedron", 8),
+    "hexahedron27": (12, "hexahedron", 8),
+    "wedge15": (18, "wedge", 6),
+    "wedge18": (13, "wedge", 6),
+    "pyramid13": (19, "pyramid", 5),
+    "pyramid14": (14, "pyramid", 5),
+}
+
 
 def is_triangle(faces: Index) -> NDArray[np.bool_]:
     """Whether each face is a triangle, shape (face_count,): triangles have their last corner twice.

@@ -1,8 +1,9 @@
-"""Owns `MeshFile`: a mesh of hexahedra, wedges, pyramids and tetrahedra from any file format that meshio knows."""
+"""Owns `MeshFile`: a mesh of hexahedra, wedges, pyramids and tetrahedra from a file of another program."""
 
 from __future__ import annotations
 
 import io
+import logging
 import textwrap
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -14,10 +15,13 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.cell_types import CELL_TYPES, STORED_TYPES
+from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC, STORED_TYPES
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
+from warp_mca.geometry.gmsh_file import GMSH_SUFFIXES, read_by_gmsh
+from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.selection import Select, check_selections, with_selections
 
 if TYPE_CHECKING:
     import meshio
@@ -29,20 +33,29 @@ _READ = {cell.meshio: cell for cell in CELL_TYPES.values()}  # cells that are re
 class MeshFile:
     """A mesh from a file; nodes that no cell uses are dropped.
 
+    gmsh reads .unv and .bdf, `keyword_file` the .k of LS-DYNA, meshio .msh, .inp, .vtu and all others that it knows.
+    Quadratic cells are taken as linear ones, which is logged as a warning.
+
     Node sets come from the file's point sets and from its named groups of faces, edges or vertices; cell sets from
     its named groups of cells. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
-    a name is called physical_N after its number.
+    a name is called physical_N after its number, a part or property without one part_N.
 
     Attributes:
-        path: of the file, in metres.
+        path: of the file.
+        scale: metres for one unit of its coordinates, 1e-3 for millimetres.
+        select: more node sets.
     """
 
     path: str | Path
+    scale: float = 1.0
+    select: tuple[Select, ...] = ()
 
     def __post_init__(self) -> None:
         validate.plain(self)
         if not isinstance(self.path, (str, Path)):
             raise bad_value("MeshFile.path", self.path, "give the path of a mesh file")
+        validate.positive("MeshFile", scale=self.scale)
+        check_selections("MeshFile", self.select)
 
     def build(self) -> Mesh:
         """Reads the file.
@@ -50,8 +63,8 @@ class MeshFile:
         Raises:
             RequestError: it cannot be read, or holds something other than sound hexahedra.
         """
-        read = self._read()
-        points = np.array(read.points, dtype=np.float64)
+        read = self._linear(self._read())
+        points = self.scale * np.array(read.points, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise self._bad("its points are not three-dimensional; save it with x, y and z")
         if not np.isfinite(points).all():
@@ -67,7 +80,8 @@ class MeshFile:
             )
             for kept in STORED_TYPES.values()
         }
-        return compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, **arrays))
+        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, **arrays))
+        return with_selections(mesh, self.select)
 
     def _read(self) -> meshio.Mesh:
         try:
@@ -76,12 +90,19 @@ class MeshFile:
             raise self._bad(f"{error.strerror or error}; check the path") from error
         if not found:
             raise self._bad("there is no such file; check the path")
+        suffix, said = Path(self.path).suffix.lower(), io.StringIO()
         try:
             import meshio
         except ImportError as error:
             raise RequestError(f"meshio cannot be imported ({error}): install it with pip install meshio") from error
-        suffix, said = Path(self.path).suffix.lower(), io.StringIO()
+        reader = "meshio"
         try:
+            if suffix in KEYWORD_SUFFIXES:
+                reader = "the reader of keyword files"
+                return read_keywords(Path(self.path))
+            if suffix in GMSH_SUFFIXES:
+                reader = "gmsh"
+                return read_by_gmsh(Path(self.path))
             if suffix == ".inp":
                 self._check_abaqus()
             with redirect_stdout(said), redirect_stderr(io.StringIO()):
@@ -90,9 +111,24 @@ class MeshFile:
             raise
         except (Exception, SystemExit) as error:  # some of its readers exit, others raise whatever went wrong
             reason = textwrap.shorten(said.getvalue() if isinstance(error, SystemExit) else str(error), 200).rstrip(".")
-            what = f"meshio cannot read it ({reason})" if reason else "meshio cannot read it"
+            what = f"{reader} cannot read it ({reason})" if reason else f"{reader} cannot read it"
             remedy = "in gmsh's format 4.1 with Mesh.SaveAll off" if suffix == ".msh" else "as binary .msh"
             raise self._bad(f"{what}; save it {remedy} or as .vtu") from error
+
+    def _linear(self, read: meshio.Mesh) -> meshio.Mesh:
+        """The mesh with quadratic cells as linear ones: their corners come first in all formats."""
+        count = sum(len(block.data) for block in read.cells if block.type in QUADRATIC)
+        if count:
+            kinds = ", ".join(sorted({block.type for block in read.cells if block.type in QUADRATIC}))
+            what = (
+                f"{self.path}: {count} quadratic cells ({kinds}) are taken as linear ones, without the nodes in edges"
+            )
+            logging.getLogger("warp_mca").warning("%s", what)
+        for block in read.cells:
+            if block.type in QUADRATIC:
+                _, block.type, corners = QUADRATIC[block.type]
+                block.data = block.data[:, :corners]
+        return read
 
     def _physical_names(self) -> dict[tuple[int, int], str]:
         """Names of the physical groups of gmsh's file by number and dimension: a surface and a volume may share one,

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
+from warp_mca.scene.drops import fall_velocity, resting_place
 from warp_mca.scene.materials import MATERIALS, Material
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.geometry.recipe import Recipe
+    from warp_mca.scene.contacts import RigidPlane
 
 Vec3 = tuple[float, float, float]
 
@@ -72,3 +74,25 @@ class Body:
             velocity=self.velocity,
             angular_velocity=self.angular_velocity,
         )
+
+    def place_on(self, plane: RigidPlane, gap: float = 0.0) -> Body:
+        """The body moved along the normal of a plane until its lowest node lies `gap` [m] above; it is meshed for it.
+
+        Raises:
+            RequestError: the gap is below 0, or the body cannot be meshed.
+        """
+        return replace(self, position=resting_place(self, plane, gap))
+
+    def drop(self, height: float, gravity: Vec3 = (0.0, -9.81, 0.0)) -> Body:
+        """The body with the velocity sqrt(2 g h) along `gravity` [m/s^2] added, as after a fall from rest.
+
+        Args:
+            height: of the fall before the first step [m]; a gap that is left then is not counted.
+            gravity: as in `Scene.gravity`.
+
+        Raises:
+            RequestError: the height is below 0, or there is no gravity.
+        """
+        fall = fall_velocity(height, gravity)
+        x, y, z = (v + w for v, w in zip(self.velocity, fall, strict=True))
+        return replace(self, velocity=(x, y, z))

@@ -1,0 +1,106 @@
+"""Keyword files of LS-DYNA: nodes, solids of each shape, parts and sets, in columns and between commas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.geometry.quality import check, volumes
+
+# A unit cube, on it a wedge of volume 1/2, beside it a pyramid of volume 1/3, before it a tetrahedron of volume 1/6.
+POINTS = {
+    **{k + 1: (x, y, z) for k, (x, y, z) in enumerate([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])},
+    **{k + 11: (x, y, z) for k, (x, y, z) in enumerate([(0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])},
+    21: (0, 0.5, 2),
+    22: (1, 0.5, 2),
+    31: (2, 0.5, 0.5),
+    41: (0, -1, 0),
+    99: (9, 9, 9),
+}
+SOLIDS = {
+    1: (1, (1, 2, 3, 4, 11, 12, 13, 14)),
+    2: (2, (11, 12, 13, 14, 21, 22, 22, 21)),
+    5: (2, (2, 3, 13, 12, 31, 31, 31, 31)),
+    7: (1, (1, 2, 11, 41, 41, 41, 41, 41)),
+}
+WEDGE = (14, 11, 12, 13, 21, 21, 22, 22)  # its last nodes are those of the edge
+HEAD = "*KEYWORD\n$ a comment\n*TITLE\nparts\n"
+TAIL = """*PART
+steel block
+         1         1         1
+*PART
+
+         2         1         1
+*SET_NODE_LIST_TITLE
+top edge
+         7
+        21        22
+*SET_NODE_LIST
+         3       0.0
+         1         2
+        41
+*SET_SEGMENT
+         4
+         1         2         3         4
+*SET_NODE_LIST_GENERATE
+         5
+        11        14
+*END
+"""
+
+
+def columns(nodes: list[int], two_cards: bool) -> str:
+    head = "".join(f"{n:8d}" for n in nodes[:2])
+    return head + ("\n" if two_cards else "") + "".join(f"{n:8d}" for n in nodes[2:]) + "\n"
+
+
+def deck(layout: str) -> str:
+    """The parts in one of the layouts of cards."""
+    solids = {**SOLIDS, 2: (2, WEDGE)}
+    rows = [[number, part, *nodes] for number, (part, nodes) in solids.items()]
+    if layout == "commas":
+        nodes = "".join(f"{n}, {x}, {y}, {z}\n" for n, (x, y, z) in POINTS.items())
+        cells = "".join(", ".join(map(str, row)) + "\n" for row in rows)
+    else:
+        nodes = "".join(f"{n:8d}{x:16.9e}{y:16.9e}{z:16.9e}       0       0\n" for n, (x, y, z) in POINTS.items())
+        cells = "".join(columns(row, layout == "two cards") for row in rows)
+    return f"{HEAD}*NODE\n{nodes}*ELEMENT_SOLID\n{cells}{TAIL}"
+
+
+@pytest.mark.parametrize("layout", ["columns", "two cards", "commas"])
+def test_solids_parts_and_sets(tmp_path: Path, layout: str):
+    (tmp_path / "it.k").write_text(deck(layout))
+    mesh = mca.MeshFile(tmp_path / "it.k", scale=0.1).build()
+    check(mesh, "it")
+    assert [len(mesh.hexahedra), len(mesh.tetrahedra), len(mesh.points)] == [3, 1, len(POINTS) - 1]
+    assert sorted(volumes(mesh)) == pytest.approx([1e-3 / 6, 1e-3 / 3, 1e-3 / 2, 1e-3])
+    assert volumes(mesh)[mesh.cell_sets["steel block"]] == pytest.approx([1e-3, 1e-3 / 6])
+    assert volumes(mesh)[mesh.cell_sets["part_2"]] == pytest.approx([1e-3 / 2, 1e-3 / 3])
+    places = {
+        name: {tuple(np.round(10 * mesh.points[n], 6).tolist()) for n in mesh.nodes(name)} for name in mesh.node_sets
+    }
+    wanted = {"top edge": (21, 22), "set_3": (1, 2, 41), "set_4": (1, 2, 3, 4), "set_5": (11, 12, 13, 14)}
+    assert places == {name: {POINTS[n] for n in members} for name, members in wanted.items()}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("*TITLE", "*INCLUDE", "INCLUDE is not read"),
+        ("*ELEMENT_SOLID", "*ELEMENT_SOLID_ORTHO", "ELEMENT_SOLID_ORTHO is not read"),
+        ("*KEYWORD", "*KEYWORD LONG=Y", "long fields"),
+        ("*NODE\n", "*NODE+\n", "long fields"),
+        ("      31      31\n", "      31      14\n", "is of no known type"),
+        ("       1       2       3       4", "       1       2       3       8", "node 8 is used but not in"),
+        ("       1       2       3       4", "       1       2       x       4", "invalid literal"),
+    ],
+)
+def test_what_is_not_read_is_refused(tmp_path: Path, old: str, new: str, words: str):
+    text = deck("columns")
+    assert old in text
+    (tmp_path / "it.key").write_text(text.replace(old, new, 1))
+    with pytest.raises(mca.RequestError, match=rf"the reader of keyword files cannot read it \(.*{words}"):
+        mca.MeshFile(tmp_path / "it.key").build()

@@ -1,0 +1,218 @@
+"""Owns `Cad`: a mesh of tetrahedra in a part of a CAD file, or in the closed surface of an STL file, made by gmsh."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from warp_mca.base import validate
+from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry.cell_types import TETRAHEDRON
+from warp_mca.geometry.degenerate import stored
+from warp_mca.geometry.edit import compact
+from warp_mca.geometry.gmsh_session import gmsh_session
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.recipe import LIMIT
+from warp_mca.geometry.selection import Select, check_selections, with_selections
+
+# Metres for one unit of the coordinates that gmsh gives: of STEP and IGES files, which name their unit, it gives mm.
+UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
+_UNIT = "Geometry.OCCTargetUnit"  # gmsh's option: unit of what it reads from STEP and IGES
+_HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest slivers
+_SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
+_GENERIC = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
+_KEPT = 4  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
+
+
+@dataclass(frozen=True)
+class Cad:
+    """Tetrahedra in the solids of a STEP, IGES, BREP or STL file.
+
+    Node sets are the faces, by the name that gmsh reads in the file, or "face_1", "face_2", ..., and the selections;
+    cell sets are the solids, by name or "solid_1", .... Faces of an STL file are parted by edges sharper than 40
+    degrees.
+
+    Attributes:
+        path: of the file.
+        size: greatest edge of a tetrahedron [m], about; small faces make smaller ones.
+        scale: metres for one unit of the file. None takes the file's own unit where it names one (STEP, IGES), and
+            metres for BREP and STL. STEP and IGES count in millimetres here whatever unit they name.
+        select: more node sets.
+    """
+
+    path: str | Path
+    size: float
+    scale: float | None = None
+    select: tuple[Select, ...] = ()
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        if not isinstance(self.path, str | Path):
+            raise bad_value("Cad.path", self.path, "give the path of a CAD file")
+        if Path(self.path).suffix.lower() not in UNITS:
+            known = ", ".join(UNITS)
+            raise bad_value("Cad.path", str(self.path), f"CAD files end in {known}; MeshFile reads finished meshes")
+        validate.positive("Cad", size=self.size)
+        if self.scale is not None:
+            validate.positive("Cad", scale=self.scale)
+        check_selections("Cad", self.select)
+
+    def refined(self, factor: float) -> Cad:
+        """The same part with tetrahedra `factor` times smaller."""
+        return replace(self, size=self.size / factor)
+
+    def build(self) -> Mesh:
+        """Meshes the part, or takes its mesh from memory if the file is as it was.
+
+        Raises:
+            RequestError: there is no such file, gmsh cannot read or mesh it, or it has no solid.
+        """
+        try:
+            found = Path(self.path).stat()
+        except OSError as error:
+            raise bad_value("Cad.path", str(self.path), f"{error.strerror or error}; check the path") from error
+        scale = self.scale or UNITS[Path(self.path).suffix.lower()]
+        mesh = _meshed(str(Path(self.path).resolve()), (found.st_mtime_ns, found.st_size), self.size, scale)
+        return with_selections(mesh, self.select)
+
+
+def extent(path: str | Path, scale: float | None = None) -> float:
+    """Diagonal of the box around the part in a CAD file [m]; `scale` as in `Cad`.
+
+    Raises:
+        RequestError: there is no such file, gmsh cannot read it, or it has no solid.
+    """
+    part = Cad(path, size=1.0, scale=scale)
+    if not Path(path).is_file():
+        raise bad_value("Cad.path", str(path), "there is no such file; check the path")
+    with gmsh_session() as gmsh, _explained(str(path)):
+        _draw(gmsh, str(path))
+        return _diagonal(gmsh) * (part.scale or UNITS[Path(path).suffix.lower()])
+
+
+@lru_cache(maxsize=_KEPT)
+def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mesh:
+    """The mesh of a file that was changed last at `stamp`: time [ns] and size [byte]."""
+    # without a least size gmsh divides the part in ten
+    options = {"Mesh__Algorithm3D": _HXT, "Mesh__MeshSizeMax": size / scale, "Mesh__MeshSizeMin": size / scale}
+    with gmsh_session(**options) as gmsh, _explained(path):
+        _draw(gmsh, path)
+        x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(-1, -1)
+        count = 6.0 * (x1 - x0) * (y1 - y0) * (z1 - z0) * (scale / size) ** 3  # at most: of a part that fills its box
+        if count > LIMIT:
+            remedy = f"up to {count:.2g} elements would result in a part of {_diagonal(gmsh) * scale:.3g} m"
+            raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
+        with _quiet():
+            gmsh.model.mesh.generate(3)
+        return _read(gmsh.model, scale)
+
+
+@contextmanager
+def _explained(path: str) -> Iterator[None]:
+    """Raise what gmsh reports about a file as RequestError."""
+    try:
+        yield
+    except Exception as error:
+        if type(error) is not Exception:  # gmsh raises nothing more specific than this
+            raise
+        words = " ".join(str(error).split()).rstrip(".") or "it gives no reason"
+        remedy = "repair the part in the CAD program or take another size"
+        raise bad_value("Cad.path", path, f"gmsh cannot read or mesh it ({words}); {remedy}") from error
+
+
+def _draw(gmsh: ModuleType, path: str) -> None:
+    """Reads the part into gmsh's model; sews the faces of a file without solids together."""
+    unit = gmsh.option.getString(_UNIT)
+    try:
+        gmsh.option.setString(_UNIT, "MM")
+        with _quiet():
+            gmsh.merge(path)
+    finally:
+        gmsh.option.setString(_UNIT, unit)
+    if Path(path).suffix.lower() == ".stl":
+        try:
+            _part_faces(gmsh, False)
+        except Exception:  # closed faces, as a whole sphere, cannot be flattened
+            gmsh.model.remove()
+            gmsh.model.add("warp_mca")
+            gmsh.merge(path)
+            _part_faces(gmsh, True)
+        faces = [tag for _, tag in gmsh.model.getEntities(2)]
+        if faces:
+            gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(faces)])
+        gmsh.model.geo.synchronize()
+    elif not gmsh.model.getEntities(3):
+        with _quiet():
+            gmsh.model.occ.healShapes(tolerance=1e-6 * _diagonal(gmsh), sewFaces=True, makeSolids=True)
+        gmsh.model.occ.synchronize()
+    if not gmsh.model.getEntities(3):
+        raise bad_value("Cad.path", path, "it holds no solid; save the part as a closed solid")
+
+
+def _part_faces(gmsh: ModuleType, cut: bool) -> None:
+    """Parts the triangles of an STL file along sharp edges, and if `cut`, into pieces that can be flattened."""
+    gmsh.model.mesh.classifySurfaces(_SHARP, True, cut, math.pi)
+    gmsh.model.mesh.createGeometry()
+
+
+def _diagonal(gmsh: ModuleType) -> float:
+    """Of the box around the model, in the file's unit."""
+    box = gmsh.model.getBoundingBox(-1, -1)
+    return math.dist(box[:3], box[3:])
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Close standard output meanwhile: libraries in gmsh write there what they transferred, and which edges cross."""
+    sys.stdout.flush()
+    kept, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(null)
+
+
+def _read(model: ModuleType, scale: float) -> Mesh:
+    """Collects tetrahedra and sets; nodes that no tetrahedron uses are left out."""
+    solids = [tag for _, tag in model.getEntities(3)]
+    blocks = [model.mesh.getElementsByType(TETRAHEDRON.gmsh, tag)[1].reshape(-1, 4) for tag in solids]
+    if not all(map(len, blocks)):
+        raise RequestError(
+            "gmsh left a solid without tetrahedra: repair the part in the CAD program or take another size"
+        )
+    tags, coordinates, _ = model.mesh.getNodes()
+    order = np.argsort(tags)
+    tags, points = tags[order], scale * coordinates.reshape(-1, 3)[order]
+    node_sets: dict[str, np.ndarray] = {}
+    for k, (_, tag) in enumerate(model.getEntities(2)):
+        nodes = np.searchsorted(tags, model.mesh.getNodes(2, tag, includeBoundary=True)[0])
+        name = _name(model, 2, tag) or f"face_{k + 1}"  # several faces may have one name
+        node_sets[name] = np.union1d(node_sets.get(name, np.zeros(0)), nodes).astype(np.int32)
+    cell_sets: dict[str, np.ndarray] = {}
+    first = 0
+    for k, (tag, block) in enumerate(zip(solids, blocks, strict=True)):
+        name = _name(model, 3, tag) or f"solid_{k + 1}"
+        more = np.arange(first, first + len(block))
+        cell_sets[name] = np.append(cell_sets.get(name, np.zeros(0)), more).astype(np.int32)
+        first += len(block)
+    cells = np.searchsorted(tags, np.concatenate(blocks)).astype(np.int32)
+    tetrahedra = stored(points, cells, TETRAHEDRON.name)
+    return compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, tetrahedra))
+
+
+def _name(model: ModuleType, dim: int, tag: int) -> str:
+    """Name of a face or a solid in the file, without those of the assemblies that it lies in; "" without one."""
+    name = model.getEntityName(dim, tag).rpartition("/")[2].strip()
+    return "" if name in _GENERIC or name.startswith("Open CASCADE") else name
