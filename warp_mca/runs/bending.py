@@ -88,6 +88,8 @@ def seen(model: Model, samples: list[Sample], u: Array, before: Array) -> Array:
 
 def bending_warnings(model: Model, stiffened: Array, exchanged: float) -> Iterator[str]:
     """A sentence for each body whose cells bend too stiffly, of the scene alone, which exchanged so much energy [J]."""
+    if not len(stiffened):  # no cells that can be so
+        return
     element = {name: block.element for block in model.blocks for name in _bodies(model, block)}
     for name, (wasted, energy) in zip(model.element_start, stiffened, strict=True):
         if energy > LEAST * exchanged and wasted > SHARE * energy:
