@@ -267,6 +267,7 @@ def test_a_run_that_is_terminated_clears_away_what_is_half_written(here: Path):
 import os, signal, sys
 import meshio, warp_mca.recorders.mesh_file as mesh_file
 from warp_mca.cli import main as cli
+from warp_mca.cli.parser import make_parser
 whole = mesh_file._write
 def write(path, mesh):
     whole(path, mesh)
@@ -352,6 +353,7 @@ def test_each_file_of_an_option_given_twice_is_written(here: Path, capsys: pytes
         (["--final", "a.stl"], ["final = 'a.stl'"]),
         (["--frames", "1", "--rrd", "a.rrd"], ["frames = 1", "at least 2"]),
         (["--snapshot", "-1"], ["snapshot = -1", "from 0 s on"]),
+        (["--snapshot", "5"], ["snapshot-5s.png = 5", "the run ends at"]),
     ],
 )
 def test_a_recorder_that_cannot_write_is_refused(
@@ -360,6 +362,19 @@ def test_a_recorder_that_cannot_write_is_refused(
     line = refused(capsys, "run", "landing.py", *options)
     assert all(word in line for word in words), line
     assert contents(here) == []
+
+
+def test_the_help_of_run_has_an_example_for_each_purpose(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("COLUMNS", "400")
+    assert cli.main(["run", "--help"]) == 0
+    examples = [
+        line.split("warp-mca ")[1].split(";")[0] for line in capsys.readouterr().out.splitlines() if "as in" in line
+    ]
+    assert len(examples) == 6
+    for example in examples:
+        assert make_parser().parse_args(example.replace("…", "two_link").split()).scene == "two_link"
 
 
 def test_view_without_a_recording(capsys: pytest.CaptureFixture[str]):

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
 
 
-def add_accuracy(parser: argparse.ArgumentParser) -> None:
+def add_accuracy(parser: argparse._ArgumentGroup) -> None:
     """Add the options."""
     parser.add_argument(
         "--accuracy",
-        metavar="X%%",
-        help="choose mesh, step and contact springs for this error of first peak, impulse and duration (default: none)",
+        metavar="SHARE",
+        help="choose mesh, step and springs for this error, as 2%%, of first peak, impulse and duration",
     )
     parser.add_argument(
         "--model",

@@ -54,29 +54,35 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _group(parser: argparse.ArgumentParser, title: str, example: str) -> argparse._ArgumentGroup:
+    """Options of one purpose, with an example for them."""
+    return parser.add_argument_group(title, f"as in: {parser.prog} {example}")
+
+
 def _run(parser: argparse.ArgumentParser) -> None:
     _add_scene(parser)
     _add_device(parser)
     _add_options(parser)
-    add_accuracy(parser)
+    add_accuracy(_group(parser, "accuracy", "two_link --set joint_nodes=pin --accuracy 2%"))
     _add_results(parser)
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
-    parser.add_argument(
+    group = _group(parser, "steps and time", "two_link --duration 5e-3 --multi-rate auto --mass-scaling 1.5")
+    group.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
+    group.add_argument(
         "--multi-rate",
         type=_groups,
         metavar="auto|N",
         help="let N groups of elements take steps of their own; auto: as many as suit the device (default: one step)",
     )
-    parser.add_argument(
+    group.add_argument(
         "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
     )
-    parser.add_argument(
+    group.add_argument(
         "--time-step-scale", type=float, metavar="SHARE", help="time step over the stable one (default: the scene's)"
     )
-    parser.add_argument(
+    group.add_argument(
         "--mass-scaling",
         type=_mass_scaling,
         metavar="F",
@@ -85,7 +91,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_results(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    group = _group(parser, "run and results", "two_link --checkpoint 60w --out impact")
+    group.add_argument(
         "--sweep",
         dest="sweeps",
         action="append",
@@ -93,20 +100,20 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE,…",
         help="as warp-mca sweep --grid, with the files of each run in folders 0, 1, … in DIR",
     )
-    parser.add_argument(
+    group.add_argument(
         "--method",
         default="mca",
         choices=METHODS,
         help="mca: rigid links swing until they touch; pure-fem: finite elements from the release on (default: mca)",
     )
-    parser.add_argument(
+    group.add_argument(
         "--checkpoint",
         metavar="EVERY",
         help="store the state each 100 steps, 2e-5s simulated or 30w (seconds of wall time); after an interruption the "
         "same command goes on from it (default with pure-fem: 30w)",
     )
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
-    parser.add_argument("--force", action="store_true", help="replace results that the folder holds already")
+    group.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
+    group.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(parser)
     parser.set_defaults(command=run.run)
 
@@ -182,7 +189,7 @@ def _groups(text: str) -> int | str:
     return int(text) if text.isdigit() else text
 
 
-def _add_element(parser: argparse.ArgumentParser) -> None:
+def _add_element(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     names = ", ".join(ELEMENTS)
     parser.add_argument(
         "--element", metavar="NAME", choices=tuple(ELEMENTS), help=f"formulation of every body: {names}"
@@ -190,25 +197,28 @@ def _add_element(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
-    parser.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
+    group = _group(parser, "device", "… --device cuda:0 --precision float64")
+    group.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    group.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
 
 
 def _add_scene(parser: argparse.ArgumentParser) -> None:
+    group = _group(parser, "scene", "two_link --preset standard --set mu=0.3 --set v_plate=0.8")
     parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
-    parser.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
-    parser.add_argument(
+    group.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
+    group.add_argument(
         "--refine", type=float, metavar="R", help="cells R times smaller than the recipes say; below 1 larger ones"
     )
     help_text = "change a parameter; may be given several times"
-    _add_element(parser)
-    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
+    _add_element(group)
+    group.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
 
 
 def _add_recorders(parser: argparse.ArgumentParser) -> None:
     from warp_mca.recorders import FILES
 
-    group = parser.add_argument_group("see the run", "options with FILE may be given several times")
+    example = "two_link --viewer rerun --usd impact.usdc --snapshot 60e-6; options with FILE may be given several times"
+    group = _group(parser, "see the run", example)
     group.add_argument(
         "--viewer", default="none", choices=("rerun", "none"), help="open a viewer and stream to it (default: none)"
     )

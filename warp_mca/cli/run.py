@@ -74,7 +74,12 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     for option, kind in FILES.items():
         more = {"cadence": cadence} if kind.frames else {}
         found += [kind.make(file, **more) for file in files[option]]
-    return found + [SnapshotFile(out / f"snapshot-{1e6 * t:g}us.png", time=t) for t in args.snapshots]
+    return found + [SnapshotFile(out / f"snapshot-{_time_words(t)}.png", time=t) for t in args.snapshots]
+
+
+def _time_words(t: float) -> str:
+    """A time [s] in a file's name: in microseconds, as impacts last, or in seconds from 10 ms on."""
+    return f"{t:g}s" if t >= 0.01 else f"{1e6 * t:g}us"
 
 
 def resume(args: argparse.Namespace) -> None:

@@ -62,14 +62,12 @@ def run(
         device: "cpu" or a CUDA device as "cuda:0".
         precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
         threads: of a run on the CPU, all cores that this process may use if None; results do not depend on it.
-        multi_rate: number of groups of elements that take steps of their own, 2, 4, 8, ... times that of the smallest;
-            "auto" chooses it for the device, None lets all elements take the same step.
+        multi_rate: groups of elements with steps of their own; "auto" chooses how many, None: all take one step.
         duration: of the impact phase [s]; the scene's own if None.
         out: folder for summary.json, history.csv and the figures; nothing is written if None.
         force: replace results that `out` holds already.
         refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
-        mass_scaling: in place of `ImpactPhase.mass_scaling`: how many times longer the stable step is to be, or that
-            step as "2e-8s", by added mass.
+        mass_scaling: in place of `ImpactPhase.mass_scaling`, with the same values.
         accuracy: greatest error of the first force peak, the impulse and the contact duration, as 0.02 or "2%": mesh,
             step and contact springs are then chosen, but those that are given here (docs/accuracy.md).
         meshes: finished meshes by body, to save making them again.
@@ -90,15 +88,32 @@ def run(
     tell, span = teller(progress), span_of(scene, duration)
     settings = settings_of(device, precision, threads, multi_rate)
     _check_files(recorders, out, force)
-    every = every_of(method, checkpoint, out, scene, recorders)
-    if accuracy is not None and (every or method == METHOD):
-        remedy = "it is for runs of one impact that store nothing on the way; leave it out, or method and checkpoint"
-        raise bad_value("accuracy", validate.brief(accuracy), remedy)
+    every = _every(method, checkpoint, out, scene, recorders, accuracy)
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
     result = partial(_result, plan, scene, meshes, span, tell, settings, recorders, method)
     return result(None) if out is None else _kept(result, out, force, every)
+
+
+def _every(
+    method: str,
+    checkpoint: str | Every | None,
+    out: str | os.PathLike[str] | None,
+    scene: Scene,
+    recorders: Sequence[Recorder],
+    accuracy: float | str | Accuracy | None,
+) -> Every | None:
+    """How often the run stores its state, None for never; arguments as in `run`.
+
+    Raises:
+        RequestError: the run cannot store it, or `accuracy` is asked of one that would.
+    """
+    every = every_of(method, checkpoint, out, scene, recorders)
+    if accuracy is not None and (every or method == METHOD):
+        remedy = "it is for runs of one impact that store nothing on the way; leave it out, or method and checkpoint"
+        raise bad_value("accuracy", validate.brief(accuracy), remedy)
+    return every
 
 
 def _kept(
