@@ -40,7 +40,7 @@ class Sample:
     Attributes:
         body: number of the body, in the order of `Model.element_start`.
         energies: that finds what they spend, of positions, displacements, cells and moduli.
-        conn: their nodes, shape (cell_count, corner_count).
+        conn: their nodes, shape (cell_count, corner_count), int32.
         K, G: bulk and shear modulus [Pa].
         share: cells of the body and material over those looked at [-].
     """
