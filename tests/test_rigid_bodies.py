@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from impacts import SHORT_RANGES, begun, figures, finished, result_of
@@ -303,7 +304,6 @@ def test_what_a_run_says_of_rigid_bodies():
 def test_recorders_show_rigid_bodies_without_stress(tmp_path: Path):
     from warp_mca.recorders import VtkHdfFile
 
-    h5py = pytest.importorskip("h5py")
     mca.run(ball("ball"), duration=2e-5, recorders=[VtkHdfFile(tmp_path / "ball.vtkhdf")])
     with h5py.File(tmp_path / "ball.vtkhdf") as file:
         root = file["VTKHDF"]

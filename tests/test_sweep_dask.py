@@ -11,7 +11,7 @@ from sweeping import SCENE, figures
 from warp_mca.cli.main import main
 from warp_mca.runs.sweep_table import read_rows
 
-distributed = pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed", reason="the extra cluster is not installed")
 COMMAND = ["sweep", "block.py", "--grid", "v=1,2,3", "--grid", "kills=nothing,worker", "--set", "duration=2e-6"]
 
 

@@ -52,6 +52,7 @@ def two_compressions(evidence: Evidence) -> Found:
 
 
 def stick_in_restitution(evidence: Evidence) -> Found:
+    """Whether more than half of the time of sticking at 0.4 m/s lies in restitution."""
     result = evidence.run("v_plate", 0.4)
     sticks = [tuple(stick) for stick in result.summary["sticks"]]
     length = read.overlap(sticks, sticks)
@@ -85,15 +86,15 @@ def velocities_hardly_change(evidence: Evidence) -> Found:
 
 
 def gross_slip(evidence: Evidence) -> Found:
-    shares = {}
-    for value in (0.1, 1.5):
-        result = evidence.run("mu", value)
-        shares[value] = read.stick_time(result) / (1e3 * result.summary["contact_duration"])
+    """Whether less than a tenth of the contact sticks at the least friction, and more at the greatest."""
+    shares = {value: stick_share(evidence.run("mu", value)) for value in (0.1, 1.5)}
     said = ", ".join(f"{100 * share:.0f} % of the contact at μ = {value:g}" for value, share in shares.items())
     return Words(f"sticks {said}", shares[0.1] < 0.1 < shares[1.5])
 
 
 def succession(study: str) -> Callable[[Evidence], Found]:
+    """Whether bodies of 7 GPa or less touch the plate more than once."""
+
     def found(evidence: Evidence) -> Found:
         values = [value for value in evidence.values(study) if value <= 7.0]
         if not values:

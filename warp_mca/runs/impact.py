@@ -193,7 +193,8 @@ class _Loop:
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
-        self.looks = Transfer({"u": self.state.u}, self.solver.device)
+        looked_at = any(item.samples for item in impact.scene_runs)
+        self.looks = Transfer({"u": self.state.u}, self.solver.device) if looked_at else None
         self.watch, self.contact = contact_watch(self.solver, self.state), True
         self.written = 0
 
@@ -273,17 +274,17 @@ class _Loop:
 
     def _look(self) -> None:
         """Have bodies looked at as they are now, once their shape has come, while the device goes on."""
-        while self.looks.pending:
-            self._see()
-        self.looks.send(0)
+        self._see()
+        if self.looks:
+            self.looks.send(0)
 
     def _see(self) -> None:
-        _, shape = self.looks.receive()
-        for item in self.impact.scene_runs:
-            item.ledger.kept.stiffened = item.look(shape["u"])
+        while self.looks and self.looks.pending:
+            _, shape = self.looks.receive()
+            for item in self.impact.scene_runs:
+                item.ledger.kept.stiffened = item.look(shape["u"])
 
     def _receive_all(self) -> None:
-        while self.looks.pending:
-            self._see()
+        self._see()
         while self.transfer.pending:
             self._receive()

@@ -80,7 +80,8 @@ class SceneRun:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
 
     @cached_property
-    def _samples(self) -> list[Sample]:
+    def samples(self) -> list[Sample]:
+        """Cells that `runs.bending` looks at."""
         return samples_of(self.ready.model)
 
     def look(self, u: Array) -> Array:
@@ -88,10 +89,10 @@ class SceneRun:
 
         See `SceneRecords.stiffened`.
         """
-        if not self._samples:
+        if not self.samples:
             return self.ledger.kept.stiffened
         first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        return seen(self.ready.model, self._samples, u[first:end], self.ledger.kept.stiffened)
+        return seen(self.ready.model, self.samples, u[first:end], self.ledger.kept.stiffened)
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
