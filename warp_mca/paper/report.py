@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,20 +62,21 @@ def make_report(
     force: bool = False,
     prepare: Prepare | None = None,
     progress: Progress | None = None,
+    deadline: float = math.inf,
 ) -> Report:
     """Run what is missing of a level, and write the report.
 
     Args:
         level: to be run.
         out: folder of the report. The same call goes on with what it holds.
-        device, precision, workers, force, prepare, progress: as in `warp_mca.sweep`.
+        device, precision, workers, force, prepare, progress, deadline: as in `carry_out_runs`.
 
     Raises:
         RequestError, McaError: as in `warp_mca.sweep`; a file cannot be written.
     """
     out = folder_path("out", out)
     options: dict[str, Any] = {"device": device, "precision": precision, "workers": workers, "force": force}
-    runs = carry_out_runs(level, out, **options, prepare=prepare, progress=progress)
+    runs = carry_out_runs(level, out, **options, prepare=prepare, progress=progress, deadline=deadline)
     figures = figure_rows(runs)
     page = Page(level, _made(runs, precision), judge(CLAIMS, runs), figures, drawn(Evidence(runs)))
     entries = {
