@@ -37,7 +37,7 @@ SMALL = replace(
 
 def runs_of(level: studies.Level) -> Runs:
     """No run of a level."""
-    return Runs(level, {}, {}, {}, "cpu")
+    return Runs(level, Path(), {}, {}, {}, "cpu")
 
 
 def report_of(level: studies.Level, out: Path, deadline: float = math.inf) -> Report:

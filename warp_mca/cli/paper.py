@@ -34,6 +34,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="begin no run later than this; the report says which are missing, the same command goes on with them; "
         "0 only writes the report of what DIR holds, on any machine",
     )
+    parser.add_argument(
+        "--pure-fem",
+        action="store_true",
+        help="run finite elements alone from the release on as well (Table 2): 14 million steps at level full; their "
+        "state is stored on the way, and the same command goes on from it",
+    )
     parser.add_argument("--force", action="store_true", help="start again, in place of going on with what DIR holds")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the report (default: paper-LEVEL)")
     parser.set_defaults(command=_carry_out)
@@ -62,6 +68,7 @@ def _carry_out(args: argparse.Namespace) -> None:
             prepare=start_warp,
             progress=progress,
             deadline=args.deadline,
+            pure_fem=args.pure_fem,
         )
     _print(report)
     if failed := [row for row in report.rows if row["status"] != "done"]:

@@ -32,17 +32,23 @@ class Runs:
 
     Attributes:
         level: that was run.
+        out: folder of the report.
         cases: what was run, by study, value and variant.
         rows: of the sweep's table, by case.
         folders: with the files of each run, by case.
         device: that commands name.
+        comparison: with finite elements alone, as `table_2.compare` gives it; None if they were not run.
+        pure: folder of that comparison.
     """
 
     level: Level
+    out: Path
     cases: Mapping[Key, Case]
     rows: Mapping[Case, Row]
     folders: Mapping[Case, Path]
     device: str
+    comparison: Mapping[str, Any] | None = None
+    pure: Path = Path()
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,25 @@ class Evidence:
         if len(found) < 2:
             raise MissingRunError(f"{_title(study)}: fewer than two runs at this level")
         return found
+
+    def comparison(self) -> dict[str, Any]:
+        """What `table_2.compare` found; of the variant MAIN only.
+
+        Raises:
+            MissingRunError: finite elements alone were not run.
+        """
+        if self.runs.comparison is None or self.variant != MAIN:
+            raise MissingRunError("pure finite elements are run with --pure-fem only")
+        return dict(self.runs.comparison)
+
+    def compared(self, name: str) -> Result:
+        """One of the results that were compared, by the name of its folder.
+
+        Raises:
+            MissingRunError: as in `comparison`.
+        """
+        self.comparison()
+        return _loaded(self.runs.pure / name)
 
     def results(self, study: str) -> list[Result]:
         """Results of all values, in their order.
@@ -133,7 +158,7 @@ def carry_out_runs(
     else:
         rows = stored_rows(plan)
     folders = {case: folder / run_name(k, len(unique)) for k, case in enumerate(unique)}
-    return Runs(level, found, dict(zip(unique, rows, strict=True)), folders, device)
+    return Runs(level, out, found, dict(zip(unique, rows, strict=True)), folders, device)
 
 
 def figures_of(row: Row) -> dict[str, Any]:
