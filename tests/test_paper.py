@@ -11,7 +11,7 @@ import pytest
 from warp_mca.base.errors import RequestError
 from warp_mca.cli.main import main
 from warp_mca.paper import studies
-from warp_mca.paper.choices import TRIED, choice_rows
+from warp_mca.paper.choices import DURATIONS_HEAD, TRIED, choice_rows, duration_rows
 from warp_mca.paper.claim_table import CLAIMS
 from warp_mca.paper.claims import Claim, Words, judge
 from warp_mca.paper.evidence import Evidence, MissingRunError, Runs
@@ -25,6 +25,7 @@ from warp_mca.paper.studies import (
     MAIN,
     MESH,
     PENALTY,
+    SPRINGS,
     STUDIES,
     TOGETHER,
     Case,
@@ -227,3 +228,17 @@ def test_a_claim_about_a_choice_is_read_from_its_runs_only():
     assert found(Evidence(runs_of(SMALL))) == 1.0 and seen == [LUG]
     with pytest.raises(MissingRunError):
         found(Evidence(runs_of(SMALL), MESH))
+
+
+def test_durations_by_springs_stand_beside_the_published_ones(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warp_mca.paper.readings.event_duration", lambda result: 1e3 * float(result.time[-1]))
+    level = LEVELS["full"]
+    found = cases(level)
+    case, springs = found["rod", 0.7, MAIN], found["rod", 0.7, SPRINGS]
+    assert dict(springs.settings)["penalty"] == 0.3 and springs.mesh == COARSE
+    rows = {key: {"status": "failed", "reason": ""} for key in found.values()} | {case: {"status": "done"}}
+    published, main, *others = duration_rows(Runs(level, folder, found, rows, {case: folder / "runs" / "0"}, "cpu"))
+    assert len(published) == len(DURATIONS_HEAD) and len(others) == 3
+    assert main[1:] == ("–",) * 4 + ("0.010", "–")  # of a run of 10 us
+    assert not any(set(row[1:]) - {"–"} for row in others)
+    assert duration_rows(runs_of(LEVELS["quick"])) == []

@@ -42,6 +42,7 @@ class Page:
         comparison: with finite elements alone, if they were run.
         compared: the commands of both.
         tried: rows of the table of choices.
+        durations: rows of that of springs.
     """
 
     level: Level
@@ -52,6 +53,7 @@ class Page:
     comparison: Mapping[str, Any] | None = None
     compared: Sequence[str] = ()
     tried: Sequence[tuple[str, ...]] = ()
+    durations: Sequence[tuple[str, ...]] = ()
 
     def introduction(self) -> list[str]:
         """Paragraphs before the tables."""
@@ -113,6 +115,9 @@ def as_html(page: Page) -> str:
         parts.append(f"<h3>{heading}</h3><p>{html.escape(caption)}</p>")
         if number == "choices" and page.tried:
             parts.append(_html_table(choices.HEAD, page.tried))
+        if number == "choices" and page.durations:
+            parts.append(f"<p>{html.escape(choices.DURATIONS_CAPTION)}</p>")
+            parts.append(_html_table(choices.DURATIONS_HEAD, page.durations))
         if number in page.pictures:
             data = base64.b64encode(page.pictures[number]).decode()
             parts.append(f'<p><img alt="{heading}" src="data:image/png;base64,{data}">')
@@ -138,6 +143,8 @@ def as_markdown(page: Page) -> str:
         parts += [f"### {heading}", caption]
         if number == "choices" and page.tried:
             parts.append(_markdown_table(choices.HEAD, page.tried))
+        if number == "choices" and page.durations:
+            parts += [choices.DURATIONS_CAPTION, _markdown_table(choices.DURATIONS_HEAD, page.durations)]
         if number in page.pictures:
             parts.append(f"![{heading}]({IMAGES}/figure-{number}.png)")
         parts.append(_markdown_table(RUN_HEAD, _run_rows(page.figures.get(number, ()), mark="`")))

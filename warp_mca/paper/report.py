@@ -12,7 +12,7 @@ from typing import Any
 
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.files import write_atomically
-from warp_mca.paper.choices import choice_rows
+from warp_mca.paper.choices import choice_rows, duration_rows
 from warp_mca.paper.claim_table import CLAIMS
 from warp_mca.paper.claims import Verdict, judge
 from warp_mca.paper.evidence import Evidence, Runs, carry_out_runs, figures_of
@@ -100,7 +100,8 @@ def _report(runs: Runs, precision: str) -> Report:
     commands = [pure_case(level).command(runs.device) + more for more in (f" --method {METHOD}", "")]
     verdicts, pictures = judge(CLAIMS, runs), drawn(Evidence(runs))
     made, tried = _made(runs, precision), choice_rows(runs)
-    page = Page(level, made, verdicts, figures, pictures, runs.comparison, commands, tried)
+    tables = runs.comparison, commands, tried, duration_rows(runs)
+    page = Page(level, made, verdicts, figures, pictures, *tables)
     entries = {
         "level": level.name,
         "claims": [verdict.as_json() for verdict in page.verdicts],
