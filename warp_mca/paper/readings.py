@@ -130,7 +130,13 @@ def trend(evidence: Evidence, study: str, reading: Callable[[Result], float], un
 
 
 def path(result: Result, number: int) -> PathHistory:
-    """Path 1, 2 or 3 of Fig. 10."""
+    """Path 1, 2 or 3 of Fig. 10.
+
+    Raises:
+        MissingRunError: the run's folder has no paths.npz.
+    """
+    if not result.paths:
+        raise MissingRunError("the run's paths.npz is missing")
     return result.paths[number - 1]
 
 
