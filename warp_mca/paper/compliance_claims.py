@@ -6,7 +6,7 @@ from warp_mca.paper import readings as read
 from warp_mca.paper import word_checks as check
 from warp_mca.paper.claims import Claim
 
-_SOFT = "these runs take penalty 1; softer springs, as the paper's may be, change it as the column penalty says"
+_SOFT = "these runs take penalty 1; the contact's springs decide: the table of durations has what others give"
 _STICK = (
     "ours counts the time in which sticking nodes carry half of the normal force; the paper gives no numbers, and says "
     "that “compliances increase” both of stiffer and of softer bodies: its durations fall as they increase"
