@@ -11,13 +11,30 @@ import pytest
 from warp_mca.base.errors import RequestError
 from warp_mca.cli.main import main
 from warp_mca.paper import studies
+from warp_mca.paper.choices import DURATIONS_HEAD, TRIED, choice_rows, duration_rows
 from warp_mca.paper.claim_table import CLAIMS
 from warp_mca.paper.claims import Claim, Words, judge
-from warp_mca.paper.evidence import MissingRunError, Runs
+from warp_mca.paper.evidence import Evidence, MissingRunError, Runs
 from warp_mca.paper.page import Page, as_html, as_markdown
 from warp_mca.paper.pictures import PICTURES
+from warp_mca.paper.readings import event_duration
 from warp_mca.paper.report import Report, make_report
-from warp_mca.paper.studies import LEVELS, MAIN, MESH, PENALTY, STUDIES, MeshChoice, cases, in_order
+from warp_mca.paper.studies import (
+    LEVELS,
+    LUG,
+    MAIN,
+    MESH,
+    PENALTY,
+    SPRINGS,
+    STUDIES,
+    TOGETHER,
+    Case,
+    MeshChoice,
+    cases,
+    in_order,
+)
+from warp_mca.paper.word_checks import chosen
+from warp_mca.results.result import Result
 from warp_mca.results.storage import load
 from warp_mca.runs.sweep import LATE
 
@@ -31,7 +48,7 @@ SMALL = replace(
     limit=(),
     points={"mu": (0.1, 1.5)},
     ends={"mu": ()},
-    choices=None,
+    tried={},
 )
 
 
@@ -109,7 +126,7 @@ def test_runs_that_decide_most_come_first(level: studies.Level):
     assert set(order) == set(found.values()) and len(order) == len(set(order))
     assert order[0] == found["base", 0.0, MAIN]
     assert order.index(found["limit", 1.0, MAIN]) < order.index(found["mu", 0.1, MAIN])
-    main = {case for (_, _, variant), case in found.items() if variant == MAIN}
+    main = {case for (_, _, variant), case in found.items() if variant not in (MESH, PENALTY)}
     assert set(order[: len(main)]) == main
 
 
@@ -178,3 +195,50 @@ def test_claims_are_told_apart():
 def test_the_page_in_docs_has_every_claim():
     text = (DOCS / "paper.md").read_text(encoding="utf-8")
     assert [claim.id for claim in CLAIMS if f"| {claim.what} | {claim.source} |" not in text] == []
+
+
+def test_the_duration_of_an_impact_includes_succession_collisions():
+    def impact(*contacts: tuple[float, float], still: bool = False) -> Result:
+        return Result({"contacts": contacts, "contact_open_at_end": still}, {})
+
+    assert event_duration(impact((1e-6, 0.4e-3))) == pytest.approx(0.399)
+    assert event_duration(impact((0.0, 0.8e-3), (1.1e-3, 1.4e-3), (1.8e-3, 2e-3), still=True)) == pytest.approx(1.4)
+    for missing in (impact(), impact((0.0, 0.8e-3), (1.1e-3, 2e-3), still=True)):
+        with pytest.raises(MissingRunError):
+            event_duration(missing)
+
+
+def test_choices_that_the_paper_leaves_open_stand_beside_its_figures(folder: Path):
+    rows = {row[0]: row for row in choice_rows(runs_of(LEVELS["full"]))}
+    assert list(rows) == ["published"]
+    points = [(("mu", value, LUG), value) for value in (0.1, 1.5)]
+    level = replace(LEVELS["full"], tried={LUG: (COARSE, TOGETHER)})
+    found = {key: Case(COARSE, (("mu", value),)) for key, value in points}
+    done = {case: {"status": "done"} for case in found.values()}
+    folders = {case: folder / "runs" / str(k) for k, case in enumerate(found.values())}
+    row = choice_rows(Runs(level, folder, found, done, folders, "cpu"))[1]
+    summary = [load(path).summary for path in folders.values()]
+    assert row[0] == TRIED[LUG] and row[1] == "–" and row[-1] == "–, –"
+    assert row[4] == ", ".join(f"{1e-3 * item['F_t_min']:.3f}" for item in summary)
+
+
+def test_a_claim_about_a_choice_is_read_from_its_runs_only():
+    seen = []
+    found = chosen(LUG, lambda evidence: seen.append(evidence.variant) or 1.0)
+    assert found(Evidence(runs_of(SMALL))) == 1.0 and seen == [LUG]
+    with pytest.raises(MissingRunError):
+        found(Evidence(runs_of(SMALL), MESH))
+
+
+def test_durations_by_springs_stand_beside_the_published_ones(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warp_mca.paper.readings.event_duration", lambda result: 1e3 * float(result.time[-1]))
+    level = LEVELS["full"]
+    found = cases(level)
+    case, springs = found["rod", 0.7, MAIN], found["rod", 0.7, SPRINGS]
+    assert dict(springs.settings)["penalty"] == 0.3 and springs.mesh == COARSE
+    rows = {key: {"status": "failed", "reason": ""} for key in found.values()} | {case: {"status": "done"}}
+    published, main, *others = duration_rows(Runs(level, folder, found, rows, {case: folder / "runs" / "0"}, "cpu"))
+    assert len(published) == len(DURATIONS_HEAD) and len(others) == 3
+    assert main[1:] == ("–",) * 4 + ("0.010", "–")  # of a run of 10 us
+    assert not any(set(row[1:]) - {"–"} for row in others)
+    assert duration_rows(runs_of(LEVELS["quick"])) == []

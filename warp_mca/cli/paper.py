@@ -81,7 +81,7 @@ def _print(report: Report) -> None:
     from warp_mca.report.console import console
 
     out = console()
-    for said, state in (("agree", True), ("differ", False), ("not run at this level", None)):
+    for said, state in (("agree", True), ("differ", False), ("have no run", None)):
         out.print(f"{sum(verdict.agrees is state for verdict in report.verdicts):3} claims {said}")
     for verdict in report.verdicts:
         if verdict.agrees is False:

@@ -8,9 +8,12 @@ from warp_mca.paper.claims import Claim
 from warp_mca.paper.compliance_claims import COMPLIANCE
 from warp_mca.paper.limit_claims import LIMITS
 from warp_mca.paper.pure_claims import PURE
-from warp_mca.paper.studies import MESHES
+from warp_mca.paper.studies import CELLS, LUG, MESHES
 
-PENALTY_REASON = "springs of the factor 0.1 take part of the peak, more of it the coarser the cells at the tip are"
+PENALTY_REASON = (
+    "springs of the factor 0.1 take part of the peak, more of it the coarser the cells at the tip are; with those of "
+    "0.45 mm it is the published one"
+)
 
 
 CLAIMS: tuple[Claim, ...] = (
@@ -73,7 +76,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Table 2, Fig. 9b",
         "first peak of F_n with cells of 0.45 mm at the tip, where the paper's words give its figures together",
         3.23526,
-        check.of("choices", 0.0, read.first_peak),
+        check.chosen(CELLS, check.base(read.first_peak)),
         "kN",
         0.03,
     ),
@@ -138,7 +141,14 @@ CLAIMS: tuple[Claim, ...] = (
         "F_t turns from negative to positive from 0.8 m/s on, and not at 0.4 m/s",
         "0.8: yes, 0.4: no",
         read.reversal,
-        reason="two tied pairs of nodes yield on fine meshes, and F_t turns later; with lugs or pins it turns",
+        reason="two tied pairs of nodes yield on fine meshes, and F_t turns later; the hinge as built lets it turn",
+    ),
+    Claim(
+        "reversal_lug",
+        "Fig. 12",
+        "the same with hinges of fork and eye, as built",
+        "0.8: yes, 0.4: no",
+        check.chosen(LUG, read.reversal),
     ),
     Claim(
         "stick_restitution",

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from warp_mca.paper import choices
 from warp_mca.paper.claims import Verdict
 from warp_mca.paper.pictures import PICTURES
 from warp_mca.paper.studies import Level
@@ -24,7 +25,7 @@ RUN_HEAD = ("command", "elements", "F_n peaks [kN]", "F_t [kN]", "contact [ms]",
 SECTIONS = (  # number of each figure, its heading and caption
     *((picture.number, f"Figure {picture.number}", picture.caption) for picture in PICTURES),
     ("limit", "Limit of fine meshes", "Runs of our own: penalty 1, hinges of fork and eye, two meshes."),
-    ("choices", "The paper's choices", "Two pairs of nodes in each hinge, penalty 0.1, cells of 0.45 mm at the tip."),
+    ("choices", "Choices that the paper leaves open", choices.CAPTION),
 )
 
 
@@ -40,6 +41,8 @@ class Page:
         pictures: PNG files by number.
         comparison: with finite elements alone, if they were run.
         compared: the commands of both.
+        tried: rows of the table of choices.
+        durations: rows of that of springs.
     """
 
     level: Level
@@ -49,6 +52,8 @@ class Page:
     pictures: Mapping[str, bytes]
     comparison: Mapping[str, Any] | None = None
     compared: Sequence[str] = ()
+    tried: Sequence[tuple[str, ...]] = ()
+    durations: Sequence[tuple[str, ...]] = ()
 
     def introduction(self) -> list[str]:
         """Paragraphs before the tables."""
@@ -108,6 +113,11 @@ def as_html(page: Page) -> str:
     parts += ["<h2>Figures</h2>"]
     for number, heading, caption in SECTIONS:
         parts.append(f"<h3>{heading}</h3><p>{html.escape(caption)}</p>")
+        if number == "choices" and page.tried:
+            parts.append(_html_table(choices.HEAD, page.tried))
+        if number == "choices" and page.durations:
+            parts.append(f"<p>{html.escape(choices.DURATIONS_CAPTION)}</p>")
+            parts.append(_html_table(choices.DURATIONS_HEAD, page.durations))
         if number in page.pictures:
             data = base64.b64encode(page.pictures[number]).decode()
             parts.append(f'<p><img alt="{heading}" src="data:image/png;base64,{data}">')
@@ -131,6 +141,10 @@ def as_markdown(page: Page) -> str:
     parts += ["## Figures"]
     for number, heading, caption in SECTIONS:
         parts += [f"### {heading}", caption]
+        if number == "choices" and page.tried:
+            parts.append(_markdown_table(choices.HEAD, page.tried))
+        if number == "choices" and page.durations:
+            parts += [choices.DURATIONS_CAPTION, _markdown_table(choices.DURATIONS_HEAD, page.durations)]
         if number in page.pictures:
             parts.append(f"![{heading}]({IMAGES}/figure-{number}.png)")
         parts.append(_markdown_table(RUN_HEAD, _run_rows(page.figures.get(number, ()), mark="`")))

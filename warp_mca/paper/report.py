@@ -12,6 +12,7 @@ from typing import Any
 
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.files import write_atomically
+from warp_mca.paper.choices import choice_rows, duration_rows
 from warp_mca.paper.claim_table import CLAIMS
 from warp_mca.paper.claims import Verdict, judge
 from warp_mca.paper.evidence import Evidence, Runs, carry_out_runs, figures_of
@@ -98,7 +99,9 @@ def _report(runs: Runs, precision: str) -> Report:
     level, figures = runs.level, figure_rows(runs)
     commands = [pure_case(level).command(runs.device) + more for more in (f" --method {METHOD}", "")]
     verdicts, pictures = judge(CLAIMS, runs), drawn(Evidence(runs))
-    page = Page(level, _made(runs, precision), verdicts, figures, pictures, runs.comparison, commands)
+    made, tried = _made(runs, precision), choice_rows(runs)
+    tables = runs.comparison, commands, tried, duration_rows(runs)
+    page = Page(level, made, verdicts, figures, pictures, *tables)
     entries = {
         "level": level.name,
         "claims": [verdict.as_json() for verdict in page.verdicts],
@@ -119,11 +122,12 @@ def figure_rows(runs: Runs) -> dict[str, list[dict[str, Any]]]:
     """By the paper's number of the figure: of each run the command, what was varied, the figures of its summary."""
     by_study: dict[str, list[dict[str, Any]]] = {}
     for (study, value, variant), case in runs.cases.items():
+        group = "choices" if variant in runs.level.tried else study
         row = {"command": case.command(runs.device), "variant": variant, "value": value, **figures_of(runs.rows[case])}
         if row["status"] == DONE:
             summary = load(runs.folders[case]).summary
             row |= {key: summary[key] for key in LISTS}
-        by_study.setdefault(study, []).append(row)
+        by_study.setdefault(group, []).append(row)
     found = {picture.number: by_study.get(picture.study, []) for picture in PICTURES}
     return found | {name: by_study.get(name, []) for name in ("limit", "choices")}
 

@@ -14,6 +14,8 @@ from warp_mca.scene import catalogue
 
 SCENE = "two_link"
 MAIN, MESH, PENALTY = "main", "mesh", "penalty"  # variants of a point: as shown; other mesh; on it, other penalty too
+LUG, CELLS, CELLS_LUG = "lug", "cells", "cells, lug"  # hinges of fork and eye; cells of 0.45 mm at the tip; both
+SPRINGS = "springs"  # penalty 0.3 on cells of 1.2 mm: springs as soft, by area, as the published first peak asks for
 Settings = tuple[tuple[str, object], ...]
 
 
@@ -109,7 +111,7 @@ STIFF: Settings = (("penalty", 1.0),)  # springs of a soft tip are soft in propo
 # of Table 2: links swing for long, on hinges that do not yield; rigid links have the mass of the mesh
 PURE: Settings = (("joint_nodes", "axis"), ("penalty", 1.0), ("rigid_inertia", "mesh"), ("duration", 5e-3))
 TANGENT = 27.0 / 70.0  # tangent modulus over Young's modulus, Table 1
-SPANS = ((0.7, 3e-3), (7.0, 2e-3), (70.0, 0.8e-3), (7000.0, 0.5e-3))  # moduli [GPa], duration [s]
+SPANS = ((0.7, 4e-3), (7.0, 2e-3), (70.0, 0.8e-3), (7000.0, 0.5e-3))  # moduli [GPa], duration [s]
 
 
 def _compliance(name: str, figure: str, title: str, *parts: str) -> Study:
@@ -137,10 +139,12 @@ STUDIES: dict[str, Study] = {
         _compliance("body", "17", "Modulus of the rods' cylinders", "body"),
         _compliance("rod", "18", "Modulus of the whole rods", "tip", "body"),
         Study("limit", ("limit",), "Stiff springs, hinges of fork and eye", common=(("hinge", "lug"), *STIFF)),
-        Study("choices", ("choices",), "Choices that give the published figures together", common=BASE),
     )
 }
-FIRST = ("base", "choices", "limit", "meshes")  # studies whose runs come before all others
+FIRST = ("base", "limit", "meshes")  # studies whose runs come before all others
+ENDS = tuple((name, value) for name in ("tip", "body", "rod") for value in (0.7, 7000.0))  # with published durations
+# Points whose published figures are put beside those of choices that the paper leaves open
+TOGETHER = (("base", 0.0), ("mu", 0.1), ("mu", 1.5), ("v_plate", 0.4), ("v_plate", 0.8))
 MESHES = "meshes"  # name under which the runs of Fig. 7 are found, by number from the coarsest mesh
 
 
@@ -156,7 +160,7 @@ class Level:
         limit: two meshes on which stiff springs and hinges as built are compared, the finer one last; may be empty.
         points: values of each study; a study that is not listed is not run.
         ends: of these, values that are run in all variants.
-        choices: mesh with which the paper's own words give its figures together, or None.
+        tried: mesh and points of each variant that is a choice which the paper leaves open.
         pure: mesh of the comparison with pure finite elements, where that is asked for.
     """
 
@@ -168,7 +172,7 @@ class Level:
     limit: tuple[MeshChoice, ...]
     points: Mapping[str, tuple[float, ...]]
     ends: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    choices: MeshChoice | None = None
+    tried: Mapping[str, tuple[MeshChoice, tuple[tuple[str, float], ...]]] = field(default_factory=dict)
     pure: MeshChoice = MeshChoice("quick", refine=0.5)
 
 
@@ -191,7 +195,7 @@ def in_order(level: Level, found: Mapping[Key, Case]) -> list[Case]:
     def rank(key: Key) -> tuple[bool, int, bool]:
         study, value, variant = key
         first = FIRST.index(study) if study in FIRST else len(FIRST)
-        return variant != MAIN, first, value not in level.ends.get(study, (value,))
+        return variant in (MESH, PENALTY), first, value not in level.ends.get(study, (value,))
 
     return list(dict.fromkeys(found[key] for key in sorted(found, key=rank)))
 
@@ -207,8 +211,11 @@ def _cases(level: Level) -> Iterator[tuple[Key, Case]]:
                 yield (name, value, PENALTY), Case(level.other, _replaced(settings, study.other))
     for k, mesh in enumerate(level.meshes):
         yield (MESHES, float(k), MAIN), Case(mesh, BASE)
-    if level.choices is not None:
-        yield ("choices", 0.0, MAIN), Case(level.choices, STUDIES["choices"].common)
+    for variant, (mesh, points) in level.tried.items():
+        changes: Settings = (("hinge", "lug"),) if variant in (LUG, CELLS_LUG) else ()
+        changes += (("penalty", 0.3),) if variant == SPRINGS else ()
+        for name, value in points:
+            yield (name, value, variant), Case(mesh, _replaced(STUDIES[name].settings(value), changes))
     for k, mesh in enumerate(level.limit):
         yield ("limit", float(k), MAIN), Case(mesh, STUDIES["limit"].common)
 
@@ -217,7 +224,7 @@ def _replaced(settings: Settings, changes: Settings) -> Settings:
     return tuple((dict(settings) | dict(changes)).items())
 
 
-# with two pairs of nodes in each hinge and the penalty 0.1, see docs/hinges.md
+# cells of 0.45 mm at the tip, with which the penalty 0.1 gives the published first peak, see docs/hinges.md
 CHOICES = MeshChoice(
     "quick", cells=(("section", 8), ("axial_OA", 20), ("axial_AB", 20), ("focus_size", 0.45e-3), ("focus_layers", 5))
 )
@@ -259,7 +266,7 @@ LEVELS = {
                 "rod": (7.0, 70.0, 700.0),
             },
             ends={"swing": (), "mu": (0.1, 1.5)} | dict.fromkeys(("tip", "body", "rod"), (7.0, 700.0)),
-            choices=CHOICES,
+            tried={LUG: (replace(QUICK, refine=0.7), TOGETHER), CELLS: (CHOICES, TOGETHER[:1])},
         ),
         Level(
             "full",
@@ -279,7 +286,8 @@ LEVELS = {
             },
             ends={"swing": (), "v_plate": (0.4, 0.8, 4.0), "mu": (0.1, 1.5)}
             | dict.fromkeys(("tip", "body", "rod"), (0.7, 7000.0)),
-            choices=CHOICES,
+            tried=dict.fromkeys((CELLS, CELLS_LUG), (CHOICES, TOGETHER))
+            | {LUG: (PAPER, TOGETHER), SPRINGS: (replace(QUICK, refine=0.5), ENDS)},
             pure=PAPER,
         ),
     )

@@ -26,6 +26,17 @@ def base(reading: Callable[[Result], float]) -> Callable[[Evidence], Found]:
     return of("base", 0.0, reading)
 
 
+def chosen(variant: str, found: Callable[[Evidence], Found]) -> Callable[[Evidence], Found]:
+    """What is found in the runs of another variant than the main one, and of this one only."""
+
+    def of_variant(evidence: Evidence) -> Found:
+        if evidence.variant != MAIN:
+            raise MissingRunError("choices are run on one mesh")
+        return found(Evidence(evidence.runs, variant))
+
+    return of_variant
+
+
 def trend(study: str, reading: Callable[[Result], float], unit: str, *, rises: bool) -> Callable[[Evidence], Found]:
     """Whether a reading rises, or falls, over all values of a study."""
     return partial(read.trend, study=study, reading=reading, unit=unit, rises=rises)
