@@ -36,6 +36,7 @@ PAGES = (
     "how-to/rigid_plane.md",
     "how-to/boundary.md",
     "how-to/units.md",
+    "how-to/stopped.md",
 )
 _BLOCK = re.compile(r"^```(?P<info>[^\n`]+)\n(?P<text>.*?)^```$", re.S | re.M)
 _PICTURE = re.compile(r"!\[[^\]]*\]\([./]*images/pages/([^)]+)\)")

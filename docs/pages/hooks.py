@@ -1,39 +1,77 @@
-"""Owns what mkdocs does beyond its plugins: pages that stand at the top of the repository, and their links."""
+"""Owns what mkdocs does beyond its plugins: pages of files beside docs/, links that leave docs/, notebooks."""
 
 from __future__ import annotations
 
+import posixpath
 import re
 from pathlib import Path
 from typing import Any
 
-from mkdocs.structure.files import File, Files
+from mkdocs.structure.files import File, Files, InclusionLevel
+from mkdocs.structure.pages import Page
+from notebooks import render  # beside this file: mkdocs looks there for what hooks import
 
 ROOT = Path(__file__).resolve().parents[2]
-# Files beside docs/, by the page that each becomes.
-TOP = {"index.md": "README.md", "contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
-_PAGE_OF = {source: page for page, source in TOP.items()}
-_LINK = re.compile(r"(\]\()([^)#\s:]+)(#[^)\s]*)?(\))")
+# Pages of files beside docs/, by where these stand in the repository.
+PAGE_OF = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+CODE = ("kernels/", "scenes/", "tests/", "benchmarks/", "warp_mca/")  # shown as pages of their own where linked
+_LINK = re.compile(r"(?P<before>\]\()(?P<target>[^)#\s:]+)(?P<anchor>#[^)\s]*)?(?P<after>\))")
 
 
 def on_files(files: Files, *, config: Any) -> Files:
-    """Add the pages that stand beside docs/, their links as they are from within it."""
-    for page, source in TOP.items():
-        text = (ROOT / source).read_text(encoding="utf-8")
-        files.append(File.generated(config, page, content=_LINK.sub(_from_top, text)))
+    """Add pages of files beside docs/, of notebooks, which run now, and of each source file that a page links to."""
+    for notebook in [file for file in files if file.src_uri.endswith(".ipynb")]:
+        text, pictures = render(Path(str(notebook.abs_src_path)))
+        files.append(File.generated(config, notebook.src_uri.removesuffix(".ipynb") + ".md", content=text))
+        for name, picture in pictures.items():
+            place = posixpath.join(posixpath.dirname(notebook.src_uri), name)
+            files.append(File.generated(config, place, content=picture))
+    for source, page in PAGE_OF.items():
+        text = _relinked((ROOT / source).read_text(encoding="utf-8"), source, page)
+        files.append(File.generated(config, page, content=text))
+    sources = set()
+    for file in files.documentation_pages():
+        place = "docs/" + file.src_uri
+        text = file.content_string if file.generated_by else Path(str(file.abs_src_path)).read_text(encoding="utf-8")
+        sources |= {found for match in _LINK.finditer(text) if (found := _from(place, match["target"])).endswith(".py")}
+    for source in sorted(sources):
+        if source.startswith(CODE) and (ROOT / source).is_file():
+            text = (ROOT / source).read_text(encoding="utf-8")
+            content = f"# {source}\n\n```python\n{text}```\n"
+            page = File.generated(config, _code_page(source), content=content)
+            page.inclusion = InclusionLevel.NOT_IN_NAV
+            files.append(page)
     return files
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
+def on_page_markdown(markdown: str, *, page: Page, **_: Any) -> str:
     """Links out of docs/ lead to the pages that these files become."""
-    return _LINK.sub(_from_docs, markdown)
+    return markdown if page.file.generated_by else _relinked(markdown, "docs/" + page.file.src_uri, page.file.src_uri)
 
 
-def _from_top(match: re.Match[str]) -> str:
-    before, target, anchor, after = match.groups()
-    return f"{before}{_PAGE_OF.get(target, target.removeprefix('docs/'))}{anchor or ''}{after}"
+def _code_page(source: str) -> str:
+    return f"code/{source.removesuffix('.py')}.md"
 
 
-def _from_docs(match: re.Match[str]) -> str:
-    before, target, anchor, after = match.groups()
-    name = target.removeprefix("../")
-    return f"{before}{_PAGE_OF.get(name, target) if name != target else target}{anchor or ''}{after}"
+def _from(place: str, target: str) -> str:
+    """Where a link in the file at `place` leads, from the top of the repository on."""
+    return posixpath.normpath(posixpath.join(posixpath.dirname(place), target))
+
+
+def _relinked(text: str, place: str, page: str) -> str:
+    """The text of the file at `place`, with links as they are from the page that it becomes."""
+
+    def relink(match: re.Match[str]) -> str:
+        found = _from(place, match["target"])
+        if found.startswith("docs/"):
+            to = found.removeprefix("docs/")
+        elif found in PAGE_OF:
+            to = PAGE_OF[found]
+        elif found.startswith(CODE) and found.endswith(".py"):
+            to = _code_page(found)
+        else:
+            return match[0]
+        to = posixpath.relpath(to, posixpath.dirname(page) or ".")
+        return f"{match['before']}{to}{match['anchor'] or ''}{match['after']}"
+
+    return _LINK.sub(relink, text)
