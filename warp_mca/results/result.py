@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.force_history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
 from warp_mca.results.paths import PathHistory
+from warp_mca.results.sensor_history import ProbeHistory, SectionHistory
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -44,6 +45,8 @@ class Result:
         contacts: forces of each of the scene's contacts by itself, with one row for each row of the history.
         stopped: which guard stopped this scene of a batch, in one sentence; None if none did. Rows end before it.
         failed: names of recorders that failed: what they write is missing or ends too early.
+        probes: motion of the scene's probes, with one row for each row of the history.
+        sections: resultants of the scene's sections, likewise.
     """
 
     summary: dict[str, Any]
@@ -54,6 +57,8 @@ class Result:
     stopped: str | None = None
     failed: tuple[str, ...] = ()
     contacts: tuple[ContactHistory, ...] = ()
+    probes: tuple[ProbeHistory, ...] = ()
+    sections: tuple[SectionHistory, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -96,6 +101,8 @@ class Result:
             history={**history, "time_s": history["time_s"] - start},
             paths=tuple(path.at(rows) for path in self.paths),
             contacts=tuple(contact.at(rows) for contact in self.contacts),
+            probes=tuple(replace(probe.at(rows), time=self.time[rows] - start) for probe in self.probes),
+            sections=tuple(section.at(rows) for section in self.sections),
         )
 
 

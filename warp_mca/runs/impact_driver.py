@@ -115,7 +115,7 @@ class ImpactDriver:
         warnings = tuple(mesh_warnings(setup.scene, setup.meshes, model)) if self.count == 1 else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
         start = setup.first if self.count == 1 else replace(setup.first, **mismatch)  # those are of the first hand-off
-        return Prepared(setup.scene, setup.meshes, start, model, probes, warnings), u, V
+        return Prepared(setup.scene, setup.meshes, start, model, probes, setup.sensors, warnings), u, V
 
     def _shape(
         self, motion: Motion, relaxation: Relaxation, u: ByBody, settled: list[Shape]
