@@ -66,14 +66,12 @@ def blocks(text: str) -> list[Block]:
     for match in _BLOCK.finditer(text):
         language, _, rest = match["info"].partition(" ")
         title = re.search(r'title="([^"]+)"', rest)
-        found.append(
-            Block(language, title[1] if title else "", match["text"], match.start("text"), match.end("text"))
-        )
+        found.append(Block(language, title[1] if title else "", match["text"], match.start("text"), match.end("text")))
     return found
 
 
 def page_blocks(page: str) -> list[Block]:
-    """The blocks of a page of the documentation; the code cells of a notebook are its Python blocks."""
+    """The blocks of a page, by its place in docs/; the code cells of a notebook are its Python blocks."""
     text = (DOCS / page).read_text(encoding="utf-8")
     if not page.endswith(".ipynb"):
         return blocks(text)
@@ -81,13 +79,18 @@ def page_blocks(page: str) -> list[Block]:
     return [Block("python", "", "".join(cell["source"]), 0, 0) for cell in cells]
 
 
-def run_page(page: str, folder: Path) -> list[tuple[Block, str]]:
+def run_page(page: str, folder: Path, given: dict[str, object] | None = None) -> list[tuple[Block, str]]:
     """Run the Python blocks of a page in a folder, each going on from the one before: what each one printed.
 
     Bash blocks are not run. Raises whatever a block raises.
+
+    Args:
+        page: its place in docs/.
+        folder: to run in.
+        given: names that the page takes as known.
     """
     before, path = Path.cwd(), list(sys.path)
-    names: dict[str, object] = {"__name__": "__main__"}
+    names: dict[str, object] = {"__name__": "__main__", **(given or {})}
     printed, loaded = [], set(sys.modules)
     os.chdir(folder)
     sys.path.insert(0, str(folder))

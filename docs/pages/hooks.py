@@ -14,6 +14,7 @@ from notebooks import render  # beside this file: mkdocs looks there for what ho
 ROOT = Path(__file__).resolve().parents[2]
 # Pages of files beside docs/, by where these stand in the repository.
 PAGE_OF = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+CITATION = "CITATION.cff"
 CODE = ("kernels/", "scenes/", "tests/", "benchmarks/", "warp_mca/")  # shown as pages of their own where linked
 _LINK = re.compile(r"(?P<before>\]\()(?P<target>[^)#\s:]+)(?P<anchor>#[^)\s]*)?(?P<after>\))")
 
@@ -29,6 +30,7 @@ def on_files(files: Files, *, config: Any) -> Files:
     for source, page in PAGE_OF.items():
         text = _relinked((ROOT / source).read_text(encoding="utf-8"), source, page)
         files.append(File.generated(config, page, content=text))
+    files.append(File.generated(config, CITATION, content=(ROOT / CITATION).read_text(encoding="utf-8")))
     sources = set()
     for file in files.documentation_pages():
         place = "docs/" + file.src_uri
@@ -64,7 +66,9 @@ def _relinked(text: str, place: str, page: str) -> str:
     def relink(match: re.Match[str]) -> str:
         found = _from(place, match["target"])
         if found.startswith("docs/"):
-            to = found.removeprefix("docs/")
+            to = re.sub(r"\.ipynb$", ".md", found.removeprefix("docs/"))
+        elif found == CITATION:
+            to = found
         elif found in PAGE_OF:
             to = PAGE_OF[found]
         elif found.startswith(CODE) and found.endswith(".py"):
