@@ -23,11 +23,11 @@ DOCS = Path(__file__).parent.parent / "docs"
 PICTURES = DOCS / "images" / "gallery"
 
 
-def run_scene(name: str) -> dict[str, Any]:
-    """Run and picture one scene: its row of gallery.json."""
+def run_scene(name: str, folder: Path = PICTURES) -> dict[str, Any]:
+    """Run one scene, and picture it in a folder: its row of gallery.json."""
     item = SCENES[name]
     scene = mca.make_scene(name, **dict(item.parameters or {}))
-    picture = PICTURES / f"{name}.png"
+    picture = folder / f"{name}.png"
     instant = item.at * scene.impact.duration
     begun = time.process_time()
     result = mca.run(scene, device="cpu", recorders=[SnapshotFile(picture, time=instant)])

@@ -3,9 +3,9 @@
     python -m benchmarks.pages                          run every page of PAGES, write its outputs and pictures
     python -m benchmarks.pages tutorials/drop.md        one of them
 
-A Python block is run; one with `title="NAME"` is written to the file NAME instead, beside the pages' other files. A block
-of ```text that follows a Python block shows what that one printed. `![…](…/images/pages/NAME.png)` shows the picture
-NAME.png that the page's code wrote. `tests/test_pages.py` runs the pages as well, and compares.
+A Python block is run; one with `title="NAME"` is written to the file NAME instead, beside the page's other files. A
+block of ```text that follows a Python block shows what that one printed. `![…](…/images/pages/NAME.png)` shows the
+picture NAME.png that the page's code wrote. `tests/test_pages.py` runs the pages as well, and compares.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import shutil
 import sys
 import tempfile
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from benchmarks.pictures import shrink
@@ -115,7 +116,7 @@ def run_page(page: str, folder: Path, given: dict[str, object] | None = None) ->
 def shown(page: str) -> list[tuple[Block, Block]]:
     """The Python blocks of a page whose output it shows, each with the block that shows it."""
     found = page_blocks(page)
-    return [(a, b) for a, b in zip(found, found[1:], strict=False) if (a.language, b.language) == ("python", "text")]
+    return [(a, b) for a, b in pairwise(found) if (a.language, b.language) == ("python", "text")]
 
 
 def pictures(page: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Python blocks of the pages that take names or files as known: they run on a small scene in place of the large ones."""
+"""Python blocks of pages that take names or files as known: they run on a small scene in place of large ones."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Bar:
         """The mesh."""
         box = mca.Box(size=(0.2, 0.01, 0.01), divisions=(self.cells, 2, 2)).build()
         points = box.points.copy()
-        points[np.isclose(points[:, 0], 0.1), 0] -= 0.15 / self.cells
+        points[np.isclose(points[:, 0], 0.1), 0] -= 0.18 / self.cells
         return dataclasses.replace(box, points=points)
 
     def refined(self, factor: float) -> Bar:
@@ -45,7 +45,7 @@ def small(**parameters: object) -> mca.Scene:
         name="small",
         bodies=(mca.Body(name="AB", geometry=Bar(), material=STEEL, velocity=(1.0, 0.0, 0.0)),),
         contacts=(mca.Contact(slave=SURFACE, master=WALL),),
-        impact=mca.ImpactPhase(duration=7e-5, output_interval=1e-6),
+        impact=mca.ImpactPhase(duration=6e-5, output_interval=1e-6),
         paths=(mca.Path(name="a", lines=(mca.Line(body="AB", start=(0.2, 0, 0), end=(0, 0, 0)),), spacing=0.01),),
         tip=mca.Point(body="AB", at=(0.1, 0.0, 0.0)),
         parameters=parameters,

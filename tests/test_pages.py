@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
+import json
 import re
 import shlex
 from collections.abc import Iterator
@@ -14,11 +14,12 @@ import pytest
 from PIL import Image
 
 import warp_mca as mca
-from benchmarks.gallery import render
+from benchmarks.gallery import render, run_scene
 from benchmarks.gallery_scenes import SCENES
 from benchmarks.pages import DOCS, PAGES, blocks, page_blocks, pictures, run_page, shown
+from benchmarks.pictures import WIDTH
 from warp_mca.cli.parser import make_parser
-from warp_mca.scene.catalogue import scene_names
+from warp_mca.scene.catalogue import load_source, parse_overrides, scene_names
 
 ROOT = DOCS.parent
 NUMBER = re.compile(r"[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -70,6 +71,28 @@ def test_the_material_of_the_tutorial_is_that_of_the_tests():
     assert law.text == (ROOT / "tests" / "voce.py").read_text(encoding="utf-8")
 
 
+def test_the_gallery_has_every_scene_and_is_rendered_from_its_runs():
+    rows = json.loads((DOCS / "gallery.json").read_text(encoding="utf-8"))
+    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == render(rows)
+    assert sorted(row["scene"] for row in rows) == sorted(SCENES) == sorted(scene_names())
+    for row in rows:
+        with Image.open(DOCS / "images" / "gallery" / f"{row['scene']}.png") as picture:
+            assert picture.width <= WIDTH
+        if row["known"] is not None:
+            assert row["measured"] == pytest.approx(row["known"], rel=0.03, abs=1e-12), row["scene"]
+
+
+def test_a_run_gives_the_figure_of_the_gallery(tmp_path: Path):
+    rows = {row["scene"]: row for row in json.loads((DOCS / "gallery.json").read_text(encoding="utf-8"))}
+    assert run_scene("pulse_bar", tmp_path)["measured"] == pytest.approx(rows["pulse_bar"]["measured"], rel=1e-4)
+
+
+def test_every_public_name_is_in_the_api():
+    text = "".join(path.read_text(encoding="utf-8") for path in (DOCS / "api").glob("*.md"))
+    names = re.findall(r"^::: warp_mca\.(\w+)$", text, flags=re.M)
+    assert sorted(names) == sorted(set(mca.__all__) - {"__version__"})
+
+
 def command_lines(page: Path) -> list[str]:
     """Lines of a page's bash blocks, those that go on joined, parts of `a && b` by themselves, without comments."""
     text = "\n".join(b.text for b in blocks(page.read_text(encoding="utf-8")) if b.language == "bash")
@@ -102,8 +125,6 @@ def test_commands_on_the_pages_are_accepted():
 
 def check_scene(asked: argparse.Namespace, where: str) -> None:
     """That a built-in scene of a command exists and takes its parameters."""
-    from warp_mca.scene.catalogue import load_source, parse_overrides
-
     name = getattr(asked, "scene", None)
     if isinstance(name, str) and "." not in name and name != "SCENE":
         assert name in scene_names(), where
