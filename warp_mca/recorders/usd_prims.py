@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.geometry.creases import Creases
 from warp_mca.recorders.colours import PALETTE, SLIP, STICK, levels
-from warp_mca.recorders.creases import Creases
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import SurfaceMesh
@@ -52,7 +52,7 @@ class BodyPrim:
             primvars.CreatePrimvar(name, float_array, UsdGeom.Tokens.vertex) for name in ("vonMises", "plasticStrain")
         )
         self.plastic, self.plastic_sum = _Held(plastic), -1.0
-        self.creases = Creases(surface, points)
+        self.creases = Creases(surface.quads, points)
         normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
         normals.CreateIndicesAttr().Set(Vt.IntArray.FromNumpy(self.creases.group))
         self.normals = _Held(normals)

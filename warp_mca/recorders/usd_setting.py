@@ -20,7 +20,7 @@ ROOM = 1.15  # distance of the camera over the least that holds the bodies
 LIGHT, DARK = (0.62, 0.63, 0.66), (0.45, 0.46, 0.5)  # squares of a plane, linear colours
 STEEP = 0.7  # of the upward direction's z, above which z is the stage's up axis
 SUN = np.array([0.4, 0.8, 0.45])  # direction to the light, in axes of the view
-SUN_INTENSITY, SKY_INTENSITY = 1.0, 0.5
+SUN_INTENSITY, SKY_INTENSITY = 0.85, 0.4
 
 
 def set_up_axis(stage: Any, world: Any, up: NDArray) -> None:

@@ -58,8 +58,8 @@ class PlaneMesh:
         points: corners of its squares at t = 0 [m], shape (point_count, 3), float64.
         quads: counter-clockwise from the free side, shape (square_count, 4), int32.
         dark: whether each square is a dark one, shape (square_count,), bool.
-        normal: unit vector to the free side, shape (3,).
-        velocity: of the plane along itself [m/s], shape (3,).
+        normal: unit vector to the free side [-], shape (3,), float64.
+        velocity: of the plane along itself [m/s], shape (3,), float64.
         period: after which way along the velocity the pattern repeats [m].
     """
 

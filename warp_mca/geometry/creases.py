@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.recorders.recorder import SurfaceMesh
+from warp_mca.geometry.cell_types import is_triangle
 
 CREASE = np.cos(np.radians(35.0))  # faces that meet at a greater angle keep a sharp edge
 TURNED = np.cos(np.radians(5.0))  # faces that turned by more get new normals
@@ -19,14 +19,20 @@ class Creases:
         count: how many there are.
     """
 
-    def __init__(self, surface: SurfaceMesh, points: NDArray[np.floating]) -> None:
-        """Find the edges of a skin with these points [m], shape (vertex_count, 3)."""
+    def __init__(self, quads: NDArray[np.int32], points: NDArray[np.floating]) -> None:
+        """Find the edges of a skin.
+
+        Args:
+            quads: vertices of each face, triangles with their last one twice, shape (face_count, 4), int32.
+            points: of the vertices [m], shape (vertex_count, 3), float32 or float64.
+        """
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 
-        self.quads = surface.quads
-        self._used = np.arange(4) < surface.corner_counts[:, None]
-        first, second = _corners_over_edges(surface, _units(self._faces(points)))
+        self.quads = quads
+        count = np.where(is_triangle(quads), 3, 4)
+        self._used = np.arange(4) < count[:, None]
+        first, second = _corners_over_edges(quads, count, _units(self._faces(points)))
         size = self.quads.size
         links = coo_matrix((np.ones(len(first), dtype=bool), (first, second)), shape=(size, size))
         label = connected_components(links, directed=False)[1].reshape(self.quads.shape)
@@ -45,6 +51,16 @@ class Creases:
         sums = [np.bincount(self.group, corner[:, k], minlength=self.count) for k in range(3)]
         return _units(np.stack(sums, axis=1)).astype(np.float32)
 
+    def by_triangle(self, points: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
+        """Normals at the corners of the faces cut in triangles, and their vertices, shapes (count, 3, 3), (count, 3)."""
+        normals = self.normals(points)
+        assert normals is not None  # asked for the first time
+        group = np.zeros(self.quads.shape, dtype=np.int32)
+        group[self._used] = self.group
+        halves = [(slice(None), [0, 1, 2]), (self._used[:, 3], [0, 2, 3])]
+        corner = np.concatenate([self.quads[faces][:, at] for faces, at in halves])
+        return normals[np.concatenate([group[faces][:, at] for faces, at in halves])], corner
+
     def _faces(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
         """Normals of the faces, as long as twice their area [m^2], shape (face_count, 3)."""
         a, b, c, d = (points[self.quads[:, k]] for k in range(4))
@@ -56,11 +72,11 @@ def _units(vectors: NDArray[np.floating]) -> NDArray[np.floating]:
     return vectors / np.maximum(length, np.finfo(np.float32).tiny)
 
 
-def _corners_over_edges(surface: SurfaceMesh, normal: NDArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _corners_over_edges(quads: NDArray, count: NDArray, normal: NDArray) -> tuple[NDArray, NDArray]:
     """Pairs of corners, numbered 4 face + corner, that faces on both sides of a smooth edge have at its ends."""
-    face, start = np.nonzero(np.arange(4) < surface.corner_counts[:, None])
-    end = (start + 1) % surface.corner_counts[face]
-    ends = np.stack([surface.quads[face, start], surface.quads[face, end]], axis=1)
+    face, start = np.nonzero(np.arange(4) < count[:, None])
+    end = (start + 1) % count[face]
+    ends = np.stack([quads[face, start], quads[face, end]], axis=1)
     turned = ends[:, 0] > ends[:, 1]
     key = np.sort(ends, axis=1)
     corner = np.stack([4 * face + start, 4 * face + end], axis=1)
