@@ -166,6 +166,7 @@ class SceneRun:
             more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
         if scene.stress_paths:
             body = scene.body(scene.stress_paths[0].lines[0].body)
+            more["path_headings"] = {path.name: path.heading for path in scene.stress_paths}
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
         return RunFacts(
             scene=scene.name,

@@ -45,6 +45,8 @@ class Scene:
         joints, contacts, fixed, prescribed, ties: what binds the bodies.
         absorbing: sides of bodies through which waves leave.
         gravity: [m/s^2].
+        up: direction that points up in pictures [-], of any length; None takes the one opposite to gravity, else the
+            normal of the first rigid plane, else y.
         paths: lines along which stress is recorded.
         probes: points and node sets whose motion is recorded.
         sections: cuts through bodies whose resultants are recorded.
@@ -70,6 +72,7 @@ class Scene:
     probes: tuple[Probe, ...] = ()
     sections: tuple[Section, ...] = ()
     gravity: Vec3 = (0.0, 0.0, 0.0)
+    up: Vec3 | None = None
     tip: Point | None = None
     target: Point | None = None
     refine: float = 1.0
@@ -115,7 +118,9 @@ class Scene:
             if pairs.count((slave, master)) > 1:
                 what = f"{slave.nodes} of {slave.body}"
                 raise bad_value("Scene.contacts", what, "it meets the same master twice; list each pair once")
-        validate.vectors("Scene", gravity=self.gravity)
+        validate.vectors("Scene", gravity=self.gravity, **({} if self.up is None else {"up": self.up}))
+        if self.up is not None and not any(self.up):
+            raise bad_value("Scene.up", self.up, "give a vector that is not zero")
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
