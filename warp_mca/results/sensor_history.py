@@ -15,6 +15,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.results.cfc import cfc_filter, is_even
 from warp_mca.results.csv_table import write_table
 from warp_mca.results.npz import load_histories, save_histories
+from warp_mca.results.units import units_of
 from warp_mca.scene import Scene
 
 Array = NDArray[np.float64]
@@ -146,9 +147,18 @@ def sensor_columns(probes: Sequence[ProbeHistory], sections: Sequence[SectionHis
     return found
 
 
-def sensor_figures(probes: Sequence[ProbeHistory], sections: Sequence[SectionHistory], time: Array) -> dict[str, Any]:
-    """What the summary says of probes and sections; nothing where there are none."""
-    found: dict[str, Any] = {}
+def sensor_figures(
+    probes: Sequence[ProbeHistory], sections: Sequence[SectionHistory], history: Mapping[str, Array]
+) -> dict[str, Any]:
+    """What the summary says of units, and of probes and sections where there are any.
+
+    Args:
+        probes, sections: of the run.
+        history: its columns.
+    """
+    own = {name: unit for name, (_, unit) in sensor_columns(probes, sections).items()}
+    found: dict[str, Any] = {"units": units_of(history) | own}
+    time = history["time_s"]
     if probes:
         found["probes"] = [_probe_figures(probe) for probe in probes]
     if sections:

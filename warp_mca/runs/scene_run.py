@@ -125,7 +125,7 @@ class SceneRun:
         facts = self._facts(wall, shares)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
-        summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history["time_s"])
+        summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
         warnings = (*self._warnings(shares, stopped), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
         return Result(summary, history, None, warnings, paths, stopped, **own)
