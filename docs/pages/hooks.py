@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +48,20 @@ def on_files(files: Files, *, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page: Page, **_: Any) -> str:
-    """Links out of docs/ lead to the pages that these files become."""
-    return markdown if page.file.generated_by else _relinked(markdown, "docs/" + page.file.src_uri, page.file.src_uri)
+    """Links out of docs/ lead to the pages that these files become; the gallery shows the code of its scenes."""
+    if page.file.generated_by:
+        return markdown
+    if page.file.src_uri == "gallery.md":
+        markdown = re.sub(r"Code: \[scenes/(\w+)\.py\]\([^)]*\)\.", _scene_code, markdown)
+    return _relinked(markdown, "docs/" + page.file.src_uri, page.file.src_uri)
+
+
+def _scene_code(match: re.Match[str]) -> str:
+    """The link to a scene's file, and what its `build` does, folded."""
+    code = (ROOT / "scenes" / f"{match[1]}.py").read_text(encoding="utf-8").split(") -> mca.Scene:\n")[1]
+    body = code.split("\n\n\n")[0].rstrip()
+    fence = f"```python\n{textwrap.dedent(body)}\n```"
+    return f'{match[0]}\n\n??? example "The scene"\n\n{textwrap.indent(fence, "    ")}'
 
 
 def _code_page(source: str) -> str:
