@@ -26,11 +26,11 @@ PICTURES = DOCS / "images" / "gallery"
 def run_scene(name: str, folder: Path = PICTURES) -> dict[str, Any]:
     """Run one scene, and picture it in a folder: its row of gallery.json."""
     item = SCENES[name]
-    scene = mca.make_scene(name, **dict(item.parameters or {}))
+    scene = mca.make_scene(name)
     picture = folder / f"{name}.png"
     instant = item.at * scene.impact.duration
     begun = time.process_time()
-    result = mca.run(scene, device="cpu", recorders=[SnapshotFile(picture, time=instant)])
+    result = mca.run(scene, device="cpu", recorders=[SnapshotFile(picture, time=instant, **item.look)])
     spent = time.process_time() - begun
     shrink(picture)
     known = item.known(result.summary["parameters"]) if item.known else None

@@ -198,7 +198,7 @@ def test_probes_and_sections_record_swings_and_impacts(name: str):
     known = np.zeros(len(end.time), dtype=bool)
     known[inside] = True
     back = known[:-1] & ~known[1:]  # steps in which vibration is left out
-    assert error[~back].max() < 1e-3 and error[back].max() < 0.15
+    assert error[~back].max() < 2e-3 and error[back].max() < 0.15
     assert np.array_equal(~np.isnan(cut.force[:, 0]), known) and np.nanmax(np.abs(cut.force)) > 10.0
     assert [len(result.impact(k).probes[0].time) for k in (0, 1)] == [p.impact.rows for p in impacts(name)]
 

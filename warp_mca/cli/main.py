@@ -61,7 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if before[number] is not signal.SIG_IGN:  # as nohup has it
             signal.signal(number, _terminate)
     warnings = _Warnings()
-    logging.getLogger(LOGGER).addHandler(warnings)
+    logger = logging.getLogger(LOGGER)
+    level = logger.level  # which commands may change
+    logger.addHandler(warnings)
     try:
         return _carry_out(argv)
     except McaError as error:
@@ -79,7 +81,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("; ".join([f"warp-mca: {what} before it was done", *getattr(stop, "__notes__", ())]), file=sys.stderr)
         return 128 + number
     finally:
-        logging.getLogger(LOGGER).removeHandler(warnings)
+        logger.removeHandler(warnings)
+        logger.setLevel(level)
         gc.set_threshold(*collect)
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)

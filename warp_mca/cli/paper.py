@@ -29,8 +29,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _carry_out(args: argparse.Namespace) -> None:
+    from warp_mca.base.progress import progress_bar
     from warp_mca.paper.report import level_named, make_report
-    from warp_mca.report.console import progress_bar
 
     start_warp()
     with progress_bar() as progress:

@@ -28,7 +28,7 @@ from warp_mca.results.sensor_history import CSV, NPZ, load_sensors, save_sensors
 FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
 CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
-PROBE_FILES = (NPZ, CSV)  # of scenes with probes or sections, besides
+PROBE_FILES = (NPZ, CSV, "probes.png")  # of scenes with probes or sections, besides
 ALL_FILES = FILES + CONTACT_FILES + PATH_FILES + PROBE_FILES
 DIGESTS = "files"  # key of summary.json: SHA-256 of each other file of the run, by its name
 
@@ -90,6 +90,7 @@ def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
     from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
     from warp_mca.report.paths import save_path_figures
+    from warp_mca.report.probes import save_probes
 
     path = folder.path
     try:
@@ -110,6 +111,7 @@ def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
                 save_path_figures(written, shown)
             if result.probes or result.sections:
                 save_sensors(written, result.time, result.probes, result.sections)
+                save_probes(written / "probes.png", shown)
             digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
             result = _with_output_time(result, path, time.perf_counter() - begun)
             summary = {**result.summary, "warnings": list(result.warnings), DIGESTS: digests}
@@ -155,7 +157,7 @@ def _of_other_runs(path: Path, digests: Mapping[str, str] | None) -> list[str]:
     """Names of the files with data in `path` that differ from those of the run whose `digests` these are."""
     if digests is None:  # results of an earlier version
         return []
-    found = [name for name in ("history.csv", "forces.npz", "paths.npz", *PROBE_FILES) if (path / name).exists()]
+    found = [name for name in ("history.csv", "forces.npz", "paths.npz", NPZ, CSV) if (path / name).exists()]
     return [name for name in found if digests.get(name) != _digest(path / name)]
 
 

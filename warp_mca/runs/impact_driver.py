@@ -18,6 +18,7 @@ from warp_mca.results.paths import Found, locate
 from warp_mca.rigid.placement import link_placements
 from warp_mca.runs.advice import mesh_warnings
 from warp_mca.runs.cycle_setup import Setup
+from warp_mca.runs.forecast import announce
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.motion import Motion
 from warp_mca.runs.parts import ImpactPart
@@ -65,6 +66,8 @@ class ImpactDriver:
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
         impact = Impact([ready], span, **setup.settings.solver, shape=shape)
         setup.clock.lap("compile")
+        if self.count == 1:
+            announce(impact)
         self._advance(impact)
         setup.clock.lap("fe")
         if impact.stopped[0] is not None:

@@ -38,7 +38,7 @@ class Prepared:
     start: HandOff
     model: Model
     probes: Probes
-    sensors: Sensors
+    sensors: Sensors = Sensors()
     warnings: tuple[str, ...] = ()
 
 
