@@ -137,10 +137,15 @@ SCENES: dict[str, Picture] = {
         at=0.1, quantity="first peak of the normal force", unit="N", measured=_summary("F_n_first_peak")
     ),
     "taylor_bar": Picture(
-        at=1.0, look={"field": "plastic_strain"}, quantity="greatest equivalent plastic strain", unit="-", measured=_summary("max_plastic_strain")
+        at=1.0,
+        look={"field": "plastic_strain"},
+        quantity="greatest equivalent plastic strain",
+        unit="-",
+        measured=_summary("max_plastic_strain"),
     ),
     "hertz_sphere": Picture(
-        at=0.33, look={"limit": 30e6},
+        at=0.33,
+        look={"limit": 30e6},
         quantity="peak force of the whole sphere",
         unit="N",
         measured=lambda result, p: peak_and_duration(result)[0],
@@ -207,7 +212,8 @@ SCENES: dict[str, Picture] = {
     ),
     "ringing_bar": Picture(at=0.3, quantity="frequency of its lowest standing wave", unit="Hz", measured=_ringing),
     "cantilever": Picture(
-        at=0.35, look={"magnify": 10.0},
+        at=0.35,
+        look={"magnify": 10.0},
         quantity="lowest frequency of bending",
         unit="Hz",
         measured=lambda result, p: float(fitted_frequencies(result.time, result["tip_vy"], (_bending(p),))[0]),
@@ -231,7 +237,8 @@ SCENES: dict[str, Picture] = {
         theory=HEAT,
     ),
     "rolling_sphere": Picture(
-        at=0.3, look={"field": "velocity"},
+        at=0.3,
+        look={"field": "velocity"},
         quantity="speed in the end",
         unit="m/s",
         measured=_rolling_speed,
@@ -239,7 +246,8 @@ SCENES: dict[str, Picture] = {
         theory="a solid sphere that slides at first rolls at 5 v / 7",
     ),
     "stick_slip": Picture(
-        at=0.5, look={"field": "velocity"},
+        at=0.5,
+        look={"field": "velocity"},
         quantity="greatest friction force",
         unit="N",
         measured=_summary("F_t_max"),
@@ -255,13 +263,22 @@ SCENES: dict[str, Picture] = {
         theory="contact that sticks loses nothing",
     ),
     "metal_block": Picture(
-        at=0.2, look={"field": "plastic_strain"}, quantity="greatest equivalent plastic strain", unit="-", measured=_summary("max_plastic_strain")
+        at=0.2,
+        look={"field": "plastic_strain"},
+        quantity="greatest equivalent plastic strain",
+        unit="-",
+        measured=_summary("max_plastic_strain"),
     ),
     "strained_element": Picture(
-        at=1.0, look={"field": "plastic_strain"}, quantity="greatest equivalent plastic strain", unit="-", measured=_summary("max_plastic_strain")
+        at=1.0,
+        look={"field": "plastic_strain"},
+        quantity="greatest equivalent plastic strain",
+        unit="-",
+        measured=_summary("max_plastic_strain"),
     ),
     "pendulum": Picture(
-        at=0.02, look={"field": "velocity"},
+        at=0.02,
+        look={"field": "velocity"},
         quantity="period",
         unit="s",
         measured=_period,
@@ -269,10 +286,15 @@ SCENES: dict[str, Picture] = {
         theory="elliptic integral, with the inertia of the mesh",
     ),
     "double_pendulum": Picture(
-        at=0.5, look={"field": "velocity"}, quantity="greatest error of the energy balance", unit="-", measured=_summary("energy_error")
+        at=0.5,
+        look={"field": "velocity"},
+        quantity="greatest error of the energy balance",
+        unit="-",
+        measured=_summary("energy_error"),
     ),
     "spinning_rod": Picture(
-        at=0.25, look={"field": "velocity"},
+        at=0.25,
+        look={"field": "velocity"},
         quantity="reaction of the hinge, from its impulse",
         unit="N",
         measured=lambda result, p: float(
@@ -282,7 +304,8 @@ SCENES: dict[str, Picture] = {
         theory="m ω² L / 2, whose direction turns with the rod",
     ),
     "spinning_top": Picture(
-        at=0.1, look={"field": "velocity"},
+        at=0.1,
+        look={"field": "velocity"},
         quantity="rate of precession",
         unit="rad/s",
         measured=_turning,
