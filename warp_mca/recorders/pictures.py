@@ -18,6 +18,7 @@ from warp_mca.report.snapshot import FIELDS, Look, Skin
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
+FILM_PIXELS = 600  # along the longer side of the pictures of a film
 MARGIN = 0.05  # around the bodies that strike, as a share of their size
 
 
@@ -93,6 +94,6 @@ def rigid_motion(X: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.f
     return (X - centre) @ (left * [1.0, 1.0, sign]) @ right + moved - X
 
 
-def with_limit(look: Look, bounds: NDArray[np.float64], limit: float) -> Look:
-    """The same for another box [m] and, unless one was asked for, another value at the upper end of the colours."""
-    return replace(look, bounds=bounds, limit=look.limit if look.limit is not None else limit)
+def for_film(look: Look, bounds: NDArray[np.float64], limit: float) -> Look:
+    """The same in fewer pixels for a box [m] and, unless one was asked for, a value at the upper end of the colours."""
+    return replace(look, bounds=bounds, limit=look.limit if look.limit is not None else limit, pixels=FILM_PIXELS)
