@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.validate import brief, is_number
+from warp_mca.report.magnify import magnified
 from warp_mca.report.setting import EYE, plane_mesh, view_axes
 from warp_mca.report.snapshot import FIELDS
 from warp_mca.scene import RigidPlane
@@ -33,7 +34,7 @@ def plotter(
         file: what `VtkHdfFile` or `--vtkhdf` wrote.
         time: after first contact [s]; the nearest frame is taken, the last one by default.
         field: that colours it: von_mises, plastic_strain, displacement or velocity.
-        magnify: of displacements.
+        magnify: of the motion of nodes less the rigid motion of their body that is nearest to it.
         options: of `pyvista.Plotter`, such as off_screen=True.
 
     Raises:
@@ -53,9 +54,9 @@ def plotter(
     words, unit = FIELDS[field].words, FIELDS[field].unit
     title = f"{words} [{unit or '-'}]"
     mesh.point_data[title] = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
-    shape = mesh.warp_by_vector("displacement", factor=magnify)
-    points = np.asarray(shape.points, dtype=float)
-    found.add_mesh(shape, scalars=title, cmap="viridis", split_sharp_edges=True, smooth_shading=True)
+    points = _places(mesh, magnify)
+    mesh.points = points
+    found.add_mesh(mesh, scalars=title, cmap="viridis", split_sharp_edges=True, smooth_shading=True)
     up = np.asarray(mesh.field_data["up"], dtype=float).ravel()
     for plane in _planes(mesh, points, up):
         squares = pv.PolyData.from_regular_faces(plane.points + plane.shift(at), plane.quads)
@@ -93,6 +94,16 @@ def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
     if "up" not in mesh.field_data:
         raise bad_value("file", str(path), "it does not say which way is up; record it again with this version")
     return mesh, float(times[step])
+
+
+def _places(mesh: pyvista.DataSet, magnify: float) -> NDArray[np.float64]:
+    """Points of the deformed mesh [m], shape (point_count, 3)."""
+    places = np.array(mesh.points, dtype=float)
+    displacement = np.asarray(mesh.point_data["displacement"], dtype=float)
+    for body in np.unique(mesh.cell_data["body"]):
+        nodes = np.asarray(mesh.extract_cells(mesh.cell_data["body"] == body).point_data["vtkOriginalPointIds"])
+        places[nodes] = magnified(places[nodes], displacement[nodes], magnify)
+    return places
 
 
 def _planes(mesh: pyvista.DataSet, points: NDArray[np.float64], up: NDArray[np.float64]) -> list[Any]:
