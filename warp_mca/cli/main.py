@@ -19,6 +19,7 @@ from typing import NoReturn
 
 from warp_mca.base.errors import McaError
 from warp_mca.base.stdio import drop_output, open_streams, what_failed
+from warp_mca.cli import completion
 from warp_mca.cli.parser import make_parser
 from warp_mca.runs.advice import LOGGER
 
@@ -92,7 +93,9 @@ def _carry_out(argv: Sequence[str] | None) -> int:
     """Carry out one command; what it printed has left the process when it returns."""
     status = 0
     try:
-        args = make_parser().parse_args(argv)
+        parser = make_parser()
+        completion.answer(parser)
+        args = parser.parse_args(argv)
         args.words = list(sys.argv[1:] if argv is None else argv)
         args.command(args)
     except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands

@@ -71,15 +71,19 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     from warp_mca.recorders import FILES, Cadence, SnapshotFile
 
     cadence = Cadence(frames=args.frames)
+    drawn = {"field": args.field, "magnify": args.magnify}
     found: list[Recorder] = []
     files = {option: list(getattr(args, option)) for option in FILES}
     if args.viewer == "rerun":
         first = files["rrd"].pop(0) if files["rrd"] else None
         found.append(FILES["rrd"].make(first, viewer=True, cadence=cadence))
     for option, kind in FILES.items():
-        more = {"cadence": cadence} if kind.frames else {}
+        more = {**({"cadence": cadence} if kind.frames else {}), **(drawn if kind.pictures else {})}
         found += [kind.make(file, **more) for file in files[option]]
-    return found + [SnapshotFile(out / f"snapshot-{_time_words(t)}.png", time=t) for t in args.snapshots]
+    other = "" if args.field == "von_mises" else f"-{args.field}"
+    return found + [
+        SnapshotFile(out / f"snapshot-{_time_words(t)}{other}.png", time=t, **drawn) for t in args.snapshots
+    ]
 
 
 def _time_words(t: float) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.recorders.pictures import Subject, with_limit
+from warp_mca.recorders.pictures import Subject, for_film
 from warp_mca.recorders.recorder import Cadence, check_file
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class AnimationFile:
         boxes = np.stack([look.bounds for look in looks if look.bounds is not None])
         bounds = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
         greatest = max(field_limit(skins, self.subject.field) for _, skins in frames)
-        return with_limit(looks[0], bounds, greatest)
+        return for_film(looks[0], bounds, greatest)
 
 
 def _pictures(frames: list[tuple[float, dict[str, Skin]]], look: Look) -> Iterator[NDArray[np.uint8]]:

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import brief, is_number
 from warp_mca.recorders.recorder import SURFACE, VOLUME
+from warp_mca.report.magnify import magnified
 from warp_mca.report.setting import plane_meshes, up_of
 from warp_mca.report.snapshot import FIELDS, Look, Skin
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
+FILM_PIXELS = 600  # along the longer side of the pictures of a film
 MARGIN = 0.05  # around the bodies that strike, as a share of their size
 
 
@@ -75,24 +77,9 @@ class Subject:
         if value.ndim == 2:
             value = np.linalg.norm(value, axis=1)
         X, u = info.model.X[nodes], frame.volume.displacement[nodes].astype(np.float64)
-        if self.magnify != 1.0:
-            rigid = rigid_motion(X, u)
-            return X + rigid + self.magnify * (u - rigid), value
-        return X + u, value
+        return magnified(X, u, self.magnify), value
 
 
-def rigid_motion(X: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacement of the rigid motion nearest to `u` in the least squares [m], shape (node_count, 3).
-
-    The rotation is that of W. Kabsch, Acta Cryst. A 32 (1976) 922, from the singular value decomposition of the
-    covariance of places before and after.
-    """
-    centre, moved = X.mean(axis=0), (X + u).mean(axis=0)
-    left, _, right = np.linalg.svd((X - centre).T @ (X + u - moved))
-    sign = np.sign(np.linalg.det(left @ right))
-    return (X - centre) @ (left * [1.0, 1.0, sign]) @ right + moved - X
-
-
-def with_limit(look: Look, bounds: NDArray[np.float64], limit: float) -> Look:
-    """The same for another box [m] and, unless one was asked for, another value at the upper end of the colours."""
-    return replace(look, bounds=bounds, limit=look.limit if look.limit is not None else limit)
+def for_film(look: Look, bounds: NDArray[np.float64], limit: float) -> Look:
+    """The same in fewer pixels for a box [m] and, unless one was asked for, a value at the upper end of the colours."""
+    return replace(look, bounds=bounds, limit=look.limit if look.limit is not None else limit, pixels=FILM_PIXELS)

@@ -92,10 +92,11 @@ def rigid_planes(scene: Scene) -> list[RigidPlane]:
 
 def plane_meshes(scene: Scene, points: NDArray[np.floating]) -> list[PlaneMesh]:
     """The rigid planes of a scene as far as bodies with these points [m], shape (point_count, 3), cover them."""
-    return [_plane_mesh(plane, points, up_of(scene)) for plane in rigid_planes(scene)]
+    return [plane_mesh(plane, points, up_of(scene)) for plane in rigid_planes(scene)]
 
 
-def _plane_mesh(plane: RigidPlane, points: NDArray[np.floating], up: Array) -> PlaneMesh:
+def plane_mesh(plane: RigidPlane, points: NDArray[np.floating], up: Array) -> PlaneMesh:
+    """A rigid plane as far as bodies with these points [m], shape (point_count, 3), cover it; `up` as from `up_of`."""
     normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
     velocity = np.array(plane.velocity)
     along = velocity if velocity.any() else view_axes(up)[0] - (view_axes(up)[0] @ normal) * normal

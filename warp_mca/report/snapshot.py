@@ -26,7 +26,6 @@ Array = NDArray[np.floating]
 
 LIGHT = np.array([0.35, 0.80, 0.49])  # direction towards the light: right, upwards and to the viewer
 AMBIENT = 0.55  # brightness of a surface turned away from it
-PIXELS = 900  # along the longer side of the picture
 FINER = 2  # times finer it is computed, for smooth edges
 PLANE_LIGHT, PLANE_DARK = (0.88, 0.88, 0.90), (0.78, 0.79, 0.82)  # squares of planes
 
@@ -81,6 +80,7 @@ class Look:
         up: unit vector upwards [-].
         planes: rigid planes behind the bodies.
         magnify: how many times the shape is magnified, for the title.
+        pixels: along the longer side of the picture.
     """
 
     field: str = "von_mises"
@@ -89,6 +89,7 @@ class Look:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     planes: Sequence[PlaneMesh] = ()
     magnify: float = 1.0
+    pixels: int = 900
 
 
 class Picture:
@@ -133,7 +134,7 @@ class Picture:
     def _image(self, skins: Mapping[str, Skin], time: float) -> NDArray[np.uint8]:
         """What the eye sees, shape (height, width, 3)."""
         size = self.high - self.low
-        pixels = np.maximum(np.round(PIXELS * size / size.max()).astype(int), 1)
+        pixels = np.maximum(np.round(self.look.pixels * size / size.max()).astype(int), 1)
         width, height = FINER * pixels
         parts = [_of_skin(skin, self.colours, self.scale) for skin in skins.values()]
         parts += [_of_plane(plane, time) for plane in self.look.planes]
