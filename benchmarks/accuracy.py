@@ -15,15 +15,15 @@ import argparse
 import json
 import multiprocessing
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
 from benchmarks.accuracy_calibrate import calibrated
 from benchmarks.accuracy_families import FAMILIES, Family, Values
-from benchmarks.accuracy_judge import judged, render
-from benchmarks.accuracy_measure import Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of, warm
+from benchmarks.accuracy_judge import judged, no_dearer, render
+from benchmarks.accuracy_measure import Job, Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of
 from warp_mca.accuracy.store import OWN
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -66,13 +66,10 @@ def _scenes(args: argparse.Namespace, family: Family, seed: int, others: int) ->
     return sampled(family, seed, count)
 
 
-def _tables(
-    args: argparse.Namespace, scenes: Mapping[str, list[Values]], families: Iterable[Family], until: float
-) -> Iterable[dict[str, dict[int, Table]]]:
-    """All rows so far, by family, scene and variant, after each job."""
-    jobs = [job for f in families for job in jobs_of(f, scenes[f.scene], args.device, args.reference)]
-    tables: dict[str, dict[int, Table]] = {name: {} for name in scenes}
-    for count, (name, scene, variant, row) in enumerate(run_jobs(jobs, args.workers, until), 1):
+def _tables(jobs: Sequence[Job], workers: int, until: float) -> Iterable[dict[str, dict[int, Table]]]:
+    """All rows so far, by family, scene and variant, after each few runs."""
+    tables: dict[str, dict[int, Table]] = {job.family: {} for job in jobs}
+    for count, (name, scene, variant, row) in enumerate(run_jobs(jobs, workers, until), 1):
         tables[name].setdefault(scene, {})[variant] = row
         if count % 20 == 0:
             print(f"{count} runs, {until - time.monotonic():.0f} s left", flush=True)
@@ -86,7 +83,7 @@ def learn(args: argparse.Namespace, families: list[Family], until: float) -> Non
     scenes = {family.scene: _scenes(args, family, LEARN, GALLERY) for family in families}
     before = json.loads(target.read_text(encoding="utf-8"))["families"] if target.exists() else {}
     found: dict[str, Any] = {}
-    for tables in _tables(args, scenes, families, until):
+    for tables in _tables(jobs_of(families, scenes, args.device, args.reference), args.workers, until):
         found = {f.scene: stored(f, scenes[f.scene], tables[f.scene]) for f in families}
         found = {name: item for name, item in found.items() if item["scenes"]}
         target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
@@ -99,13 +96,12 @@ def validate(args: argparse.Namespace, families: list[Family], until: float) -> 
     """Try the accuracies on scenes that were not learnt from."""
     target = args.output or JSON
     scenes = {family.scene: _scenes(args, family, HELD_OUT, 1) for family in families}
-    if args.workers > 1:
-        warm([job for f in families for job in jobs_of(f, scenes[f.scene], args.device, args.reference)])
     begin = time.monotonic()
     runs = _accurate_runs(args, scenes, until - 0.5 * (until - begin))
     print(f"{len(runs)} runs with an accuracy in {time.monotonic() - begin:.0f} s", flush=True)
     found: list[dict[str, Any]] = []
-    for tables in _tables(args, scenes, families, until):
+    jobs = jobs_of(families, scenes, args.device, args.reference, no_dearer(runs, args.device))
+    for tables in _tables(jobs, args.workers, until):
         found = []
         for family in families:
             for k, values in enumerate(scenes[family.scene]):
@@ -152,7 +148,7 @@ def accurate_run(task: tuple[str, int, Values, float, str]) -> dict[str, Any]:
     accuracy = result.summary["accuracy"]
     return {
         **entry,
-        **row_of(result),
+        **row_of(result, accuracy["chosen"].get("element")),
         "estimate": accuracy["estimate"],
         "chosen": accuracy["chosen"],
         "why": accuracy["why"],

@@ -70,11 +70,17 @@ def _between(rng: random.Random, low: float, high: float) -> float:
     return _digits(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def _links(refine: float, axial: int, penalty: float, mass_scaling: float | None = 1.5) -> Variant:
+def _links(
+    refine: float, axial: int, penalty: float, mass_scaling: float | None = 1.5, element: str | None = None
+) -> Variant:
     """`two_link` with so many cells along OA after refinement, and as long ones along AB."""
     cells = {"axial_OA": max(1, round(axial / refine)), "axial_AB": max(1, round(axial * 15 / 16 / refine))}
     return Variant(
-        refine=refine, mass_scaling=mass_scaling, multi_rate="auto", parameters={"penalty": penalty, **cells}
+        refine=refine,
+        mass_scaling=mass_scaling,
+        element=element,
+        multi_rate="auto",
+        parameters={"penalty": penalty, **cells},
     )
 
 
@@ -142,6 +148,11 @@ FAMILIES = (
             _links(4 / 3, 56, 2.0),
             _links(5 / 3, 56, 2.0),
             _links(2.0, 64, 2.0),
+            _links(1 / 2, 20, 1.0, 2.0),
+            _links(2 / 3, 28, 1.0, 2.0),
+            _links(2 / 3, 28, 1.0, 1.5, "hex8r"),
+            _links(1.0, 28, 1.0, 1.5, "hex8r"),
+            _links(4 / 3, 42, 1.0, 1.5, "hex8r"),
         ),
         fine=_links(3.0, 72, 3.0, None),
         partner=10,

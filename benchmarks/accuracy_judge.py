@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.accuracy_families import Family, Values
 from benchmarks.accuracy_measure import COMPUTED, FINE, Row, Table, errors_of
 from warp_mca.accuracy.choice import cost_of
 from warp_mca.accuracy.figures import BOUND
-from warp_mca.accuracy.store import Size
+from warp_mca.accuracy.store import Size, families
 from warp_mca.runs.rate_groups import COSTS, StepCost
 
 START, END = "<!-- accuracy: measured -->", "<!-- accuracy: end -->"  # around what is rendered
+MARGIN = 1.5  # costs by the store, means over its scenes, over those of the run [-]
 LOW, HIGH, SMALL = 0.5, 3.0, 0.2  # of estimates over true errors; share of what was asked below which both are small
 
 
@@ -46,9 +47,30 @@ def judged(
 
 def cost(row: Row, device: str) -> float:
     """Time of the steps of a run by what the device's steps cost [s]; measured times of small runs say little."""
-    computed = row["computed"] or (COMPUTED if device == "cpu" else 1.0)
+    computed = (row["computed"] or COMPUTED) * row["work"] if device == "cpu" else row["computed"] or 1.0
     step: StepCost = COSTS["cpu" if device == "cpu" else "H100"]
     return cost_of(Size(row["elements"], row["steps"], computed), step, cpu=True)
+
+
+def no_dearer(runs: Iterable[Row], device: str) -> Callable[[str, int, int], bool]:
+    """Whether a variant may be the cheapest one within: by the store, it costs no more than the dearest run chosen.
+
+    Of a family that is not in the store, and of a scene without runs, any may be.
+    """
+    known, most = families(), dict[tuple[str, int], float]()
+    for run in runs:
+        if "refused" not in run:
+            place = run["scene"], run["number"]
+            most[place] = max(most.get(place, 0.0), cost(run, device))
+    word, cpu = ("cpu", True) if device == "cpu" else ("H100", False)
+
+    def wanted(family: str, scene: int, variant: int) -> bool:
+        sizes = known[family].sizes if family in known else ()
+        if variant >= len(sizes) or (family, scene) not in most:
+            return True
+        return cost_of(sizes[variant], COSTS[word], cpu) <= MARGIN * most[family, scene]
+
+    return wanted
 
 
 def _worst(errors: Sequence[float | None], bound: Iterable[int]) -> float:

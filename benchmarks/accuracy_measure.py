@@ -5,12 +5,13 @@ Each process takes jobs in turn: a reference alone, or a variant of some scenes 
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import random
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, zip_longest
 from typing import Any
 
 import warp_mca as mca
@@ -18,11 +19,12 @@ from benchmarks.accuracy_families import FAMILIES, Family, Values
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.variant import Variant
 
-BATCH = 10  # scenes side by side
+BATCH = 5  # scenes side by side at most
+WORK = {"hex8r": 0.65}  # processor time of an element over that of hex8 with plasticity (docs/performance.md) [-]
 COMPUTED = 0.4  # share of the elements that a step computes on a CPU with several rates, where it was not measured
 FINE = -1  # number of the reference among the variants
 
-Row = dict[str, Any]  # figures, elements, steps, refine, computed
+Row = dict[str, Any]  # figures, elements, steps, refine, computed, work
 Table = dict[int, Row]  # by number of the variant
 FAMILY = {family.scene: family for family in FAMILIES}
 
@@ -64,8 +66,8 @@ def sampled(family: Family, seed: int, count: int) -> list[Values]:
     return [{**family.fixed, **family.sample(rng)} for _ in range(count)]
 
 
-def row_of(result: mca.Result) -> Row:
-    """What is kept of a run."""
+def row_of(result: mca.Result, element: str | None) -> Row:
+    """What is kept of a run with these elements, the scene's own if None."""
     summary = result.summary
     groups = summary.get("rate_groups")
     shortest = groups[0]["step"] if groups else 0.9 * summary["stable_dt"]
@@ -78,6 +80,7 @@ def row_of(result: mca.Result) -> Row:
         "steps": round(steps),
         "refine": summary["refine"],
         "computed": work / summary["n_elements"] if work else None,
+        "work": WORK.get(element or "", 1.0),
     }
 
 
@@ -96,7 +99,11 @@ def measured(job: Job) -> list[tuple[str, int, int, Row]]:
     if not results:
         results = [_alone(scene, variant, options) for scene in scenes]
     pairs = zip(job.scenes, results, strict=True)
-    return [(job.family, scene, job.variant, row_of(result)) for scene, result in pairs if result is not None]
+    return [
+        (job.family, scene, job.variant, row_of(result, variant.element))
+        for scene, result in pairs
+        if result is not None
+    ]
 
 
 def _alone(scene: mca.Scene, variant: Variant, options: Mapping[str, Any]) -> mca.Result | None:
@@ -107,25 +114,44 @@ def _alone(scene: mca.Scene, variant: Variant, options: Mapping[str, Any]) -> mc
         return None
 
 
-def jobs_of(family: Family, scenes: Sequence[Values], device: str, scale: float) -> list[Job]:
-    """Jobs of a family, some scenes after the others, so that the first ones are complete first.
+def jobs_of(
+    families: Sequence[Family],
+    scenes: Mapping[str, Sequence[Values]],
+    device: str,
+    scale: float,
+    wanted: Callable[[str, int, int], bool] = lambda family, scene, variant: True,
+) -> list[Job]:
+    """Jobs of some scenes of each family in turn, then of the next ones: those that a deadline leaves out are the last.
 
-    On a GPU scenes of `two_link` of equal duration share a batch; references are alone.
+    On a GPU scenes of `two_link` of equal duration share a batch; references are alone. `wanted` tells whether a
+    variant of a scene is measured; the reference and its partner always are, and come first.
     """
+    rounds = zip_longest(*([(f, part) for part in _parts(f, scenes[f.scene], device)] for f in families))
+    jobs = []
+    for family, part in (item for found in rounds for item in found if item is not None):
+        others = [number for number in range(len(family.variants)) if number != family.partner]
+        pieces = [(FINE, [k]) for k in part] + [(family.partner, part)]
+        pieces += [(number, [k for k in part if wanted(family.scene, k, number)]) for number in others]
+        known = scenes[family.scene]
+        jobs += [
+            Job(family.scene, number, tuple(piece), tuple(known[k] for k in piece), device, scale)
+            for number, piece in pieces
+            if piece
+        ]
+    return jobs
+
+
+def _parts(family: Family, scenes: Sequence[Values], device: str) -> list[list[int]]:
+    """Numbers of scenes that share batches, those of one duration cut into equal parts."""
     together = BATCH if device != "cpu" and family.scene == "two_link" else 1
     order = sorted(range(len(scenes)), key=lambda k: (scenes[k].get("duration", 0.0), _stiffness(scenes[k])))
     parts: list[tuple[int, list[int]]] = []
     for _, group in groupby(order, key=lambda k: scenes[k].get("duration")):
         members = list(group)
-        parts += [(i, members[i : i + together]) for i in range(0, len(members), together)]
-    jobs = []
-    for _, part in sorted(parts):
-        pieces = [(FINE, [k]) for k in part] + [(number, part) for number in range(len(family.variants))]
-        jobs += [
-            Job(family.scene, number, tuple(piece), tuple(scenes[k] for k in piece), device, scale)
-            for number, piece in pieces
-        ]
-    return jobs
+        count = math.ceil(len(members) / together)
+        size = math.ceil(len(members) / count)
+        parts += [(i, members[i : i + size]) for i in range(0, len(members), size)]
+    return [part for _, part in sorted(parts)]
 
 
 def _stiffness(values: Values) -> float:
@@ -142,18 +168,6 @@ def attempted(job: Job) -> list[tuple[str, int, int, Row]]:
         return []
 
 
-def warm(jobs: Sequence[Job]) -> None:
-    """Compile kernels before many processes would do it at once: of a batch, a run alone, and one of several rates."""
-    first = next((job for job in jobs if job.variant != FINE), None)
-    if first is None:
-        return
-    attempted(replace(first, scenes=first.scenes[:2], values=first.values[:2]))
-    attempted(replace(first, scenes=first.scenes[:1], values=first.values[:1]))
-    variant = replace(variant_of(FAMILY[first.family], first.variant), multi_rate=2)
-    scene = variant.applied(mca.make_scene(first.family, **first.values[0]))
-    _alone(scene, variant, {"device": first.device, "threads": 1, "duration": 1e-5})
-
-
 def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[str, int, int, Row]]:
     """Rows as they come, until all are there or the clock (`time.monotonic`) says `until`."""
     if workers < 2:
@@ -162,7 +176,6 @@ def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[
                 return
             yield from attempted(job)
         return
-    warm(jobs)
     with multiprocessing.get_context("spawn").Pool(workers) as pool:
         pending = pool.imap_unordered(attempted, jobs)
         for _ in jobs:
@@ -174,16 +187,13 @@ def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[
 
 
 def truth_of(family: Family, table: Table) -> list[float | None] | None:
-    """Limits of the figures, extrapolated from the reference and its partner; None without the reference.
+    """Limits of the figures, extrapolated from the reference and its partner; None without one of the two.
 
     f0 = f + (f - f_c) h^p / (h_c^p - h^p) with the order p of the family.
     """
-    if FINE not in table:
+    if FINE not in table or family.partner not in table:
         return None
-    fine = table[FINE]
-    partner = table.get(family.partner)
-    if partner is None:
-        return fine["figures"]
+    fine, partner = table[FINE], table[family.partner]
     ratio = fine["refine"] / partner["refine"]
     if ratio <= 1.1:
         return fine["figures"]
@@ -198,7 +208,7 @@ def errors_of(figures: Sequence[float | None], truth: Sequence[float | None]) ->
 
 
 def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]) -> dict[str, Any]:
-    """The family as the store has it; scenes without a reference are left out."""
+    """The family as the store has it; scenes whose limits are not known are left out."""
     entries = []
     for k, values in enumerate(scenes):
         table = tables.get(k, {})
@@ -211,7 +221,9 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
                 "errors": [None if e is None else round(e, 5) for e in errors_of(row["figures"], truth)],
                 "elements": row["elements"],
                 "steps": row["steps"],
-                "computed": round(row["computed"] or COMPUTED, 3),
+                "computed": round(
+                    (row["computed"] or COMPUTED) * WORK.get(family.variants[number].element or "", 1.0), 3
+                ),
             }
             for number, row in sorted(table.items())
             if number != FINE

@@ -1,6 +1,7 @@
 """The report on the published study: runs, claims, pictures and pages, in a small form of its levels."""
 
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +17,9 @@ from warp_mca.paper.evidence import MissingRunError, Runs
 from warp_mca.paper.page import Page, as_html, as_markdown
 from warp_mca.paper.pictures import PICTURES
 from warp_mca.paper.report import Report, make_report
-from warp_mca.paper.studies import LEVELS, MAIN, MESH, PENALTY, STUDIES, MeshChoice, cases
+from warp_mca.paper.studies import LEVELS, MAIN, MESH, PENALTY, STUDIES, MeshChoice, cases, in_order
 from warp_mca.results.storage import load
+from warp_mca.runs.sweep import LATE
 
 DOCS = Path(__file__).parent.parent / "docs"
 COARSE = MeshChoice("quick", refine=0.5)
@@ -35,14 +37,14 @@ SMALL = replace(
 
 def runs_of(level: studies.Level) -> Runs:
     """No run of a level."""
-    return Runs(level, {}, {}, {}, "cpu")
+    return Runs(level, Path(), {}, {}, {}, "cpu")
 
 
-def report_of(level: studies.Level, out: Path) -> Report:
+def report_of(level: studies.Level, out: Path, deadline: float = math.inf) -> Report:
     """A report on runs of the study of friction that end after 10 us."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(STUDIES, "mu", replace(STUDIES["mu"], common=(("duration", 10e-6),)))
-        return make_report(level, out, workers=1)
+        return make_report(level, out, workers=1, deadline=deadline)
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +83,34 @@ def test_it_continues_in_its_folder(folder: Path):
     report_of(SMALL, folder)
     assert (folder / "paper.json").read_bytes() == before
     assert (folder / "runs" / "0" / "summary.json").stat().st_mtime_ns == kept
+
+
+def test_a_deadline_leaves_runs_for_later(tmp_path: Path):
+    report = report_of(SMALL, tmp_path, deadline=1e-9)
+    assert [row["reason"] for row in report.rows] == [LATE, LATE]
+    assert {verdict.why for verdict in report.verdicts if verdict.claim.id == "mu_low_peak"} == {
+        f"Coefficient of friction, 0.1: {LATE}"
+    }
+
+
+def test_the_report_is_written_again_without_the_device(folder: Path):
+    before = (folder / "paper.html").read_bytes()
+    (folder / "paper.html").unlink()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("warp_mca.paper.evidence.carry_out", None)
+        report_of(SMALL, folder, deadline=0.0)
+    assert (folder / "paper.html").read_bytes() == before
+
+
+@pytest.mark.parametrize("level", LEVELS.values(), ids=LEVELS)
+def test_runs_that_decide_most_come_first(level: studies.Level):
+    found = cases(level)
+    order = in_order(level, found)
+    assert set(order) == set(found.values()) and len(order) == len(set(order))
+    assert order[0] == found["base", 0.0, MAIN]
+    assert order.index(found["limit", 1.0, MAIN]) < order.index(found["mu", 0.1, MAIN])
+    main = {case for (_, _, variant), case in found.items() if variant == MAIN}
+    assert set(order[: len(main)]) == main
 
 
 def test_another_level_needs_another_folder(folder: Path):

@@ -14,14 +14,10 @@ from test_overlap import Driver
 
 import warp_mca as mca
 from warp_mca.elements.patch_stage import PatchStage
-from warp_mca.kernels.contact import watch
-from warp_mca.kernels.contact.search import FLAGS, STALE
 from warp_mca.kernels.elements import hex8, hex8_patch
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import rated_node
-from warp_mca.runs.impact import Impact
 from warp_mca.solve import early_launch
-from warp_mca.solve.contact_watch import ContactWatch, contact_watch
 from warp_mca.solve.rate_chains import Chains, Task, tasks
 from warp_mca.solve.stage import Step
 from warp_mca.solve.threads import flushing
@@ -54,7 +50,8 @@ def test_tasks_in_any_order_that_keeps_their_waits_give_the_same_bits(groups: in
         for task in order:
             chains.launch(task, Step(chained.state))
     chained.state.steps += steps
-    assert order != found and chains.top == solver.model.rates.top
+    rates = solver.model.rates
+    assert rates is not None and order != found and chains.top == rates.top
     assert chained.state.differences(plain.state) == []
     assert (chained.state.contacts[0].spring.face.numpy() >= 0).any()
 
@@ -86,41 +83,18 @@ def leaving() -> mca.Scene:
     )
 
 
-def chained(scene: mca.Scene, groups: int) -> Impact:
-    """An impact phase that takes substeps as a GPU does."""
-    impact = begun(scene, multi_rate=groups)
+def test_an_impact_in_chains_has_the_bits_of_substeps_in_turn():
+    """With its searches and records."""
+    plain, chained = (begun(leaving(), duration=4e-5, multi_rate=3) for _ in range(2))
     with wp.ScopedDevice("cpu"):
-        impact.solver.chains = Chains(impact.solver)
-    return impact
-
-
-def test_contact_left_out_where_nothing_is_near_changes_no_bit(monkeypatch: pytest.MonkeyPatch):
-    own, near = ContactWatch.search, []
-    monkeypatch.setattr(ContactWatch, "search", lambda watch: near.append(own(watch)) or near[-1])
-    plain, watched = begun(leaving(), multi_rate=3), chained(leaving(), 3)
-    for impact in (plain, watched):
+        chained.solver.chains = Chains(chained.solver)
+    for impact in (plain, chained):
         impact.advance()
         assert impact.stopped == [None]
-    first = near.index(False)
-    assert 1 < first < len(near) - 5 and not any(near[first:])
-    assert watched.state.differences(plain.state) == []
-    known, found = figures(plain), figures(watched)
+    assert plain.state.scenes[0].touched
+    assert chained.state.differences(plain.state) == []
+    known, found = figures(plain), figures(chained)
     assert [name for name in known if known[name].tobytes() != found[name].tobytes()] == []
-
-
-@pytest.mark.parametrize(
-    ("moved", "hints", "near", "stale"), [(0.1, 0, 0, 0), (0.2, 0, 1, 0), (0.3, 1, 1, 0), (0.3, 0, 1, 1)]
-)
-def test_nodes_that_are_too_fast_bring_contact_back_or_stop_the_run(moved: float, hints: int, near: int, stale: int):
-    """By their motion since the last search, in margins; `hints` of the two searches before it."""
-    with wp.ScopedDevice("cpu"):
-        hint = wp.full(watch.HINTS, hints, dtype=wp.int32)
-        flag = wp.zeros((1, len(FLAGS)), dtype=wp.int32)
-        hint[2:3].zero_()
-        u, before = wp.array([[0.0, moved * 2e-3, 0.0]], dtype=wp.vec3d), wp.zeros(1, dtype=wp.vec3d)
-        node = wp.zeros(1, dtype=wp.int32)
-        wp.launch(watch.watch_nodes, 1, inputs=[2, u, before, node, 2e-3], outputs=[hint, flag])
-    assert (hint.numpy()[2], flag.numpy()[0, STALE]) == (near, stale)
 
 
 def test_patches_of_a_chain_are_its_elements(monkeypatch: pytest.MonkeyPatch):
@@ -159,9 +133,8 @@ def test_slow_nodes_do_not_begin_early_but_what_follows_them_does(monkeypatch: p
 
 
 @pytest.mark.gpu
-def test_a_device_leaves_contact_out_too_and_repeats_itself():
+def test_a_device_gives_the_figures_of_the_cpu_and_repeats_itself():
     cpu, cuda, again = (finished(leaving(), multi_rate=3, device=device) for device in ("cpu", "cuda:0", "cuda:0"))
-    assert isinstance(contact_watch(cuda.solver, cuda.state), ContactWatch)
     assert cuda.state.differences(again.state) == []
     known, found = figures(cpu), figures(cuda)
     for name in ("history/F_n_N", "history/E_kinetic", "history/E_internal"):

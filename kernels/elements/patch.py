@@ -27,7 +27,7 @@ from warp_mca.model.patches import PATCH, SLOTS
 SCHEDULERS = 256  # threads that put patches in order
 RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need
 # How many of these a chain of slower elements takes at most, so that the fastest find places beside it.
-BESIDE = {"mixed": 1, "float64": 1}
+BESIDE = {"mixed": 2, "float64": 1}
 HALVED = 2.5  # patches of half the size on a multiprocessor up to which those of the fastest elements are halved
 # Of a slot: where the node lies on its patch's grid, and its number; that alone in float64, where positions are not
 # rounded, so that shared memory has no room for displacements of the next patch.

@@ -43,7 +43,8 @@ def choices(
 ) -> list[Choice]:
     """Variants of a family that keep what the user typed, from the cheapest on; `step` is the cost of one.
 
-    Bodies that must keep their masses take the same meshes without mass scaling, whose errors are smaller.
+    Bodies that must stay as they are take the same meshes without mass scaling, whose errors are smaller, and no other
+    elements.
     """
     variants = [replace(item, mass_scaling=None) if asked.full else item for item in family.variants]
     found = [
@@ -55,7 +56,7 @@ def choices(
             spreads=family.spreads,
         )
         for k, variant in enumerate(variants)
-        if keeps(variant, asked) and family.sizes[k].steps > 0.0
+        if keeps(variant, asked) and family.sizes[k].steps > 0.0 and not (asked.full and variant.element)
     ]
     return sorted(found, key=lambda choice: choice.cost)
 

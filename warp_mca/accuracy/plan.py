@@ -67,6 +67,11 @@ class Plan:
         """The result, if the finest pilot is accurate enough."""
         return self.pilots.result if self.pilots else None
 
+    @property
+    def _catalogued(self) -> Scene:
+        """The scene as modelled, but for elements, which are no parameter of a scene."""
+        return replace(self.variant, element=None).applied(self.scene) if self.variant.element else self.scene
+
     def judged(self, result: Result) -> Result:
         """The result with `accuracy` in its summary: estimated errors, what was chosen, and how to run it again."""
         found = figures_of(result)
@@ -91,7 +96,7 @@ class Plan:
             "chosen": {**self.variant.knobs, "multi_rate": groups, "precision": precision},
             "why": self.why,
             "deciding": self.wall,
-            "command": command(self.scene, precision, groups, result.summary),
+            "command": command(self._catalogued, precision, groups, result.summary, self.variant.element),
         }
         return replace(result, summary={**result.summary, "accuracy": accuracy})
 
@@ -204,7 +209,9 @@ def _from_pilots(scene: Scene, asked: Accuracy, reasons: Mapping[str, str], boun
     return Plan(scene=made, variant=found.variant, asked=asked, why=found.why, reasons=reasons, pilots=found)
 
 
-def command(scene: Scene, precision: str, groups: int | None, summary: Mapping[str, Any]) -> str | None:
+def command(
+    scene: Scene, precision: str, groups: int | None, summary: Mapping[str, Any], element: str | None = None
+) -> str | None:
     """The command that gives the run again without `--accuracy`; None for scenes that the catalogue does not have."""
     source = source_of(scene)
     if source is None:
@@ -219,6 +226,7 @@ def command(scene: Scene, precision: str, groups: int | None, summary: Mapping[s
         "mass-scaling": scene.impact.mass_scaling,
         "multi-rate": groups,
         "precision": precision,
+        "element": element,
         "device": str(summary["device"]).split(" ")[0],
     }
     words += [word for name, value in more.items() if value is not None for word in (f"--{name}", str(value))]

@@ -7,10 +7,10 @@ from warp_mca.paper import word_checks as check
 from warp_mca.paper.claims import Claim
 from warp_mca.paper.compliance_claims import COMPLIANCE
 from warp_mca.paper.limit_claims import LIMITS
+from warp_mca.paper.pure_claims import PURE
 from warp_mca.paper.studies import MESHES
 
 PENALTY_REASON = "springs of the factor 0.1 take part of the peak, more of it the coarser the cells at the tip are"
-PURE_FEM = "pure finite elements are not run at this level"
 
 
 CLAIMS: tuple[Claim, ...] = (
@@ -77,25 +77,7 @@ CLAIMS: tuple[Claim, ...] = (
         "kN",
         0.03,
     ),
-    Claim(
-        "fem_peak",
-        "Table 2",
-        "first peak over that of pure finite elements",
-        98.5,
-        None,
-        "%",
-        reason=PURE_FEM,
-    ),
-    Claim("fem_cost", "Table 2", "cost over that of pure finite elements", 0.705, None, "%", reason=PURE_FEM),
-    Claim(
-        "fem_motion",
-        "Fig. 9a",
-        "angles differ from pure finite elements by less than 0.5 %",
-        0.5,
-        None,
-        "%",
-        reason=PURE_FEM,
-    ),
+    *PURE,
     Claim(
         "bar_speed",
         "Sect. 3.3",

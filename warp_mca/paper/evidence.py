@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from warp_mca.paper.studies import MAIN, STUDIES, Case, Key, Level, cases
+from warp_mca.paper.studies import MAIN, STUDIES, Case, Key, Level, cases, in_order
 from warp_mca.results.result import Result
 from warp_mca.results.storage import load
 from warp_mca.runs.arguments import Progress
-from warp_mca.runs.sweep import carry_out
+from warp_mca.runs.sweep import carry_out, stored_rows
 from warp_mca.runs.sweep_job import DONE, Row
 from warp_mca.runs.sweep_plan import Plan, RunOptions, differing, run_name
-from warp_mca.runs.sweep_workers import Prepare
+from warp_mca.runs.sweep_workers import Prepare, devices_named
 
 RUNS = "runs"  # folder of the sweep
+SHARE = 3  # runs that share a GPU: most of a run's time goes to meshes, assembly, figures and files, on the host
 
 
 class MissingRunError(Exception):
@@ -30,17 +32,23 @@ class Runs:
 
     Attributes:
         level: that was run.
+        out: folder of the report.
         cases: what was run, by study, value and variant.
         rows: of the sweep's table, by case.
         folders: with the files of each run, by case.
         device: that commands name.
+        comparison: with finite elements alone, as `table_2.compare` gives it; None if they were not run.
+        pure: folder of that comparison.
     """
 
     level: Level
+    out: Path
     cases: Mapping[Key, Case]
     rows: Mapping[Case, Row]
     folders: Mapping[Case, Path]
     device: str
+    comparison: Mapping[str, Any] | None = None
+    pure: Path = Path()
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,25 @@ class Evidence:
             raise MissingRunError(f"{_title(study)}: fewer than two runs at this level")
         return found
 
+    def comparison(self) -> dict[str, Any]:
+        """What `table_2.compare` found; of the variant MAIN only.
+
+        Raises:
+            MissingRunError: finite elements alone were not run.
+        """
+        if self.runs.comparison is None or self.variant != MAIN:
+            raise MissingRunError("pure finite elements are run with --pure-fem only")
+        return dict(self.runs.comparison)
+
+    def compared(self, name: str) -> Result:
+        """One of the results that were compared, by the name of its folder.
+
+        Raises:
+            MissingRunError: as in `comparison`.
+        """
+        self.comparison()
+        return _loaded(self.runs.pure / name)
+
     def results(self, study: str) -> list[Result]:
         """Results of all values, in their order.
 
@@ -104,26 +131,34 @@ def carry_out_runs(
     force: bool = False,
     prepare: Prepare | None = None,
     progress: Progress | None = None,
+    deadline: float = math.inf,
 ) -> Runs:
     """Run what `out` does not hold yet of a level.
 
     Args:
         level: to be run.
         out: folder of the report; runs are in a folder of it.
-        device, precision, workers, force, prepare, progress: as in `warp_mca.sweep`.
+        device, precision, force, prepare, progress: as in `warp_mca.sweep`.
+        workers: number of processes; one for each core, or SHARE for each GPU, if None.
+        deadline: no run begins so many seconds after this call [s]; with 0 the device need not be there.
 
     Raises:
         RequestError, McaError: as in `warp_mca.sweep`; `out` holds runs of another level, among others.
     """
     found = cases(level)
-    unique: Sequence[Case] = list(dict.fromkeys(found.values()))
+    unique: Sequence[Case] = in_order(level, found)
     scenes = tuple(case.scene() for case in unique)
     folder = out / RUNS
     # each run is a model of its own, so that the command of its row gives the same figures
     plan = Plan(scenes, differing(scenes), RunOptions(device, precision), None, folder, folders=True, batch=1)
-    rows = carry_out(plan, workers=workers, force=force, prepare=prepare, progress=progress)
+    if deadline > 0.0:
+        workers = workers or (None if device == "cpu" else SHARE * len(devices_named(device)))
+        options: dict[str, Any] = {"workers": workers, "force": force, "prepare": prepare, "progress": progress}
+        rows = carry_out(plan, **options, deadline=deadline)
+    else:
+        rows = stored_rows(plan)
     folders = {case: folder / run_name(k, len(unique)) for k, case in enumerate(unique)}
-    return Runs(level, found, dict(zip(unique, rows, strict=True)), folders, device)
+    return Runs(level, out, found, dict(zip(unique, rows, strict=True)), folders, device)
 
 
 def figures_of(row: Row) -> dict[str, Any]:

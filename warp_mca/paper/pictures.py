@@ -13,6 +13,7 @@ import numpy as np
 from warp_mca.paper.evidence import Evidence, MissingRunError
 from warp_mca.paper.readings import path, row_at
 from warp_mca.paper.studies import MESHES, STUDIES
+from warp_mca.paper.table_2 import MCA, PURE
 from warp_mca.report.style import BLACK, BLUE, DOTS_PER_INCH, VERMILION, legend_beside, new_figure, tidy
 from warp_mca.results.result import Result
 
@@ -90,8 +91,16 @@ def _meshes(evidence: Evidence) -> Figure:
     return figure
 
 
-def _one_force(evidence: Evidence) -> Figure:
-    return _panels([("rigid bodies, then finite elements", evidence.run("base", 0.0))], FORCES[:1])
+def _force_both_ways(evidence: Evidence) -> Figure:
+    """F_n of Table 1; where they were run, also of finite elements alone and of rigid links first in their scene."""
+    named = [("rigid links first", evidence.run("base", 0.0))]
+    if evidence.runs.comparison:
+        both = (("rigid links first, as Table 2", MCA), ("finite elements alone, as Table 2", PURE))
+        named += [(name, evidence.compared(folder)) for name, folder in both]
+    figure = _panels(named, FORCES[:1])
+    figure.axes[0].set_xlim(0.0, 1e3 * named[0][1].time[-1])
+    figure.axes[0].legend(loc="upper right", frameon=False, fontsize=9)
+    return figure
 
 
 def _swing(evidence: Evidence) -> Figure:
@@ -142,7 +151,7 @@ def _pictures(study: str) -> tuple[Callable[[Evidence], Figure], Callable[[Evide
 PICTURES: tuple[Picture, ...] = (
     Picture("7", MESHES, "Normal contact force with different meshes.", _meshes),
     Picture("8", "swing", "Velocity of the tip's centre: downwards and along +x. The line marks contact.", _swing),
-    Picture("9", "base", "Normal contact force. Pure finite elements are not run at this level.", _one_force),
+    Picture("9", "base", "Normal contact force. Table 2 has finite elements alone.", _force_both_ways),
     Picture("11", "base", "Stress waves along the manipulator.", _waves),
     Picture("12", "v_plate", "Contact forces, by initial velocity of the plate.", _pictures("v_plate")[0]),
     Picture("13", "v_plate", "Velocities of tip and plate, by initial velocity of the plate.", _pictures("v_plate")[1]),

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +17,16 @@ from warp_mca.paper.claims import Verdict, judge
 from warp_mca.paper.evidence import Evidence, Runs, carry_out_runs, figures_of
 from warp_mca.paper.page import IMAGES, Page, as_html, as_markdown
 from warp_mca.paper.pictures import PICTURES, drawn
-from warp_mca.paper.studies import LEVELS, Level
+from warp_mca.paper.studies import LEVELS, Level, pure_case
+from warp_mca.paper.table_2 import compare, stored
 from warp_mca.results.storage import folder_path, load
 from warp_mca.runs.arguments import Progress
+from warp_mca.runs.checkpoint import METHOD
 from warp_mca.runs.sweep_job import DONE, Row
-from warp_mca.runs.sweep_workers import Prepare
+from warp_mca.runs.sweep_workers import Prepare, devices_named
 
 HTML, JSON, MARKDOWN = "paper.html", "paper.json", "paper.md"
+PURE = "pure"  # folder of the comparison with finite elements alone
 LISTS = ("F_n_peaks", "contacts", "sticks")  # of a summary, which rows of a sweep leave out
 
 
@@ -61,25 +66,43 @@ def make_report(
     force: bool = False,
     prepare: Prepare | None = None,
     progress: Progress | None = None,
+    deadline: float = math.inf,
+    pure_fem: bool = False,
 ) -> Report:
     """Run what is missing of a level, and write the report.
 
     Args:
         level: to be run.
         out: folder of the report. The same call goes on with what it holds.
-        device, precision, workers, force, prepare, progress: as in `warp_mca.sweep`.
+        device, precision, workers, force, prepare, progress, deadline: as in `carry_out_runs`.
+        pure_fem: run finite elements alone too, after all others; they store their state on the way.
 
     Raises:
         RequestError, McaError: as in `warp_mca.sweep`; a file cannot be written.
+        GuardError: a run of the comparison with finite elements alone lost its footing.
     """
-    out = folder_path("out", out)
-    options: dict[str, Any] = {"device": device, "precision": precision, "workers": workers, "force": force}
-    runs = carry_out_runs(level, out, **options, prepare=prepare, progress=progress)
-    figures = figure_rows(runs)
-    page = Page(level, _made(runs, precision), judge(CLAIMS, runs), figures, drawn(Evidence(runs)))
+    out, end = folder_path("out", out), time.monotonic() + deadline
+    options: dict[str, Any] = {"device": device, "precision": precision, "force": force, "progress": progress}
+    runs = carry_out_runs(level, out, **options, workers=workers, prepare=prepare, deadline=deadline)
+    runs = replace(runs, comparison=None if force else stored(out / PURE), pure=out / PURE)
+    if pure_fem and runs.comparison is None and time.monotonic() < end:
+        if not runs.pure.exists():
+            _report(runs, precision)  # the run of finite elements alone may be interrupted, again and again
+        options["device"] = devices_named(device)[0]
+        runs = replace(runs, comparison=compare(pure_case(level).scene(), runs.pure, **options))
+    return _report(runs, precision)
+
+
+def _report(runs: Runs, precision: str) -> Report:
+    """Judge, draw and write."""
+    level, figures = runs.level, figure_rows(runs)
+    commands = [pure_case(level).command(runs.device) + more for more in (f" --method {METHOD}", "")]
+    verdicts, pictures = judge(CLAIMS, runs), drawn(Evidence(runs))
+    page = Page(level, _made(runs, precision), verdicts, figures, pictures, runs.comparison, commands)
     entries = {
         "level": level.name,
         "claims": [verdict.as_json() for verdict in page.verdicts],
+        "table_2": runs.comparison,
         "figures": figures,
     }
     texts = {
@@ -89,7 +112,7 @@ def make_report(
     }
     files = {name: text.encode() for name, text in texts.items()}
     files |= {f"{IMAGES}/figure-{number}.png": data for number, data in page.pictures.items()}
-    return Report(list(page.verdicts), list(runs.rows.values()), _written(out, files))
+    return Report(list(page.verdicts), list(runs.rows.values()), _written(runs.out, files))
 
 
 def figure_rows(runs: Runs) -> dict[str, list[dict[str, Any]]]:

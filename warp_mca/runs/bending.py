@@ -26,10 +26,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SHARE = 0.2  # of a body's strain energy from which on a word is said: bending frequencies are then 12 % too high
-SAMPLE = 1024  # hexahedra of a body that are looked at, evenly spread
-MOST = 200_000  # tetrahedra of a body that are looked at: of more, none
+SAMPLE = {"hex8": 1024, "tet4": 256}  # cells of a body that are looked at, evenly spread
 LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
-TURNS = 8  # of the iteration: rotations are exact to rounding for stretches from 0.1 to 10
+TURNS = 8  # of the iteration at most: rotations are exact to rounding for stretches from 0.1 to 10
 LOOKS = 8  # in a run, besides that at its end
 
 
@@ -39,15 +38,17 @@ class Sample:
 
     Attributes:
         body: number of the body, in the order of `Model.element_start`.
-        energies: that finds what they spend, of positions, displacements, cells and moduli.
-        conn: their nodes, shape (cell_count, corner_count), int32.
+        energies: that finds what they spend, of positions, displacements and this.
+        conn: their nodes, shape (cell_count, corner_count), int32; of tetrahedra, those next to them follow.
+        looked_at: how many of `conn` are looked at.
         K, G: bulk and shear modulus [Pa].
         share: cells of the body and material over those looked at [-].
     """
 
     body: int
-    energies: Callable[[Array, Array, NDArray[np.int32], float, float], tuple[float, float]]
+    energies: Callable[[Array, Array, Sample], tuple[float, float]]
     conn: NDArray[np.int32]
+    looked_at: int
     K: float
     G: float
     share: float
@@ -59,17 +60,25 @@ def samples_of(model: Model) -> list[Sample]:
     for block in model.blocks:
         if block.element not in _ENERGIES:
             continue
-        body = _body_of(model, block)
-        for k, material in np.unique(np.column_stack([body, block.material]), axis=0):
-            conn = block.conn[:, (body == k) & (block.material == material)].T
-            count = len(conn)
-            if block.element == "hex8":
-                conn = conn[:: -(-count // SAMPLE)]
-            elif count > MOST:
-                continue
+        kind = _body_of(model, block) * len(model.law) + block.material
+        for k in np.flatnonzero(np.bincount(kind)):
+            own = np.flatnonzero(kind == k)
+            chosen = own[:: -(-len(own) // SAMPLE[block.element])]
+            cells = chosen if block.element == "hex8" else _with_neighbours(block.conn, chosen, own)
+            body, material = divmod(int(k), len(model.law))
             K, G = model.law[material, :2]
-            found.append(Sample(int(k), _ENERGIES[block.element], conn, K, G, count / len(conn)))
+            conn, energies = block.conn[:, cells].T, _ENERGIES[block.element]
+            found.append(Sample(body, energies, conn, len(chosen), K, G, len(own) / len(chosen)))
     return found
+
+
+def _with_neighbours(conn: NDArray[np.int32], chosen: NDArray[np.intp], own: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Chosen cells, then those of their `own` body that share a node with one of them."""
+    near = np.zeros(int(conn.max()) + 1, dtype=bool)
+    near[conn[:, chosen]] = True
+    beside = near[conn[0, own]] | near[conn[1, own]] | near[conn[2, own]] | near[conn[3, own]]
+    beside[np.searchsorted(own, chosen)] = False
+    return np.concatenate([chosen, own[beside]])
 
 
 def seen(model: Model, samples: list[Sample], u: Array, before: Array) -> Array:
@@ -120,7 +129,7 @@ def _energies(model: Model, samples: list[Sample], u: Array) -> Array:
     if not np.isfinite(u).all():
         return found
     for item in samples:
-        wasted, energy = item.energies(model.X, u, item.conn, item.K, item.G)
+        wasted, energy = item.energies(model.X, u, item)
         found[item.body] += item.share * wasted, item.share * energy
     return found
 
@@ -129,15 +138,27 @@ def _turned_back(F: Array) -> tuple[Array, Array]:
     """Rotation R of each gradient F of the motion and the strain of R^T F, shape (count, 3, 3) both."""
     R = F
     for _ in range(TURNS):  # Newton's iteration of the polar decomposition: Higham, SIAM J. Sci. Stat. Comput. 7 (1986)
-        x, y, z = R[..., 0], R[..., 1], R[..., 2]
-        cofactor = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
-        R = 0.5 * (R + cofactor / (x * cofactor[..., 0]).sum(axis=-1)[..., None, None])
+        cofactor = _cofactors(R)
+        closer = 0.5 * (R + cofactor / (R[:, 0] * cofactor[:, 0]).sum(axis=-1)[:, None, None])
+        change, R = np.abs(closer - R).max(initial=0.0), closer
+        if change < 1e-8:  # the next one would change it by the square of that
+            break
     stretch = R.transpose(0, 2, 1) @ F
     return R, 0.5 * (stretch + stretch.transpose(0, 2, 1)) - np.eye(3)
 
 
-def _hexahedra(X: Array, u: Array, conn: NDArray[np.int32], K: float, G: float) -> tuple[float, float]:
-    """Energy in parasitic shear and all strain energy [J] of cells of one material."""
+def _cofactors(A: Array) -> Array:
+    """Of each matrix, shape (count, 3, 3)."""
+    found = np.empty_like(A)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            found[:, i, a] = A[:, j, b] * A[:, k, c] - A[:, j, c] * A[:, k, b]
+    return found
+
+
+def _hexahedra(X: Array, u: Array, sample: Sample) -> tuple[float, float]:
+    """Energy in parasitic shear and all strain energy [J] of the cells that are looked at."""
+    conn, K, G = sample.conn, sample.K, sample.G
     before, after = X[conn], X[conn] + u[conn]
     linear = CORNERS.T / 8.0
     T = (linear @ before).transpose(0, 2, 1)  # columns: halves of the edges
@@ -159,23 +180,23 @@ def _hexahedra(X: Array, u: Array, conn: NDArray[np.int32], K: float, G: float) 
     return float((volume * wasted).sum()), float((volume * (energy + wasted)).sum())
 
 
-def _tetrahedra(X: Array, u: Array, conn: NDArray[np.int32], K: float, G: float) -> tuple[float, float]:
-    """Energy in jumps of strain between cells and all strain energy [J] of cells of one material."""
+def _tetrahedra(X: Array, u: Array, sample: Sample) -> tuple[float, float]:
+    """Energy in jumps of strain between cells and all strain energy [J] of the cells that are looked at."""
+    conn, own = sample.conn, slice(sample.looked_at)
     volume = np.abs(volumes(X[conn]))
     _, strain = _turned_back(np.eye(3) + np.einsum("eai,eaj->eij", u[conn], gradients(X[conn])))
-    theta = np.trace(strain, axis1=1, axis2=2)
-    deviator = strain - theta[:, None, None] / 3.0 * np.eye(3)
     node, corner = np.unique(conn, return_inverse=True)
     corner = corner.reshape(conn.shape)
-    total, weight = np.zeros((len(node), 3, 3)), np.zeros(len(node))
-    for k in range(4):
-        np.add.at(total, corner[:, k], volume[:, None, None] * strain)
-        np.add.at(weight, corner[:, k], volume)
-    mean = (total / weight[:, None, None])[corner].mean(axis=1)
+    weight = np.bincount(corner.ravel(), np.repeat(volume, 4))
+    weighted = np.repeat(volume[:, None] * strain.reshape(-1, 9), 4, axis=0)
+    total = np.stack([np.bincount(corner.ravel(), part, len(node)) for part in weighted.T], axis=-1)
+    mean = (total / weight[:, None])[corner[own]].mean(axis=1).reshape(-1, 3, 3)
+    strain, volume = strain[own], volume[own]
+    deviator = strain - np.trace(strain, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
     theta = np.trace(mean, axis1=1, axis2=2)  # tet4 takes the mean dilatation around its nodes
     mean -= theta[:, None, None] / 3.0 * np.eye(3)
-    energy = 0.5 * K * theta**2 + G * (deviator**2).sum(axis=(1, 2))
-    wasted = G * ((deviator - mean) ** 2).sum(axis=(1, 2))
+    energy = 0.5 * sample.K * theta**2 + sample.G * (deviator**2).sum(axis=(1, 2))
+    wasted = sample.G * ((deviator - mean) ** 2).sum(axis=(1, 2))
     return float((volume * wasted).sum()), float((volume * energy).sum())
 
 

@@ -20,7 +20,6 @@ from warp_mca.runs.bending import LOOKS
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.scene_run import SceneRun
-from warp_mca.solve.contact_watch import contact_watch
 from warp_mca.solve.output import Output
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.sensor_stage import SensorStage
@@ -202,7 +201,6 @@ class _Loop:
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
         looked_at = any(item.samples for item in impact.scene_runs)
         self.looks = Transfer({"u": self.state.u}, self.solver.device) if looked_at else None
-        self.watch, self.contact = contact_watch(self.solver, self.state), True
         self.written = 0
 
     def run(self, until: int | None) -> None:
@@ -245,24 +243,22 @@ class _Loop:
     def _part(self, part: Part, first: int, end: int, row: int | None) -> None:
         """Steps that follow each other without a look from outside, from the present one to `end`."""
         if self.state.steps > first:  # interrupted in between
-            self.solver.step(self.state, end - self.state.steps, self.contact)
+            self.solver.step(self.state, end - self.state.steps)
             return
         if part.begins_check and self.written == ROWS:
             self._send()
-        if part.begins_search and self.watch:
-            self.contact = self.watch.search()
-        elif part.begins_search:
+        if part.begins_search:
             self.solver.search(self.state)
         if part.begins_check:
             self._record(end - first, row)
         else:
-            self.solver.step(self.state, end - first, self.contact)
+            self.solver.step(self.state, end - first)
 
     def _record(self, count: int, row: int | None) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
         recording = self.impact.recording
         needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
-        self.solver.record_and_step(self.state, count, needs, row is not None, self.contact)
+        self.solver.record_and_step(self.state, count, needs, row is not None)
         self.written += 1
         if recording and row is not None:
             recording.take(row, needs)

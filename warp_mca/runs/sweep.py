@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import time
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
@@ -36,6 +38,7 @@ from warp_mca.scene.options import with_options
 from warp_mca.solve.threads import thread_count
 
 TRIES = 5  # of a run whose worker ends before it
+LATE = "not begun before the deadline; the same call goes on with it"
 GO_ON = "if out names a folder, the others can be run by the same call"
 OWN = ("index", "status", "reason", "warnings", "wall")  # columns that no parameter may take
 
@@ -109,6 +112,7 @@ def carry_out(
     meshes: Mapping[str, Mesh] | None = None,
     prepare: Prepare | None = None,
     progress: Progress | None = None,
+    deadline: float = math.inf,
 ) -> list[Row]:
     """As `sweep`, of a sweep that is planned.
 
@@ -117,11 +121,13 @@ def carry_out(
         executor, workers, force, progress: as in `sweep`.
         meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
+        deadline: no run begins so many seconds after this call [s]; rows of those left out say so, and the table does
+            not have them.
 
     Raises:
         RequestError, McaError: as in `sweep`.
     """
-    tell = teller(progress)
+    tell, end = teller(progress), time.monotonic() + deadline
     check_executor(executor)
     _check(plan, workers, local=own_workers(executor))
     groups = batches(plan, meshes)
@@ -132,8 +138,23 @@ def carry_out(
         if executor is None and (count > 1 or (plan.options.device != "cpu" and workers != 1)):
             given = "process"  # that a run of it ends badly is then not the end of the sweep
         with opened_executor(given, plan.options.device, count, prepare) as (pool, limit):
-            _Driver(plan, pool, limit or len(jobs), table, tell).go_through(jobs)
-    return [table.rows[k] for k in range(len(plan.scenes))]
+            _Driver(plan, pool, limit or len(jobs), table, tell, end).go_through(jobs)
+    return _all_rows(plan, table)
+
+
+def stored_rows(plan: Plan) -> list[Row]:
+    """The rows that the folder of a sweep has, without a run and without its device; others are said to be left.
+
+    Raises:
+        RequestError, McaError: as in `sweep`.
+    """
+    with _opened(plan, force=False) as table:
+        return _all_rows(plan, table)
+
+
+def _all_rows(plan: Plan, table: SweepTable) -> list[Row]:
+    """A row for each run: those that the table does not have were not begun."""
+    return [table.rows.get(k) or {"index": k, **failure(LATE)} for k in range(len(plan.scenes))]
 
 
 def _check(plan: Plan, workers: object, local: bool) -> None:
@@ -208,12 +229,15 @@ def _job(plan: Plan, group: Sequence[int], count: int) -> Job:
 class _Driver:
     """Hands jobs to an executor, and rows to the table as jobs end."""
 
-    def __init__(self, plan: Plan, pool: Executor, limit: int, table: SweepTable, tell: Progress) -> None:
-        self.plan, self.pool, self.limit, self.table, self.tell = plan, pool, limit, table, tell
+    def __init__(
+        self, plan: Plan, pool: Executor, limit: int, table: SweepTable, tell: Progress, end: float = math.inf
+    ) -> None:
+        """Of a plan; no job begins after `end` [s] of the monotonic clock."""
+        self.plan, self.pool, self.limit, self.table, self.tell, self.end = plan, pool, limit, table, tell, end
         self.tries: Counter[tuple[int, ...]] = Counter()
 
     def go_through(self, jobs: Sequence[Job]) -> None:
-        """Return when all jobs have ended.
+        """Return when all jobs have ended, those that began before the end of the time.
 
         Raises:
             McaError: the executor takes no more, or rows cannot be written.
@@ -223,10 +247,13 @@ class _Driver:
         try:
             while waiting or running:
                 self.tell("sweep", len(self.table.rows) / len(self.plan.scenes))
+                if time.monotonic() >= self.end:
+                    waiting.clear()
+                    running = {future: job for future, job in running.items() if not future.cancel()}
                 while waiting and len(running) < self.limit:
                     job = waiting.popleft()
                     running[self._submit(job)] = job
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                for future in wait(running, self._left(), return_when=FIRST_COMPLETED).done:
                     job = running.pop(future)
                     outcomes = self._outcomes(future, job)
                     if outcomes is None:
@@ -236,6 +263,11 @@ class _Driver:
         finally:
             for future in running:
                 future.cancel()
+
+    def _left(self) -> float | None:
+        """Time until the end [s]; None where there is none, or it is over."""
+        left = self.end - time.monotonic()
+        return left if 0.0 < left < math.inf else None
 
     def _submit(self, job: Job) -> Future[list[Row]]:
         try:

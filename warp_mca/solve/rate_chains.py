@@ -79,8 +79,7 @@ class Chains:
                 self.groups[chain, level, False], self.groups[chain, level, True] = forces, motion
         cuda = wp.get_device().is_cuda
         self._launcher = Streams(cuda)
-        # the fastest chain takes what places there are first
-        self._streams = [wp.Stream(priority=0 if chain else -1) for chain in range(self.top + 1)] if cuda else []
+        self._streams = [wp.Stream() for _ in range(self.top + 1)] if cuda else []
 
     def run(self, step: Step, first: int, end: int) -> None:
         """Launch the substeps from `first` to `end` of steps in a row; they record nothing."""

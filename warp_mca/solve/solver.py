@@ -16,7 +16,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
 from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
-from warp_mca.kernels.contact import contact, watch
+from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.search import FLAGS
 from warp_mca.kernels.hardware import subnormals
 from warp_mca.kernels.nodes import slide
@@ -170,7 +170,6 @@ class Solver:
         sums += self.rigid.kernels() + self.sensors.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
-        sums += [watch.watch_nodes] if self.chains and self.contacts else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
         movers = (self.nodes, self.absorbing, self.ties, self.floating)
         nodes = [kernel for stage in movers for kernel in stage.kernels()]
@@ -219,20 +218,20 @@ class Solver:
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
 
-    def _step(self, step: Step, contact: bool = True) -> None:
+    def _step(self, step: Step) -> None:
         self._streams.run(self.groups, step)
         if self.chains:
-            self.chains.run(Step(step.state, contact=contact), 1, self.chains.substeps)
+            self.chains.run(Step(step.state), 1, self.chains.substeps)
             return
         for j in range(1, 1 << len(self.subgroups)):
             level = (j & -j).bit_length() - 1
             self._streams.run(self.subgroups[level], Step(step.state, step.split))
 
-    def _steps(self, state: State, count: int, contact: bool) -> None:
+    def _steps(self, state: State, count: int) -> None:
         if self.resident and count:
             return self.resident.launch(state, count)
         if self.chains and count:
-            return self.chains.run(Step(state, contact=contact), 0, count * self.chains.substeps)
+            return self.chains.run(Step(state), 0, count * self.chains.substeps)
         for _ in range(count):
             self._step(Step(state))
 
@@ -241,11 +240,11 @@ class Solver:
             stage.schedule()
 
     def record_and_step(
-        self, state: State, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True, contact: bool = True
+        self, state: State, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True
     ) -> None:
         """Record the state, as a row of the history or as a check between two, then advance `count` steps.
 
-        A row may come with a frame of `needs`. Arguments else as of `step`.
+        A row may come with a frame of `needs`.
 
         Raises:
             Exception: what a thread raised.
@@ -253,7 +252,7 @@ class Solver:
         name = f"{'record' if is_row else 'check'} {sorted(needs)}"
 
         def record(split: Split = whole) -> None:
-            self._step(Step(state, split, True, is_row, needs), contact)
+            self._step(Step(state, split, True, is_row, needs))
 
         if self._replay.pool:
             self._replay.stages(state, name, record)
@@ -264,13 +263,13 @@ class Solver:
         def interval() -> None:
             self._schedule()
             record()
-            self._steps(state, count - 1, contact)
+            self._steps(state, count - 1)
 
-        self._replay.graph(state, f"{name} {count}{'' if contact else ' clear'}", interval)
+        self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count
 
-    def step(self, state: State, count: int, contact: bool = True) -> None:
-        """Advance `count` steps; without `contact` where a `ContactWatch` says that nothing can touch.
+    def step(self, state: State, count: int) -> None:
+        """Advance `count` steps.
 
         Raises:
             Exception: what a thread raised.
@@ -281,9 +280,9 @@ class Solver:
 
             def steps() -> None:
                 self._schedule()
-                self._steps(state, count, contact)
+                self._steps(state, count)
 
-            self._replay.graph(state, f"step {count}{'' if contact else ' clear'}", steps)
+            self._replay.graph(state, f"step {count}", steps)
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:

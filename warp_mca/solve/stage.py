@@ -13,7 +13,6 @@ from warp_mca.solve.threads import Split, whole
 if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
-CONTACT = "contact"  # stage that may be left out
 MAIN, BESIDE, ASIDE, SUMS = "main", "beside", "aside", "sums"  # streams of a GPU; a CPU runs stages one by one
 
 
@@ -27,7 +26,6 @@ class Step:
         records: whether the step also records the state at its start.
         is_row: whether the record is a row of the history, and not a check between two.
         needs: of recorders, that a frame of this step must hold.
-        contact: whether anything may touch; where not, contact is left out of steps that do not record.
     """
 
     state: State
@@ -35,7 +33,6 @@ class Step:
     records: bool = False
     is_row: bool = False
     needs: frozenset[str] = frozenset()
-    contact: bool = True
 
 
 @dataclass(frozen=True)
@@ -73,8 +70,6 @@ class Streams:
         summing = False
         for group in groups:
             stages = [stage for stage in group if step.records or not stage.only_records]
-            if not step.contact:
-                stages = [stage for stage in stages if stage.name != CONTACT]
             if stages:
                 summing = summing or any(stage.stream == SUMS for stage in stages)
                 self._run_group(stages, step)

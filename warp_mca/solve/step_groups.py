@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.stage import ASIDE, BESIDE, CONTACT, SUMS, Group, Stage, Step
+from warp_mca.solve.stage import ASIDE, BESIDE, SUMS, Group, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -48,7 +48,7 @@ def _forces(solver: Solver, level: int | None, common: bool, chain: int | None =
     active = [e for e in solver.elements if level is None or e.parts(level, chain)]
     found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level, chain)) for e in active]
     found += [
-        Stage(CONTACT, lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
+        Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
         for c in (solver.contacts if common else [])
     ]
     if common and solver.couplings.count:
