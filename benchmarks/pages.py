@@ -126,7 +126,7 @@ def pictures(page: str) -> list[str]:
 
 def write(page: str, folder: Path) -> None:
     """Run a page, and put what it printed and drew where the page shows it."""
-    printed = {block.start: text for block, text in run_page(page, folder)}
+    printed = {block.start: re.sub(r" +$", "", text, flags=re.M) for block, text in run_page(page, folder)}
     text = (DOCS / page).read_text(encoding="utf-8")
     for code, output in reversed(shown(page)):
         text = text[: output.start] + printed[code.start] + text[output.end :]

@@ -42,7 +42,7 @@ def test_the_same_lines_drop_other_files(
     suffix: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.chdir(folder)
-    code = DROP.text.replace(READ, {**CAD, **MESHES}[suffix]).replace("300e-6", "30e-6")
+    code = DROP.text.replace(READ, {**CAD, **MESHES}[suffix]).replace("200e-6", "30e-6")
     if suffix not in PICTURED:
         code = code.replace("recorders=[picture, ", "recorders=[")
     assert ("part." in code, "30e-6" in code, "recorders=[picture" in code) == (True, True, suffix in PICTURED)
