@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_gpu import oblique
-from test_probes import watched
+from test_probes import PROBES, SECTIONS, watched
 
 import warp_mca as mca
+from warp_mca.report.probes import plot_probes
 from warp_mca.results import tables
 from warp_mca.results.units import unit_of
 
@@ -70,6 +72,25 @@ def test_xarray_has_dimensions_and_units():
     stress = data.stress_down.sel(component="yy")
     assert np.array_equal(stress, result().paths[0].stress[:, :, 1]) and stress.attrs["units"] == "Pa"
     assert all("units" in variable.attrs for variable in data.data_vars.values())
+
+
+def test_the_page_on_probes_does_what_it_says(capsys: pytest.CaptureFixture[str]):
+    pytest.importorskip("pandas")
+    page = (Path(__file__).parents[1] / "docs" / "probes.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(code, {})
+    said = capsys.readouterr().out
+    raw, smooth, force = map(float, re.findall(r"[-\d.]+(?= m/s\^2 raw| by CFC| N through)", said))
+    assert raw > smooth == pytest.approx(950.0, rel=0.02) and force == pytest.approx(-0.0216 * smooth, rel=0.15)
+
+
+def test_probes_are_drawn_raw_and_filtered():
+    figure = plot_probes(result())
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [p.name for p in (*PROBES, *SECTIONS)]
+    inside, cut = figure.axes[1], figure.axes[4]
+    assert "y CFC 1000" in [line.get_label() for line in inside.lines]
+    assert inside.get_ylabel() == "acceleration [km/s²]" and cut.get_ylabel() == "force [kN]"
+    assert figure.axes[-1].get_xlabel() == "time after first contact [ms]"
 
 
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch):

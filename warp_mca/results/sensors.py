@@ -90,6 +90,9 @@ class Sensors:
         )
 
 
+NO_SENSORS = Sensors()
+
+
 def locate_sensors(scene: Scene, meshes: Mapping[str, Mesh]) -> Sensors:
     """Find the nodes around probes, and the cells on both sides of sections.
 

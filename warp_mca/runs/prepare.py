@@ -11,7 +11,7 @@ from warp_mca.model.build import Grouping, build_model
 from warp_mca.model.cells import nodal_masses
 from warp_mca.model.model import Model
 from warp_mca.results.paths import Found, Probes, locate
-from warp_mca.results.sensors import Sensors, locate_sensors
+from warp_mca.results.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.runs.advice import mesh_warnings
 from warp_mca.runs.arguments import Progress
@@ -38,7 +38,7 @@ class Prepared:
     start: HandOff
     model: Model
     probes: Probes
-    sensors: Sensors = Sensors()
+    sensors: Sensors = NO_SENSORS
     warnings: tuple[str, ...] = ()
 
 

@@ -111,7 +111,7 @@ def carry_out(
     force: bool = False,
     meshes: Mapping[str, Mesh] | None = None,
     prepare: Prepare | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     deadline: float = math.inf,
 ) -> list[Row]:
     """As `sweep`, of a sweep that is planned.

@@ -19,8 +19,8 @@ class SceneRecords:
         sums: columns of each row of the history, see `kernels.records.columns`, each shape (column_count,), float64.
         velocities: of the recorded points at each row [m/s], each shape (point_count, 3), float64.
         path_stress: of the scene's probes [Pa], each shape (row_count, probe_count, 6), float32.
-        sensors: channels of the scene's probes and sections at each row, see `SensorStage.rings`, each shape
-            (channel_count,), float64.
+        sensors: position [m] and velocity [m/s] of the scene's probes, force [N] and moment [N m] of its sections at
+            each row, each shape (channel_count,), float64.
         peaks: of each contact pass at its greatest, sum of normal forces [N] and sum of their squares [N^2], shape
             (pass_count, 2), float64.
         stiffened: of each body, energy that its cells spent on their own stiffness and its strain energy [J], when that
