@@ -56,12 +56,12 @@ def plotter(
     mesh.point_data[title] = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
     points = _places(mesh, magnify)
     mesh.points = points
-    found.add_mesh(mesh, scalars=title, cmap="viridis", split_sharp_edges=True, smooth_shading=True)
+    found.add_mesh(mesh, name="bodies", scalars=title, cmap="viridis", split_sharp_edges=True, smooth_shading=True)
     up = np.asarray(mesh.field_data["up"], dtype=float).ravel()
-    for plane in _planes(mesh, points, up):
+    for k, plane in enumerate(_planes(mesh, points, up)):
         squares = pv.PolyData.from_regular_faces(plane.points + plane.shift(at), plane.quads)
         squares.cell_data["dark"] = plane.dark.astype(np.uint8)
-        found.add_mesh(squares, scalars="dark", cmap=["#e0e0e6", "#c7c9d1"], show_scalar_bar=False)
+        found.add_mesh(squares, name=f"plane {k}", scalars="dark", cmap=["#e0e0e6", "#c7c9d1"], show_scalar_bar=False)
     found.add_text(f"{1e6 * at:.1f} µs after first contact", font_size=10)
     centre, axes = 0.5 * (points.min(axis=0) + points.max(axis=0)), view_axes(up, np.ptp(points, axis=0))
     found.camera_position = [centre + EYE @ axes, centre, up]

@@ -19,7 +19,6 @@ from warp_mca.report.style import engineering, new_figure, save_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
 Array = NDArray[np.floating]
@@ -89,7 +88,7 @@ class Look:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     planes: Sequence[PlaneMesh] = ()
     magnify: float = 1.0
-    pixels: int = 900
+    pixels: int = 800
 
 
 class Picture:
@@ -111,6 +110,7 @@ class Picture:
         field = FIELDS[look.field]
         self.scale, unit = engineering(limit, field.unit) if field.unit else (1.0, "")
         self.colours = ScalarMappable(PowerNorm(field.power, 0.0, self.scale * limit or 1.0), "viridis")
+        self.palette = np.vstack([self.colours.get_cmap()(np.arange(256))[:, :3], PLANE_LIGHT, PLANE_DARK])
         wide, tall = 1e3 * (self.high - self.low)
         self.figure = new_figure(4.5 * float(np.clip(wide / tall, 0.6, 1.6)) + 1.6, 4.8)
         self.axes = self.figure.add_subplot()
@@ -136,23 +136,22 @@ class Picture:
         size = self.high - self.low
         pixels = np.maximum(np.round(self.look.pixels * size / size.max()).astype(int), 1)
         width, height = FINER * pixels
-        parts = [_of_skin(skin, self.colours, self.scale) for skin in skins.values()]
+        parts = [_of_skin(skin) for skin in skins.values()]
         parts += [_of_plane(plane, time) for plane in self.look.planes]
-        corners, normals, rgb, plain = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        seen_front = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ self.eye[2] > 0.0
-        corners, normals, rgb, plain = (array[seen_front] for array in (corners, normals, rgb, plain))
+        corners, normals, value = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        front = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ self.eye[2] > 0.0
+        corners, normals, value = corners[front], normals[front], value[front]
         on_screen = corners @ self.eye.T
         on_screen[:, :, 0] = (on_screen[:, :, 0] - self.low[0]) * width / size[0]
         on_screen[:, :, 1] = (self.high[1] - on_screen[:, :, 1]) * height / size[1]
         seen = rasterise(on_screen, int(width), int(height))
-        value = seen.interpolated(rgb[:, :, :1])[:, 0]
-        colour = np.where(plain[seen.triangle][:, None], rgb[seen.triangle, 0], self.colours.to_rgba(value)[:, :3])
-        normal = seen.interpolated(normals)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
         towards = LIGHT / np.linalg.norm(LIGHT) @ view_axes(np.array(self.look.up))
-        colour = colour * (AMBIENT + (1.0 - AMBIENT) * np.clip(normal @ towards, 0.0, 1.0))[:, None]
-        picture = np.ones((width * height, 3))
-        picture[seen.pixel] = colour
+        bright = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ towards, 0.0, 1.0)
+        value, bright = seen.interpolated(np.stack([value, bright], axis=2)).T
+        share = np.asarray(self.colours.norm(self.scale * np.maximum(value, 0.0)))
+        level = np.where(value < 0.0, 255.0 - value, 255.0 * np.clip(share, 0.0, 1.0) + 0.5).astype(np.int32)
+        picture = np.ones((width * height, 3), dtype=np.float32)
+        picture[seen.pixel] = self.palette[level] * bright[:, None]
         blocks = picture.reshape(pixels[1], FINER, pixels[0], FINER, 3).mean(axis=(1, 3))
         return np.round(255.0 * blocks).astype(np.uint8)
 
@@ -188,21 +187,18 @@ def _axes_of_view(up: tuple[float, float, float], bounds: Array) -> Array:
     return np.array([right, np.cross(eye, right), eye])
 
 
-def _of_skin(skin: Skin, colours: ScalarMappable, scale: float) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Triangles of a skin: corners, normals there, scaled value in place of a colour, and that none is plain."""
+def _of_skin(skin: Skin) -> tuple[Array, Array, Array]:
+    """Triangles of a skin: corners [m], normals and values there, shapes (count, 3, 3), (count, 3, 3), (count, 3)."""
     points = np.asarray(skin.points, dtype=float)
-    creases = Creases(skin.quads, points)
-    normals, corner = creases.by_triangle(points)
-    value = np.repeat(scale * np.asarray(skin.value, dtype=float)[corner][:, :, None], 3, axis=2)
-    return points[corner], normals, value, np.zeros(len(corner), dtype=bool)
+    normals, corner = Creases(skin.quads, points).by_triangle(points)
+    return points[corner], normals, np.asarray(skin.value, dtype=float)[corner]
 
 
-def _of_plane(plane: PlaneMesh, time: float) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Triangles of a plane: corners, normals, plain colours."""
+def _of_plane(plane: PlaneMesh, time: float) -> tuple[Array, Array, Array]:
+    """Triangles of a plane, as `_of_skin` has them; values of light squares are -1, those of dark ones -2."""
     corners = (plane.points + plane.shift(time))[np.concatenate([plane.quads[:, [0, 1, 2]], plane.quads[:, [0, 2, 3]]])]
-    rgb = np.where(np.tile(plane.dark, 2)[:, None, None], PLANE_DARK, PLANE_LIGHT)
-    normals = np.broadcast_to(plane.normal, corners.shape)
-    return corners, normals, np.broadcast_to(rgb, corners.shape), np.ones(len(corners), dtype=bool)
+    value = np.where(np.tile(plane.dark, 2), -2.0, -1.0)
+    return corners, np.broadcast_to(plane.normal, corners.shape), np.repeat(value[:, None], 3, axis=1)
 
 
 def _draw_scale(axes: Axes, width: float) -> None:
