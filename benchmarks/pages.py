@@ -115,8 +115,15 @@ def run_page(page: str, folder: Path, given: dict[str, object] | None = None) ->
 
 def shown(page: str) -> list[tuple[Block, Block]]:
     """The Python blocks of a page whose output it shows, each with the block that shows it."""
-    found = page_blocks(page)
-    return [(a, b) for a, b in pairwise(found) if (a.language, b.language) == ("python", "text")]
+    if page.endswith(".ipynb"):
+        return []
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return [
+        (code, output)
+        for code, output in pairwise(blocks(text))
+        if (code.language, output.language, text[code.end : output.start].split())
+        == ("python", "text", ["```", "```text"])
+    ]
 
 
 def pictures(page: str) -> list[str]:
