@@ -47,6 +47,12 @@ def test_all_pages_of_tutorials_and_how_tos_are_listed():
     assert found == set(PAGES)
 
 
+def test_notebooks_are_stored_without_outputs():
+    for path in DOCS.rglob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells), path.name
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_page_runs_and_prints_what_it_shows(page: str, tmp_path: Path):
     if page.endswith(".ipynb"):
