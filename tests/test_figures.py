@@ -111,7 +111,9 @@ def test_a_snapshot_shows_the_faces_towards_the_eye_in_their_colours():
     shown = np.asarray(image.get_array()).reshape(-1, 3)
     seen = shown[shown.min(axis=1) < 250]
     assert seen.shape[0] > 0.6 * shown.shape[0]
-    assert float(np.median(seen[seen[:, 0] > 180].sum(axis=1))) == pytest.approx(float(PALETTE[255].sum()), rel=0.25)  # less the shade
+    assert float(np.median(seen[seen[:, 0] > 180].sum(axis=1))) == pytest.approx(
+        float(PALETTE[255].sum()), rel=0.25
+    )  # less the shade
     faces = np.unique(np.round(seen / 12.0), axis=0, return_counts=True)[1]
     assert (faces > 0.1 * len(seen)).sum() >= 1  # the face towards +z has one colour
 

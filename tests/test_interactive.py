@@ -38,7 +38,10 @@ def test_vtk_reads_what_is_up_and_the_planes_at_every_frame(file: Path):
         reader.SetStep(step)
         reader.Update()
         fields = reader.GetOutputDataObject(0).GetFieldData()
-        expected = {"up": BELT.normal, **{f"plane_{name}": getattr(BELT, name) for name in ("point", "normal", "velocity")}}
+        expected = {
+            "up": BELT.normal,
+            **{f"plane_{name}": getattr(BELT, name) for name in ("point", "normal", "velocity")},
+        }
         for name, value in expected.items():
             np.testing.assert_array_equal(vtk_to_numpy(fields.GetArray(name)), [value])
 
@@ -57,7 +60,10 @@ def test_the_picture_stands_upright_on_its_floor(file: Path):
 
 @pytest.mark.parametrize(
     ("options", "why"),
-    [({"field": "heat"}, "field = 'heat': choose one of"), ({"magnify": -1.0}, "magnify = -1.0: give a factor above 0")],
+    [
+        ({"field": "heat"}, "field = 'heat': choose one of"),
+        ({"magnify": -1.0}, "magnify = -1.0: give a factor above 0"),
+    ],
 )
 def test_what_cannot_be_drawn_is_refused(file: Path, options: dict, why: str):
     with pytest.raises(RequestError, match=why):

@@ -48,7 +48,9 @@ def test_magnified_shapes_keep_the_rigid_motion():
     np.testing.assert_allclose(magnified(X, stretch, 50.0), X + 50.0 * stretch, atol=0.01)  # the nearest turn is small
     mirrored = X * [1.0, 1.0, -1.0]
     moved = magnified(X, mirrored - X, 1e-9)  # the nearest turn, not the mirror
-    np.testing.assert_allclose(np.linalg.norm(moved[1:] - moved[:-1], axis=1), np.linalg.norm(np.diff(X, axis=0), axis=1), rtol=1e-6)
+    np.testing.assert_allclose(
+        np.linalg.norm(moved[1:] - moved[:-1], axis=1), np.linalg.norm(np.diff(X, axis=0), axis=1), rtol=1e-6
+    )
 
 
 def test_a_picture_has_the_colour_of_the_field_and_the_floor_below(bars: FlyingBars):
@@ -95,7 +97,10 @@ def test_a_few_faces_do_not_set_the_scale_of_stress():
     ],
 )
 def test_what_cannot_be_drawn_is_refused(tmp_path: Path, options: dict, why: str):
-    for make in (lambda: SnapshotFile(tmp_path / "a.png", time=0.0, **options), lambda: AnimationFile(tmp_path / "a.gif", **options)):
+    for make in (
+        lambda: SnapshotFile(tmp_path / "a.png", time=0.0, **options),
+        lambda: AnimationFile(tmp_path / "a.gif", **options),
+    ):
         with pytest.raises(RequestError, match=why):
             make()
 

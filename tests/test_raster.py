@@ -62,6 +62,8 @@ def test_normals_are_smooth_over_a_ball_and_follow_a_turn():
     at = np.zeros((creases.count, 3))
     at[creases.group] = points[local].reshape(-1, 3)
     assert (np.einsum("ij,ij->i", normals, at) > np.cos(np.radians(4.0))).all()
-    small, large = (np.array([[np.cos(t), -np.sin(t), 0.0], [np.sin(t), np.cos(t), 0.0], [0.0, 0.0, 1.0]]) for t in (0.05, 0.1))
+    small, large = (
+        np.array([[np.cos(t), -np.sin(t), 0.0], [np.sin(t), np.cos(t), 0.0], [0.0, 0.0, 1.0]]) for t in (0.05, 0.1)
+    )
     assert creases.normals(points @ small.T) is None
     np.testing.assert_allclose(creases.normals(points @ large.T), normals @ large.T, atol=1e-6)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import is_triangle
 
 CREASE = np.cos(np.radians(35.0))  # faces that meet at a greater angle keep a sharp edge
+WATCHED = 60  # faces that are looked at for a turn, at least, and less than twice as many
 TURNED = np.cos(np.radians(5.0))  # faces that turned by more get new normals
 
 
@@ -32,21 +33,25 @@ class Creases:
         self.quads = quads
         count = np.where(is_triangle(quads), 3, 4)
         self._used = np.arange(4) < count[:, None]
-        first, second = _corners_over_edges(quads, count, _units(self._faces(points)))
+        first, second = _corners_over_edges(quads, count, _units(_normals(points, quads)))
         size = self.quads.size
         links = coo_matrix((np.ones(len(first), dtype=bool), (first, second)), shape=(size, size))
         label = connected_components(links, directed=False)[1].reshape(self.quads.shape)
         groups, group = np.unique(label[self._used], return_inverse=True)
         self.group, self.count = group.astype(np.int32), len(groups)
-        self._normals: NDArray[np.float32] | None = None
+        self._watched = quads[:: max(1, len(quads) // WATCHED)]
+        self._seen: NDArray[np.floating] | None = None
 
     def normals(self, points: NDArray[np.floating]) -> NDArray[np.float32] | None:
-        """Unit normals of the groups, shape (count, 3), float32; None where no face turned by more than 5 degrees."""
-        face = self._faces(points)
-        unit = _units(face)
-        if self._normals is not None and (np.einsum("ij,ij->i", unit, self._normals) >= TURNED).all():
+        """Unit normals of the groups, shape (count, 3), float32; None where no face turned by more than 5 degrees.
+
+        Some sixty faces spread over the skin are looked at.
+        """
+        watched = _units(_normals(points, self._watched))
+        if self._seen is not None and (np.einsum("ij,ij->i", watched, self._seen) >= TURNED).all():
             return None
-        self._normals = unit
+        self._seen = watched
+        face = _normals(points, self.quads)
         corner = np.broadcast_to(face[:, None], (*self.quads.shape, 3))[self._used]
         sums = [np.bincount(self.group, corner[:, k], minlength=self.count) for k in range(3)]
         return _units(np.stack(sums, axis=1)).astype(np.float32)
@@ -61,10 +66,12 @@ class Creases:
         corner = np.concatenate([self.quads[faces][:, at] for faces, at in halves])
         return normals[np.concatenate([group[faces][:, at] for faces, at in halves])], corner
 
-    def _faces(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Normals of the faces, as long as twice their area [m^2], shape (face_count, 3)."""
-        a, b, c, d = (points[self.quads[:, k]] for k in range(4))
-        return np.cross(c - a, d - b)
+
+def _normals(points: NDArray[np.floating], quads: NDArray[np.int32]) -> NDArray[np.floating]:
+    """Normals of faces, as long as twice their area [m^2], shape (face_count, 3)."""
+    corner = points[quads]
+    (ax, ay, az), (bx, by, bz) = (corner[:, 2] - corner[:, 0]).T, (corner[:, 3] - corner[:, 1]).T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def _units(vectors: NDArray[np.floating]) -> NDArray[np.floating]:

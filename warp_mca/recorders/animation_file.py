@@ -139,7 +139,19 @@ def _write_mp4(encoder: str, path: Path, pictures: Iterator[NDArray[np.uint8]]) 
     first = next(pictures)
     size = f"{first.shape[1]}x{first.shape[0]}"
     command = [encoder, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size]
-    command += ["-r", str(PLAYBACK), "-i", "-", "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", str(path)]
+    command += [
+        "-r",
+        str(PLAYBACK),
+        "-i",
+        "-",
+        "-pix_fmt",
+        "yuv420p",
+        "-crf",
+        "20",
+        "-movflags",
+        "+faststart",
+        str(path),
+    ]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     assert process.stdin is not None and process.stderr is not None
     with suppress(BrokenPipeError):  # what went wrong is on its standard error

@@ -68,7 +68,9 @@ class Subject:
         everything = np.concatenate([skin.points for skin in skins.values()])
         planes = plane_meshes(info.scene, everything)
         x, y, z = up_of(info.scene).tolist()
-        return Look(field=self.field, limit=self.limit, bounds=bounds, up=(x, y, z), planes=planes, magnify=self.magnify)
+        return Look(
+            field=self.field, limit=self.limit, bounds=bounds, up=(x, y, z), planes=planes, magnify=self.magnify
+        )
 
     def _from_volume(self, info: RunInfo, frame: Frame, nodes: NDArray[np.int32]) -> tuple[NDArray, NDArray]:
         """Points [m] and values at `nodes`."""

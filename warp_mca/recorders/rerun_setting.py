@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.recorders.rerun_blueprint import Sights
+from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, Sights
 from warp_mca.report.setting import plane_meshes, up_of
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import RunInfo
 
 PLANES = "/world/planes"
+TO_MM = 1e3
 LIGHT, DARK = 0xC9CBD1FF, 0xB3B6BFFF  # squares of a plane
 EVEN = 1e-3  # slave nodes that are this share of the slave's size farther than the nearest one touch at once with it
 PATCH = 0.02  # share of the slave's size around the contact over which normals are averaged
@@ -34,6 +35,36 @@ def topology(info: RunInfo, nodes: NDArray[np.int32], triangles: NDArray[np.int3
     )
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
     return rr.Mesh3D.from_fields(triangle_indices=triangles, vertex_normals=normals.astype(np.float32))
+
+
+class PathBars:
+    """Stress along a path as bars: their places, widths and colour once, their heights in every frame."""
+
+    def __init__(self, position: NDArray[np.floating], index: int) -> None:
+        """Prepare bars for path number `index` with probes at `position` [m]."""
+        import rerun as rr
+
+        place = TO_MM * np.asarray(position)
+        width = np.median(np.abs(np.diff(place))) if len(place) > 1 else 1.0
+        widths = np.full(len(place), width, dtype=np.float32)
+        self.frame = rr.BarChart.from_fields(values=widths)
+        self.once = rr.BarChart(widths, abscissa=place, widths=widths, color=PATH_COLOURS[index % len(PATH_COLOURS)])
+        object.__setattr__(self.once, "values", None)  # rerun's own setter would convert it
+
+    def heights(self, stress: NDArray[np.float32]) -> rr.BarChart:
+        """The bars for `stress` [MPa], shape (probe_count,). rerun's own conversion takes four times as long."""
+        import pyarrow as pa
+
+        tensor = self.frame.values.pa_array  # pyright: ignore[reportOptionalMemberAccess]
+        union = tensor.field("buffer")
+        children = [union.field(k) for k in range(union.type.num_fields)]
+        at = union.type_codes[0].as_py()
+        values = pa.ListArray.from_arrays(children[at].offsets, pa.array(stress), type=children[at].type)
+        children[at] = values
+        buffer = pa.Array.from_buffers(union.type, len(union), union.buffers()[:3], children=children)
+        parts = [tensor.field("shape"), tensor.field("names"), buffer]
+        self.frame.values.pa_array = pa.StructArray.from_arrays(parts, fields=list(tensor.type))  # pyright: ignore
+        return self.frame
 
 
 class Planes:

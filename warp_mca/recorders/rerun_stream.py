@@ -23,7 +23,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import kinds, members
 from warp_mca.recorders.colours import SLIP, STICK, ColourScale, check_limit, packed
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
-from warp_mca.recorders.rerun_setting import PLANES, Planes, sights, topology
+from warp_mca.recorders.rerun_setting import PLANES, PathBars, Planes, sights, topology
 from warp_mca.report.setting import up_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ FLUSH_EVERY = 4  # frames between flushes: as many may be lost when a run is kil
 CLOSE_TIMEOUT = 10.0  # of the file at the end [s]
 END = b"RRF2FOOT"  # 12 bytes before the end of a whole file
 FRAMES = Cadence(frames=100)
-TO_MPA, TO_MM = 1e-6, 1e3
+TO_MPA = 1e-6
 
 
 class RerunStream:
@@ -125,6 +125,7 @@ class RerunStream:
             self.viewer = Viewer(stream, layout, self.viewer_options)
         self.streams = [stream for stream in (self._file_stream, self._viewer_stream) if stream]
         self.planes = Planes(info)
+        self.bars = {path: PathBars(position, k) for k, (path, position) in enumerate(info.paths.items())}
         for stream in self.streams:
             log_up(stream, up_of(info.scene))
             log_legend(stream)
@@ -132,6 +133,8 @@ class RerunStream:
             self.planes.log(stream)
             for body, surface in info.surfaces.items():
                 stream.log(self.bodies[body], topology(info, surface.nodes, surface.triangles), static=True)
+            for path, bars in self.bars.items():
+                stream.log(self.paths[path], bars.once, static=True)
         self._warm_up()
 
     def frame(self, frame: Frame) -> None:
@@ -184,7 +187,7 @@ class RerunStream:
     ) -> None:
         import rerun as rr
 
-        from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, log_ticks
+        from warp_mca.recorders.rerun_blueprint import log_ticks
 
         stream.set_time("sim_time", duration=float(frame.time))
         stream.set_time("step", sequence=int(frame.step))
@@ -194,11 +197,8 @@ class RerunStream:
         sticks = np.where(frame.contact_stick, np.uint32(STICK), np.uint32(SLIP))
         dots = rr.Points3D.from_fields(positions=frame.contact_points, colors=sticks, radii=[-3.0])
         stream.log("world/contact_points", dots)
-        for k, (name, stress) in enumerate(frame.path_stress.items()):
-            at, width = _bars(self.info.paths[name])
-            colour = PATH_COLOURS[k % len(PATH_COLOURS)]
-            bars = rr.BarChart(TO_MPA * stress, abscissa=at, widths=width, color=colour)
-            stream.log(self.paths[name], bars)
+        for name, stress in frame.path_stress.items():
+            stream.log(self.paths[name], self.bars[name].heights(TO_MPA * stress))
         self.planes.move(stream, float(frame.time))
         if rescaled:
             log_ticks(stream, self.scale)
@@ -252,13 +252,6 @@ class RerunStream:
             self.info.warn(str(self.viewer.problem))
             self.streams = [stream for stream in self.streams if stream is not self._viewer_stream]
             self.viewer = self._viewer_stream = None
-
-
-def _bars(position: NDArray[np.floating]) -> tuple[NDArray, NDArray]:
-    """Centres and widths [mm] of the bars of a path."""
-    position = TO_MM * np.asarray(position)
-    width = np.median(np.abs(np.diff(position))) if len(position) > 1 else 1.0
-    return position, np.full(len(position), width, dtype=np.float32)
 
 
 def _plain(name: str) -> str:

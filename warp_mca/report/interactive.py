@@ -75,9 +75,8 @@ def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
     Raises:
         RequestError: the file cannot be read, or the time is not one.
     """
-    from vtkmodules.vtkIOHDF import vtkHDFReader
-
     import pyvista as pv  # pyright: ignore[reportMissingImports]
+    from vtkmodules.vtkIOHDF import vtkHDFReader
 
     if time is not None and not is_number(time):
         raise bad_value("time", brief(time), "give a finite time [s]")

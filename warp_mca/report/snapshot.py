@@ -104,7 +104,9 @@ class Picture:
             points = np.concatenate([skin.points for skin in skins.values()])
             bounds = np.array([points.min(axis=0), points.max(axis=0)])
         self.look, self.eye = look, _axes_of_view(look.up, bounds)
-        window = np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]]) @ self.eye[:2].T
+        window = (
+            np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]]) @ self.eye[:2].T
+        )
         self.low, self.high = window.min(axis=0), window.max(axis=0)
         limit = look.limit if look.limit is not None else field_limit(skins, look.field)
         field = FIELDS[look.field]
