@@ -120,7 +120,7 @@ def carry_out(
         executor, workers, force, progress: as in `sweep`.
         meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
-        deadline: no run begins so many seconds after this call [s]; those left out are not in the table, their rows say so.
+        deadline: no run begins so many seconds after this call [s]; the others are not in the table, their rows say so.
 
     Raises:
         RequestError, McaError: as in `sweep`.
