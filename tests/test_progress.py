@@ -74,5 +74,5 @@ def test_true_shows_lines_where_nobody_watches(monkeypatch: pytest.MonkeyPatch, 
     assert "impact: " in capsys.readouterr().err
     mca.run(bar(), threads=1, progress=False)
     assert capsys.readouterr().err == ""
-    with pytest.raises(mca.RequestError, match=r"progress = 3\.0: give True or a function"):
+    with pytest.raises(mca.RequestError, match=r"progress = 3\.0: give a function"):
         mca.run(bar(), progress=3.0)

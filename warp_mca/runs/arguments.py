@@ -49,8 +49,7 @@ def teller(progress: Progress | bool | None) -> Progress:
     if progress is None or progress is False:
         return lambda stage, done: None
     if not callable(progress):
-        remedy = "give True or a function progress(stage, done), or leave it out"
-        raise bad_value("progress", validate.brief(progress), remedy)
+        raise bad_value("progress", validate.brief(progress), "give a function progress(stage, done), or leave it out")
     return progress
 
 

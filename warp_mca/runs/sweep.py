@@ -18,7 +18,6 @@ from warp_mca.base.folder import held
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.results.storage import check_output, folder_path
 from warp_mca.runs.arguments import Progress, check_scene, span_of, teller
-from warp_mca.runs.progress import shows_progress
 from warp_mca.runs.rate_groups import check_multi_rate
 from warp_mca.runs.sweep_job import Job, Row, failure, run_job
 from warp_mca.runs.sweep_plan import Plan, RunOptions, batches, differing
@@ -43,7 +42,6 @@ GO_ON = "if out names a folder, the others can be run by the same call"
 OWN = ("index", "status", "reason", "warnings", "wall")  # columns that no parameter may take
 
 
-@shows_progress
 def sweep(
     scenes: Iterable[Scene],
     *,
@@ -60,7 +58,7 @@ def sweep(
     force: bool = False,
     refine: float | None = None,
     mass_scaling: float | str | None = None,
-    progress: Progress | bool | None = None,
+    progress: Progress | None = None,
 ) -> list[Row]:
     """Run scenes on several workers, and collect a row of figures of each.
 
@@ -81,7 +79,7 @@ def sweep(
         out: folder for sweep.csv and sweep.parquet; nothing is written if None.
         folders: keep the files of each run in a folder of its own in `out`, named by its number from 0.
         force: start again, in place of what `out` holds.
-        progress: called with a stage and the share of runs that have ended; True shows it.
+        progress: called with a stage and the share of runs that have ended.
 
     Returns:
         A row for each scene: index, the parameters that differ, status (done, stopped, failed), reason, all single
@@ -110,7 +108,7 @@ def carry_out(
     force: bool = False,
     meshes: Mapping[str, Mesh] | None = None,
     prepare: Prepare | None = None,
-    progress: Progress | bool | None = None,
+    progress: Progress | None = None,
     deadline: float = math.inf,
 ) -> list[Row]:
     """As `sweep`, of a sweep that is planned.
