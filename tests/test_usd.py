@@ -176,7 +176,7 @@ def test_contact_points_stick_or_slip(stage):
 
 
 def test_a_frame_of_20000_vertices_takes_at_most_280_kB(bars: FlyingBars, tmp_path: Path):
-    """Waves over the whole of a grid that moves, too flat to turn its normals; plastic strain grows on a fifth of it."""
+    """Waves over a grid that moves, too flat to turn its normals; plastic strain grows on a fifth of it."""
     n = 142
     index = np.arange((n - 1) ** 2)
     corner = (index // (n - 1) * n + index % (n - 1)).astype(np.int32)

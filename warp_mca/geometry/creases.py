@@ -16,7 +16,8 @@ class Creases:
     """Groups of the corners of faces at a vertex, cut where faces meet at an edge.
 
     Attributes:
-        group: of each corner of each face, faces one after the other, triangles with three, shape (corner_count,), int32.
+        group: of each corner of each face, faces one after the other; triangles have three; shape (corner_count,),
+            int32.
         count: how many there are.
     """
 
@@ -57,7 +58,7 @@ class Creases:
         return _units(np.stack(sums, axis=1)).astype(np.float32)
 
     def by_triangle(self, points: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
-        """Normals at the corners of the faces cut in triangles, and their vertices, shapes (count, 3, 3), (count, 3)."""
+        """Normals at the corners of faces cut in triangles, shape (count, 3, 3); their vertices, shape (count, 3)."""
         normals = self.normals(points)
         assert normals is not None  # asked for the first time
         group = np.zeros(self.quads.shape, dtype=np.int32)
@@ -74,7 +75,7 @@ def _normals(points: NDArray[np.floating], quads: NDArray[np.int32]) -> NDArray[
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
-def _units(vectors: NDArray[np.floating]) -> NDArray[np.floating]:
+def _units(vectors: NDArray) -> NDArray[np.floating]:
     length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
     return vectors / np.maximum(length, np.finfo(np.float32).tiny)
 

@@ -98,13 +98,13 @@ class Sights(NamedTuple):
         reach: size of the surface that may touch there [m].
     """
 
-    up: NDArray[np.float64]
+    up: NDArray[np.floating]
     bounds: NDArray[np.float64]
     focus: NDArray[np.float64] | None
     reach: float = 0.0
 
 
-def log_up(stream: rr.RecordingStream, up: NDArray[np.float64]) -> None:
+def log_up(stream: rr.RecordingStream, up: NDArray[np.floating]) -> None:
     """Say which axis of the world is up, by the nearest one."""
     import rerun as rr
 

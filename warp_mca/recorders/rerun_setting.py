@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,8 @@ class PathBars:
         """The bars for `stress` [MPa], shape (probe_count,). rerun's own conversion takes four times as long."""
         import pyarrow as pa
 
-        tensor = self.frame.values.pa_array  # pyright: ignore[reportOptionalMemberAccess]
+        held: Any = self.frame.values  # typed as all that may be given, not as what rerun makes of it
+        tensor = held.pa_array
         union = tensor.field("buffer")
         children = [union.field(k) for k in range(union.type.num_fields)]
         at = union.type_codes[0].as_py()
@@ -63,7 +64,7 @@ class PathBars:
         children[at] = values
         buffer = pa.Array.from_buffers(union.type, len(union), union.buffers()[:3], children=children)
         parts = [tensor.field("shape"), tensor.field("names"), buffer]
-        self.frame.values.pa_array = pa.StructArray.from_arrays(parts, fields=list(tensor.type))  # pyright: ignore
+        held.pa_array = pa.StructArray.from_arrays(parts, fields=list(tensor.type))
         return self.frame
 
 
@@ -81,7 +82,7 @@ class Planes:
         for k, plane in enumerate(self.meshes):
             points = plane.points[plane.quads]  # squares of their own, since colours belong to points
             first = 4 * np.arange(len(plane.quads))[:, None]
-            triangles = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]])
+            triangles = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
             colours = np.where(plane.dark, np.uint32(DARK), np.uint32(LIGHT)).repeat(4)
             mesh = rr.Mesh3D.from_fields(
                 vertex_positions=points.reshape(-1, 3).astype(np.float32),

@@ -76,6 +76,7 @@ def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
         RequestError: the file cannot be read, or the time is not one.
     """
     import pyvista as pv  # pyright: ignore[reportMissingImports]
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
     from vtkmodules.vtkIOHDF import vtkHDFReader
 
     if time is not None and not is_number(time):
@@ -85,7 +86,7 @@ def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
         raise bad_value("file", str(path), "give a recording that VtkHdfFile or --vtkhdf wrote")
     reader.SetFileName(str(path))
     reader.UpdateInformation()
-    times = np.array(reader.GetOutputInformation(0).Get(reader.GetExecutive().TIME_STEPS()))
+    times = np.array(reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()))
     step = len(times) - 1 if time is None else int(np.argmin(np.abs(times - time)))
     reader.SetStep(step)
     reader.Update()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.scene import RigidPlane, Scene
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 EYE = np.array([0.30, 0.35, 0.89])  # direction to the eye: right, upwards and to the viewer
 CHECKS = 12  # squares along a side of a plane, at least

@@ -95,7 +95,7 @@ class Picture:
     """A figure of skins that can be drawn again at other times."""
 
     def __init__(self, skins: Mapping[str, Skin], time: float, look: Look) -> None:
-        """Draw the figure: shaded skins on a scale of colours, a bar of length, and the time after first contact [s]."""
+        """Draw shaded skins on a scale of colours, with a bar of length, and the time after first contact [s]."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import PowerNorm
 
