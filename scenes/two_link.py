@@ -52,12 +52,13 @@ def _paths(length: float, radius: float) -> tuple[mca.Path, ...]:
     """
     end, hinge = 1.14 * radius, 1.45 * radius
 
-    def path(name: str, y: float) -> mca.Path:
+    def path(name: str, title: str, y: float) -> mca.Path:
         lower = mca.Line(body="AB", start=(length - end, y, 0.0), end=(hinge, y, 0.0), position=end)
         upper = mca.Line(body="OA", start=(length - hinge, y, 0.0), end=(end, y, 0.0), position=length + hinge)
-        return mca.Path(name=name, lines=(lower, upper), spacing=length / 84.0)
+        return mca.Path(name=name, lines=(lower, upper), spacing=length / 84.0, title=title)
 
-    return path("Path 1", -radius), path("Path 2", 0.0), path("Path 3", radius)
+    sides = (("upper surface", -radius), ("axis", 0.0), ("lower surface", radius))
+    return tuple(path(f"Path {k}", title, y) for k, (title, y) in enumerate(sides, 1))
 
 
 def build(

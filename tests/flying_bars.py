@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import warp_mca as mca
@@ -16,21 +18,22 @@ STEPS = 1000  # between two frames
 
 
 class FlyingBars:
-    """Two elastic bars side by side that fly along x; stress grows with time.
+    """Two elastic bars side by side that fly along x; stress grows with time. Options are those of the scene.
 
     Attributes:
         info: of the run.
         said: warnings that recorders gave.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, **options: Any) -> None:
         steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
         box = mca.Box(size=(0.1, 0.01, 0.01), divisions=(10, 1, 1))
         one, other = (
             mca.Body(name=name, geometry=box, material=steel, position=at, velocity=(3.0, 0.0, 0.0))
             for name, at in (("upper bar", (0.0, 0.02, 0.0)), ("lower", (0.0, 0.0, 0.0)))
         )
-        scene = mca.Scene(name="bars", bodies=(one, other), impact=mca.ImpactPhase(duration=1e-5))
+        options = {"name": "bars", **options}
+        scene = mca.Scene(bodies=(one, other), impact=mca.ImpactPhase(duration=1e-5), **options)
         meshes = mca.mesh(scene)
         start = hand_off(scene, meshes, nodal_masses(scene, meshes))
         model = build_model(scene, meshes, start.positions, start.velocities)

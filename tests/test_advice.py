@@ -160,7 +160,7 @@ def test_the_command_line_reports_slivers_first(
     assert cli.main(["build", "thin.py", "-o", "thin.mca"]) == 0
     assert re.search("warning: " + SLIVER, capsys.readouterr().out)
     tell = nullcontext(lambda stage, done: print(stage, file=sys.stderr))
-    monkeypatch.setattr("warp_mca.report.console.progress_bar", lambda: tell)
+    monkeypatch.setattr("warp_mca.base.progress.progress_bar", lambda: tell)
     assert cli.main(["run", "thin.py"]) == 0
     captured = capsys.readouterr()
     assert re.search("^warning: " + SLIVER + r"(.|\n)*\nimpact\n", captured.err, re.MULTILINE)

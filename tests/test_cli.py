@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -277,8 +278,9 @@ mesh_file._write = write
 sys.exit(cli.main(["run", "landing.py", "--duration", "1e-5", "--out", "there/out", "--final", "there/a.vtu"]))
 """
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True)
-    assert (done.returncode, done.stderr.count("\n")) == (143, 1), done.stderr
-    assert "terminated before it was done" in done.stderr
+    assert done.returncode == 143 and done.stderr.splitlines()[-1].endswith("terminated before it was done"), (
+        done.stderr
+    )
     assert contents(here) == []
 
 
@@ -288,12 +290,13 @@ def test_warnings_are_shown(capsys: pytest.CaptureFixture[str], monkeypatch: pyt
     assert "warning: mind the gap" in capsys.readouterr().out
 
 
-def test_as_a_program_it_writes_one_line_on_stderr_and_no_progress_bar(here: Path):
+def test_as_a_program_it_says_what_runs_on_stderr_and_shows_no_progress_bar(here: Path):
     command = [sys.executable, "-m", "warp_mca", "run", "landing.py"]
     bad = subprocess.run([*command, "--device", "cuda:99"], capture_output=True, text=True)
     assert (bad.returncode, bad.stdout, bad.stderr.count("\n")) == (2, "", 1), bad.stderr
     good = subprocess.run(command, capture_output=True, text=True)
-    assert (good.returncode, good.stderr) == (0, "")
+    assert good.returncode == 0
+    assert re.fullmatch(r"\w+: [\d,]+ elements, [\d,]+ steps of .* s, set by .*; about .* s on cpu, .*\n", good.stderr)
     json.loads((here / "landing-tiny" / "summary.json").read_text())
 
 
@@ -441,5 +444,5 @@ def test_streams_and_folders_that_are_not_there(command: str, status: int, words
 
 def test_a_matplotlib_backend_of_another_environment_is_left_alone(here: Path):
     found, error = shell("mca run landing.py --out there", MPLBACKEND="module://of.a.notebook")
-    assert (found, error) == (0, "")
+    assert found == 0 and "backend" not in error
     assert (here / "there" / "forces.png").is_file()

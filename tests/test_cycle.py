@@ -35,7 +35,12 @@ T_END = {"single_link": 0.5, "three_link": 0.8}
 
 
 def scene(name: str, **parameters) -> mca.Scene:
-    return mca.make_scene(name, **COARSE, **{"t_end": T_END[name], **parameters})
+    made = mca.make_scene(name, **COARSE, **{"t_end": T_END[name], **parameters})
+    last = made.bodies[-2].name
+    end = mca.Probe(name="end", body=last, nodes="tip")
+    return replace(
+        made, probes=(end,), sections=(mca.Section(name="cut", body=last, at=(0.1, 0, 0), normal=(1, 0, 0)),)
+    )
 
 
 @cache
@@ -178,6 +183,24 @@ def test_hinges_give_the_impulse_that_makes_the_motion_rigid():
     momentum = back.chain.moved_to(part.end).momentum(back.theta, back.theta_dot) if back.chain else np.zeros(2)
     change = momentum - mass @ v[chain, :2]
     assert part.hinge_impulse["OA"] == pytest.approx(change, abs=1e-12 * np.abs(mass @ np.abs(v[chain, :2])).max())
+
+
+@NAMES
+def test_probes_and_sections_record_swings_and_impacts(name: str):
+    """Probes move on through hand-offs and ways back; rigid links have no force in sections."""
+    _, _, result = cycle(name)
+    (end,), (cut,) = result.probes, result.sections
+    moved = np.diff(end.position, axis=0)
+    way = 0.5 * (end.velocity[1:] + end.velocity[:-1]) * np.diff(end.time)[:, None]
+    error = np.linalg.norm(moved - way, axis=1) / np.linalg.norm(moved, axis=1).max()
+    starts = [np.argmin(np.abs(end.time + result.summary["t_contact"] - p.start)) for p in impacts(name)]
+    inside = [k + n for k, p in zip(starts, impacts(name), strict=True) for n in range(p.impact.rows)]
+    known = np.zeros(len(end.time), dtype=bool)
+    known[inside] = True
+    back = known[:-1] & ~known[1:]  # steps in which vibration is left out
+    assert error[~back].max() < 2e-3 and error[back].max() < 0.15
+    assert np.array_equal(~np.isnan(cut.force[:, 0]), known) and np.nanmax(np.abs(cut.force)) > 10.0
+    assert [len(result.impact(k).probes[0].time) for k in (0, 1)] == [p.impact.rows for p in impacts(name)]
 
 
 def test_a_run_that_ends_before_the_first_touch_is_a_swing():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ def result(peak: float) -> Result:
     history = {name: np.zeros(len(TIME)) for name in HISTORY_COLUMNS} | {"time_s": TIME, "F_n_N": force}
     history["stick_fraction"] = np.where((TIME > 100.5e-6) & (TIME < 200.5e-6), 1.0, 0.0)
     history["F_t_N"] = -0.3 * force
+    history["tip_vy"] = np.full(len(TIME), -1.0)
     return Result({"scene": "toy"}, history)
 
 
@@ -34,6 +36,14 @@ def test_forces_are_drawn_over_time_in_a_fitting_unit(peak: float, unit: str, sh
     assert np.max(line.get_ydata()) == pytest.approx(shown)
     assert line.get_xdata()[-1] == pytest.approx(0.5)
     assert forces.get_title(loc="left").startswith("toy: contact for 0.")
+
+
+def test_without_velocities_there_is_no_empty_panel():
+    """As in scenes without a tip, a target and a closing speed."""
+    run = result(900.0)
+    bare = replace(run, history={**run.history, "tip_vy": np.full(len(TIME), np.nan)})
+    (forces,) = plot_forces(bare).axes
+    assert forces.get_xlabel() == "time after first contact [ms]" and forces.get_ylabel() == "contact force [N]"
 
 
 def test_sticking_is_shaded_in_both_panels():

@@ -330,3 +330,32 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
     edges = 20 * (4 if element == "tet4" else 2) - 1  # of a chain of 20 steps
     assert changed == [edges] if name != "everything" else changed[0] > edges
     assert all(np.array_equal(one, other) for one, other in zip(*states, strict=True))
+
+
+@pytest.mark.parametrize("plastic", [True, False])
+def test_probes_and_sections_record_what_they_do_on_the_cpu(plastic):
+    """Sections compute a layer of cells by patches, whose slots hold sums over its elements."""
+    metal = oblique().bodies[0].material if plastic else mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
+    scene = replace(
+        oblique(),
+        bodies=tuple(replace(body, material=metal) for body in oblique().bodies),
+        probes=(
+            mca.Probe(name="top", body="small", nodes="ymax"),
+            mca.Probe(name="in", body="large", at=(0, -0.01, 0)),
+        ),
+        sections=(
+            mca.Section(name="small", body="small", at=(0.0, 0.0101, 0.0), normal=(0.0, 1.0, 0.0)),
+            mca.Section(name="large", body="large", at=(0.0, -0.0101, 0.0), normal=(0.0, 1.0, 0.0)),
+        ),
+    )
+    cpu, cuda, again = (mca.run(scene, device=device, precision="float64") for device in ("cpu", "cuda:0", "cuda:0"))
+    for one, two in zip(cpu.sections, cuda.sections, strict=True):
+        assert np.abs(one.force).max() > 100.0
+        assert two.force == pytest.approx(one.force, abs=1e-6 * np.abs(one.force).max())
+        assert two.moment == pytest.approx(one.moment, abs=1e-6 * np.abs(one.moment).max())
+    for one, two in zip(cpu.probes, cuda.probes, strict=True):
+        assert two.position == pytest.approx(one.position, abs=1e-12)
+        assert two.velocity == pytest.approx(one.velocity, abs=1e-6)
+    assert all(np.array_equal(a.force, b.force) for a, b in zip(cuda.sections, again.sections, strict=True))
+    plain = mca.run(replace(scene, probes=(), sections=()), device="cuda:0", precision="float64")
+    assert all(np.array_equal(plain[name], cuda[name], equal_nan=True) for name in plain.history)

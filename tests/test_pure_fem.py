@@ -33,7 +33,10 @@ COARSE = {
 def build() -> mca.Scene:
     made = mca.make_scene("single_link", theta=46.6, **COARSE)
     impact = replace(made.impact, duration=1.2e-4)
-    return replace(made, rigid=replace(made.rigid, theta_dot=(-10.0,)), impact=impact)
+    end = mca.Probe(name="end", body="OA", nodes="tip")
+    middle = mca.Section(name="middle", body="OA", at=(0.1, 0.0, 0.0), normal=(1.0, 0.0, 0.0))
+    rigid = replace(made.rigid, theta_dot=(-10.0,))
+    return replace(made, rigid=rigid, impact=impact, probes=(end,), sections=(middle,))
 '''
 BLOCK, INTERVAL, COMMAND = 2, 2e-6, ["run", "scene.py", "--method", "pure-fem", "--checkpoint", "1", "--out", "out"]
 KILLED = """
@@ -70,7 +73,10 @@ def scene() -> mca.Scene:
     names: dict[str, Any] = {}
     exec(SCENE, names)
     line = mca.Line(body="OA", start=(0.05, 0.0, 0.0), end=(0.15, 0.0, 0.0))
-    return replace(names["build"](), paths=(mca.Path(name="axis", lines=(line,), spacing=0.05),))
+    return replace(
+        names["build"](),
+        paths=(mca.Path(name="axis", lines=(line,), spacing=0.05),),
+    )
 
 
 @cache
@@ -103,6 +109,9 @@ def test_the_history_is_coarse_in_the_swing_and_fine_from_shortly_before_the_tou
     assert result.time[-1] == pytest.approx(1.2e-4)
     assert result.impact().time[0] == pytest.approx(0.0, abs=1e-12)
     assert len(result.contacts[0].pressure) == len(result.paths[0].stress) == len(result.time)
+    (end,), (middle,) = result.probes, result.sections
+    way = np.cumsum(0.5 * (end.velocity[1:] + end.velocity[:-1]) * np.diff(end.time)[:, None], axis=0)
+    assert end.position[1:] == pytest.approx(end.position[0] + way, abs=1e-5) and len(middle.force) == len(result.time)
     gravity = result["E_kinetic"] - result["E_kinetic"][0]
     assert gravity[1:touch] == pytest.approx(gravity[touch - 1] * (result.time[1:touch] / -result.time[0] + 1), rel=0.1)
 
@@ -126,6 +135,8 @@ def equal(result: mca.Result) -> None:
     expected = whole()
     assert all(np.array_equal(result[name], expected[name], equal_nan=True) for name in expected.history)
     assert np.array_equal(result.contacts[0].force, expected.contacts[0].force)
+    assert np.array_equal(result.probes[0].position, expected.probes[0].position)
+    assert np.array_equal(result.sections[0].moment, expected.sections[0].moment)
     other = ("wall", "phases", "element_steps_per_s", "parameters", "wave_speeds")  # a file has no parameters and paths
     for name, value in json.loads(json.dumps(expected.summary)).items():
         assert name in other or result.summary[name] == value, name

@@ -19,7 +19,7 @@ def test_example_runs(number, tmp_path, monkeypatch, capsys):
     assert " N" in capsys.readouterr().out
 
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

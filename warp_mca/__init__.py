@@ -23,10 +23,12 @@ from warp_mca.scene import (
     Point,
     Prescribed,
     Prismatic,
+    Probe,
     Revolute,
     RigidPhase,
     RigidPlane,
     Scene,
+    Section,
     Slide,
     Spherical,
     Surface,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
     from warp_mca.report.quality import quality_table
+    from warp_mca.results.cfc import cfc_filter
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
     from warp_mca.runs.batch import run_batch
@@ -68,6 +71,7 @@ _LAZY = {
     "Accuracy": "warp_mca.accuracy.request",
     "make_scene": "warp_mca.scene.catalogue",
     "Result": "warp_mca.results.result",
+    "cfc_filter": "warp_mca.results.cfc",
     "load": "warp_mca.results.storage",
     "tradeoff": "warp_mca.accuracy.tradeoff",
     "quality_table": "warp_mca.report.quality",
@@ -97,6 +101,8 @@ __all__ = [
     "Point",
     "Path",
     "Line",
+    "Probe",
+    "Section",
     "Tip",
     "RigidPhase",
     "BaseMotion",
@@ -117,6 +123,7 @@ __all__ = [
     "Mesh",
     "Param",
     "Accuracy",
+    "cfc_filter",
     "make_scene",
     "mesh",
     "quality_table",

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import logging
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import bad_value
 from warp_mca.cli.request import SCALE, Request
-from warp_mca.runs.advice import LOGGER
 from warp_mca.scene.catalogue import parse_overrides
 
 if TYPE_CHECKING:
@@ -43,7 +41,6 @@ def accuracy_asked(args: argparse.Namespace, request: Request) -> Accuracy | Non
         return None
     if request.meshes is not None:
         raise bad_value("--accuracy", args.accuracy, "a model file holds finished meshes; name the scene itself")
-    logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that the choice is said before the run
     given = parse_overrides(args.settings)
     typed = {name: request.scene.parameters[name] for name in given}
     options = {"refine": args.refine, "mass_scaling": args.mass_scaling, "multi_rate": args.multi_rate}

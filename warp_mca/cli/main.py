@@ -19,6 +19,7 @@ from typing import NoReturn
 
 from warp_mca.base.errors import McaError
 from warp_mca.base.stdio import drop_output, open_streams, what_failed
+from warp_mca.cli import completion
 from warp_mca.cli.parser import make_parser
 from warp_mca.runs.advice import LOGGER
 
@@ -61,7 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if before[number] is not signal.SIG_IGN:  # as nohup has it
             signal.signal(number, _terminate)
     warnings = _Warnings()
-    logging.getLogger(LOGGER).addHandler(warnings)
+    logger = logging.getLogger(LOGGER)
+    level = logger.level  # which commands may change
+    logger.addHandler(warnings)
     try:
         return _carry_out(argv)
     except McaError as error:
@@ -79,7 +82,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("; ".join([f"warp-mca: {what} before it was done", *getattr(stop, "__notes__", ())]), file=sys.stderr)
         return 128 + number
     finally:
-        logging.getLogger(LOGGER).removeHandler(warnings)
+        logger.removeHandler(warnings)
+        logger.setLevel(level)
         gc.set_threshold(*collect)
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)
@@ -89,7 +93,9 @@ def _carry_out(argv: Sequence[str] | None) -> int:
     """Carry out one command; what it printed has left the process when it returns."""
     status = 0
     try:
-        args = make_parser().parse_args(argv)
+        parser = make_parser()
+        completion.answer(parser)
+        args = parser.parse_args(argv)
         args.words = list(sys.argv[1:] if argv is None else argv)
         args.command(args)
     except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands

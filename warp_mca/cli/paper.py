@@ -53,8 +53,8 @@ def _seconds(text: str) -> float:
 
 
 def _carry_out(args: argparse.Namespace) -> None:
+    from warp_mca.base.progress import progress_bar
     from warp_mca.paper.report import level_named, make_report
-    from warp_mca.report.console import progress_bar
 
     start_warp()
     with progress_bar() as progress:

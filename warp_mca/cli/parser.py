@@ -216,6 +216,7 @@ def _add_scene(parser: argparse.ArgumentParser) -> None:
 
 def _add_recorders(parser: argparse.ArgumentParser) -> None:
     from warp_mca.recorders import FILES
+    from warp_mca.report.snapshot import FIELDS
 
     example = "two_link --viewer rerun --usd impact.usdc --snapshot 60e-6; options with FILE may be given several times"
     group = _group(parser, "see the run", example)
@@ -235,4 +236,14 @@ def _add_recorders(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="SECONDS",
         help="draw the bodies at this time after first contact; may be given several times",
+    )
+    group.add_argument(
+        "--field",
+        default="von_mises",
+        choices=tuple(FIELDS),
+        metavar="FIELD",
+        help="what colours --snapshot and --animate: %(choices)s (default: %(default)s)",
+    )
+    group.add_argument(
+        "--magnify", type=float, default=1.0, metavar="F", help="draw F times the deformation there (default: 1)"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ from warp_mca.cli import sweep
 from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.request import read_request
 from warp_mca.cli.warp_start import start_warp
+from warp_mca.runs.advice import LOGGER
 from warp_mca.runs.checkpoint import DEFAULT, Every, stored_command
 
 if TYPE_CHECKING:
@@ -22,12 +24,14 @@ if TYPE_CHECKING:
 
 def run(args: argparse.Namespace) -> None:
     """Run a scene or a sweep, and print what came of it."""
-    from warp_mca.report.console import print_summary, progress_bar
-    from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES
+    from warp_mca.base.progress import progress_bar
+    from warp_mca.report.console import print_summary
+    from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
     if args.sweeps:
         _sweep(args)
         return
+    logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that what is about to run is said
     request = read_request(args)
     out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
     recorders = _recorders(args, out)
@@ -50,6 +54,7 @@ def run(args: argparse.Namespace) -> None:
             checkpoint=_every(args),
         )
     written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
+    written += PROBE_FILES if result.probes or result.sections else ()
     recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
     print_summary(result, [*(str(out / name) for name in written), *recorded])
     changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling, args.accuracy)
@@ -66,15 +71,19 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     from warp_mca.recorders import FILES, Cadence, SnapshotFile
 
     cadence = Cadence(frames=args.frames)
+    drawn = {"field": args.field, "magnify": args.magnify}
     found: list[Recorder] = []
     files = {option: list(getattr(args, option)) for option in FILES}
     if args.viewer == "rerun":
         first = files["rrd"].pop(0) if files["rrd"] else None
         found.append(FILES["rrd"].make(first, viewer=True, cadence=cadence))
     for option, kind in FILES.items():
-        more = {"cadence": cadence} if kind.frames else {}
+        more = {**({"cadence": cadence} if kind.frames else {}), **(drawn if kind.pictures else {})}
         found += [kind.make(file, **more) for file in files[option]]
-    return found + [SnapshotFile(out / f"snapshot-{_time_words(t)}.png", time=t) for t in args.snapshots]
+    other = "" if args.field == "von_mises" else f"-{args.field}"
+    return found + [
+        SnapshotFile(out / f"snapshot-{_time_words(t)}{other}.png", time=t, **drawn) for t in args.snapshots
+    ]
 
 
 def _time_words(t: float) -> str:

@@ -81,7 +81,7 @@ def sweep(
         RequestError: the request cannot be carried out.
         GuardError: not all runs are done; the table has them all.
     """
-    from warp_mca.report.console import progress_bar
+    from warp_mca.base.progress import progress_bar
     from warp_mca.runs.rate_groups import check_multi_rate
     from warp_mca.runs.sweep import carry_out
     from warp_mca.runs.sweep_plan import Plan, RunOptions, parse_grid, plain

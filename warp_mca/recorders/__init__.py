@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from warp_mca.recorders.recorder import Cadence, Recorder
 
 if TYPE_CHECKING:
+    from warp_mca.recorders.animation_file import AnimationFile
     from warp_mca.recorders.mesh_file import FinalState
     from warp_mca.recorders.rerun_stream import RerunStream
     from warp_mca.recorders.snapshot_file import SnapshotFile
@@ -18,13 +19,15 @@ if TYPE_CHECKING:
 class Kind(NamedTuple):
     """A recorder that writes a file: its module, its class, and the help of its option on the command line.
 
-    Its class is called with the file and, where it takes `frames` during the run, with `cadence`.
+    Its class is called with the file and, where it takes `frames` during the run, with `cadence`; `pictures` are drawn
+    with `field` and `magnify`, too.
     """
 
     module: str
     name: str
     help: str
     frames: bool = True
+    pictures: bool = False
 
     def make(self, *args: object, **options: object) -> Recorder:
         """The recorder; its module is imported only now."""
@@ -39,6 +42,9 @@ FILES = {
     "final": Kind(
         "warp_mca.recorders.mesh_file", "FinalState", "write the last state in a format of meshio (.vtu, …)", False
     ),
+    "animate": Kind(
+        "warp_mca.recorders.animation_file", "AnimationFile", "draw a film of the bodies (.gif, .mp4)", pictures=True
+    ),
 }
 _MODULES = {kind.name: kind.module for kind in FILES.values()} | {"SnapshotFile": "warp_mca.recorders.snapshot_file"}
 
@@ -50,6 +56,7 @@ __all__ = [
     "VtkHdfFile",
     "FinalState",
     "SnapshotFile",
+    "AnimationFile",
 ]
 
 

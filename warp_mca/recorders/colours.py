@@ -45,8 +45,8 @@ def levels(value: NDArray[np.floating], limit: float) -> NDArray[np.uint8]:
         value: not below 0, any shape, such as von Mises stress [Pa].
         limit: of the scale, in the unit of `value`.
     """
-    share = np.nan_to_num(value * (1.0 / limit if limit > 0.0 else 0.0), nan=0.0, posinf=1.0)
-    return (255.0 * np.sqrt(np.clip(share, 0.0, 1.0)) + 0.5).astype(np.uint8)
+    share = value * (1.0 / limit if limit > 0.0 else 0.0)
+    return (255.0 * np.sqrt(np.fmin(np.fmax(share, 0.0), 1.0)) + 0.5).astype(np.uint8)  # these leave out nan
 
 
 def stress_at(share: float, limit: float) -> float:

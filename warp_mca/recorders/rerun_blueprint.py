@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, stress_at
+from warp_mca.report.setting import view_axes
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -44,7 +45,8 @@ PLOTS = (
 PATH_COLOURS = (0xD55E00FF, 0x009E73FF, 0x56B4E9FF, 0xE69F00FF, 0xCC79A7FF)
 BAR = (256, 14)  # of the legend, in its own units
 TICKS = 5
-FRONT, BELOW = np.array([0.12, 0.25, 0.96]), np.array([0.0, -0.85, 0.53])  # directions to the eye
+FRONT = np.array([0.12, 0.25, 0.96])  # direction to the eye: right, upwards and to the viewer
+OUTSIDE = 0.85  # share of the direction to the eye of the contact view that points out of the slave
 BACKGROUND = (222, 223, 228)  # light, so that the dark end of the palette stands out
 
 
@@ -85,17 +87,42 @@ def log_ticks(stream: rr.RecordingStream, scale: ColourScale) -> None:
     stream.log("legend/ticks", rr.Points2D(places, colors=0xFFFFFFFF, radii=1.0, labels=labels, show_labels=True))
 
 
+class Sights(NamedTuple):
+    """Where the views look at first.
+
+    Attributes:
+        up: unit vector upwards [-], shape (3,), float64.
+        bounds: smallest and largest coordinates of what the first view should hold [m], shape (2, 3), float64.
+        focus: where contact is expected [m], and the normal of the slave's skin there [-], shape (2, 3), float64; or
+            None.
+        reach: size of the surface that may touch there [m].
+    """
+
+    up: NDArray[np.floating]
+    bounds: NDArray[np.float64]
+    focus: NDArray[np.float64] | None
+    reach: float = 0.0
+
+
+def log_up(stream: rr.RecordingStream, up: NDArray[np.floating]) -> None:
+    """Say which axis of the world is up, by the nearest one."""
+    import rerun as rr
+
+    axis = int(np.argmax(np.abs(up)))
+    name = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if up[axis] > 0.0 else 'DOWN'}"
+    stream.log("world", getattr(rr.ViewCoordinates, name), static=True)
+
+
 def blueprint(
-    scale: ColourScale, bounds: NDArray, focus: NDArray | None, struck: Sequence[str], with_paths: bool
+    scale: ColourScale, sights: Sights, struck: Sequence[str], paths: Sequence[tuple[str, str]]
 ) -> rrb.Blueprint:
     """The layout.
 
     Args:
         scale: named in the legend's title.
-        bounds: smallest and largest coordinates of what the first view should hold [m], shape (2, 3).
-        focus: centre of a close view from below [m], shape (3,), or None for no close view.
-        struck: entities that would hide the contact there, left out.
-        with_paths: whether there is stress along paths.
+        sights: where the views look.
+        struck: entities that would hide the contact, left out of the view of it.
+        paths: entity of the stress along each path, and what the path is.
     """
     import rerun.blueprint as rrb
 
@@ -105,22 +132,30 @@ def blueprint(
         visual_bounds=rrb.VisualBounds2D(x_range=[-24.0, 290.0], y_range=[-6.0, 56.0]),
         background=(24, 24, 28),
     )
-    size = float(np.linalg.norm(bounds[1] - bounds[0]))
-    views: list[rrb.View] = [_view("waves", bounds.mean(axis=0), 1.15 * size * FRONT, ["+ /world/**"])]
-    if focus is not None:
+    extent = sights.bounds[1] - sights.bounds[0]
+    size = float(np.linalg.norm(extent))
+    axes = view_axes(sights.up, extent)
+    front = 1.15 * size * FRONT @ axes
+    views: list[rrb.View] = [_view("waves", sights.bounds.mean(axis=0), front, sights.up, ["+ /world/**"])]
+    if sights.focus is not None:
+        place, outwards = sights.focus
+        aside = axes[2] - (axes[2] @ outwards) * outwards
+        if np.linalg.norm(aside) < 0.5:  # the contact faces the viewer
+            aside = axes[1]
+        distance = float(np.clip(1.2 * sights.reach, 0.1 * size, 0.3 * size))
+        eye = distance * (OUTSIDE * outwards + np.sqrt(1.0 - OUTSIDE**2) * aside / np.linalg.norm(aside))
         contents = ["+ /world/**", *(f"- {path}/**" for path in struck)]
-        views.append(_view("contact, from below", focus, 0.1 * size * BELOW, contents))
+        views.append(_view("contact, without what is struck", place, eye, sights.up, contents))
     plots: list[rrb.View] = [
         rrb.TimeSeriesView(origin=f"/plots/{name}", name=title, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop))
         for name, title, _ in PLOTS
     ]
-    if with_paths:
-        title = "von Mises stress [MPa] along the paths, over position [mm]"
-        curve = rrb.BarChartView(origin="/paths", name=title, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop))
-        plots.insert(1, curve)
+    hidden = rrb.PlotLegend(visible=False)
+    bars = [rrb.BarChartView(origin=path, name=f"{name} [MPa, mm]", plot_legend=hidden) for path, name in paths]
+    rows = [legend, rrb.Horizontal(*views, column_shares=[2, 1][: len(views)]), *([rrb.Horizontal(*bars)] * bool(bars))]
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(legend, rrb.Horizontal(*views, column_shares=[2, 1][: len(views)]), row_shares=[1, 4]),
+            rrb.Vertical(*rows, row_shares=[1, 4, 2][: len(rows)]),
             rrb.Vertical(*plots),
             column_shares=[3, 2],
         ),
@@ -131,7 +166,7 @@ def blueprint(
     )
 
 
-def _view(name: str, target: NDArray, offset: NDArray, contents: list[str]) -> rrb.Spatial3DView:
+def _view(name: str, target: NDArray, offset: NDArray, up: NDArray, contents: list[str]) -> rrb.Spatial3DView:
     """A view of `contents` from `target` + `offset` [m]."""
     import rerun.blueprint as rrb
 
@@ -141,5 +176,5 @@ def _view(name: str, target: NDArray, offset: NDArray, contents: list[str]) -> r
         contents=contents,
         background=BACKGROUND,
         line_grid=False,
-        eye_controls=rrb.EyeControls3D(position=target + offset, look_target=target, eye_up=(0.0, 1.0, 0.0)),
+        eye_controls=rrb.EyeControls3D(position=target + offset, look_target=target, eye_up=up),
     )

@@ -23,6 +23,8 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import kinds, members
 from warp_mca.recorders.colours import SLIP, STICK, ColourScale, check_limit, packed
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
+from warp_mca.recorders.rerun_setting import PLANES, PathBars, Planes, sights, topology
+from warp_mca.report.setting import up_of
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -34,7 +36,7 @@ FLUSH_EVERY = 4  # frames between flushes: as many may be lost when a run is kil
 CLOSE_TIMEOUT = 10.0  # of the file at the end [s]
 END = b"RRF2FOOT"  # 12 bytes before the end of a whole file
 FRAMES = Cadence(frames=100)
-TO_MPA, TO_MM = 1e-6, 1e3
+TO_MPA = 1e-6
 
 
 class RerunStream:
@@ -95,35 +97,44 @@ class RerunStream:
         from warp_mca.recorders.rerun_viewer import Viewer, load_rerun
 
         rr = load_rerun()
-        from warp_mca.recorders.rerun_blueprint import blueprint, log_legend, log_styles
+        from warp_mca.recorders.rerun_blueprint import blueprint, log_legend, log_styles, log_up
 
         self._reset()
         self.info = info
         self.scale = ColourScale(info.scene, self.limit)
-        names = apart(["contact_points", *map(_plain, info.surfaces)])[1:]
+        names = apart(["contact_points", "planes", *map(_plain, info.surfaces)])[2:]
         self.bodies = {body: entity("world", name) for body, name in zip(info.surfaces, names, strict=True)}
         names = apart(map(_plain, info.paths))
         self.paths = {path: entity("paths", name) for path, name in zip(info.paths, names, strict=True)}
         struck = [self.bodies[body] for body in info.surfaces if body not in info.striking]
-        layout = blueprint(self.scale, *_framing(info), struck, with_paths=bool(info.paths))
-        recording = uuid4()
+        headings = {path.name: path.heading for path in info.scene.stress_paths}
+        paths = [(at, headings.get(path, path)) for path, at in self.paths.items()]
+        layout = blueprint(self.scale, sights(info), [*struck, PLANES], paths)
+        # The viewer keeps a layout for each application: scenes must not share one.
+        application, recording = f"warp_mca {info.scene.name}", uuid4()
         if self.path is not None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            stream = rr.RecordingStream("warp_mca", recording_id=recording)
+            stream = rr.RecordingStream(application, recording_id=recording)
             try:
                 stream.set_sinks(rr.FileSink(str(self.path)), default_blueprint=layout)
             except RuntimeError as error:
                 raise bad_value("rrd", str(self.path), f"it cannot be written ({error}); name another file") from error
             self._file_stream = stream
         if self.with_viewer:
-            stream = self._viewer_stream = rr.RecordingStream("warp_mca", recording_id=recording)
+            stream = self._viewer_stream = rr.RecordingStream(application, recording_id=recording)
             self.viewer = Viewer(stream, layout, self.viewer_options)
         self.streams = [stream for stream in (self._file_stream, self._viewer_stream) if stream]
+        self.planes = Planes(info)
+        self.bars = {path: PathBars(position, k) for k, (path, position) in enumerate(info.paths.items())}
         for stream in self.streams:
+            log_up(stream, up_of(info.scene))
             log_legend(stream)
             log_styles(stream)
+            self.planes.log(stream)
             for body, surface in info.surfaces.items():
-                stream.log(self.bodies[body], _topology(info, surface.nodes, surface.triangles), static=True)
+                stream.log(self.bodies[body], topology(info, surface.nodes, surface.triangles), static=True)
+            for path, bars in self.bars.items():
+                stream.log(self.paths[path], bars.once, static=True)
         self._warm_up()
 
     def frame(self, frame: Frame) -> None:
@@ -176,7 +187,7 @@ class RerunStream:
     ) -> None:
         import rerun as rr
 
-        from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, log_ticks
+        from warp_mca.recorders.rerun_blueprint import log_ticks
 
         stream.set_time("sim_time", duration=float(frame.time))
         stream.set_time("step", sequence=int(frame.step))
@@ -186,11 +197,9 @@ class RerunStream:
         sticks = np.where(frame.contact_stick, np.uint32(STICK), np.uint32(SLIP))
         dots = rr.Points3D.from_fields(positions=frame.contact_points, colors=sticks, radii=[-3.0])
         stream.log("world/contact_points", dots)
-        for k, (name, stress) in enumerate(frame.path_stress.items()):
-            at, width = _bars(self.info.paths[name], k, len(frame.path_stress))
-            colour = PATH_COLOURS[k % len(PATH_COLOURS)]
-            bars = rr.BarChart(TO_MPA * stress, abscissa=at, widths=width, color=colour)
-            stream.log(self.paths[name], bars)
+        for name, stress in frame.path_stress.items():
+            stream.log(self.paths[name], self.bars[name].heights(TO_MPA * stress))
+        self.planes.move(stream, float(frame.time))
         if rescaled:
             log_ticks(stream, self.scale)
 
@@ -243,37 +252,6 @@ class RerunStream:
             self.info.warn(str(self.viewer.problem))
             self.streams = [stream for stream in self.streams if stream is not self._viewer_stream]
             self.viewer = self._viewer_stream = None
-
-
-def _topology(info: RunInfo, nodes: NDArray[np.int32], triangles: NDArray[np.int32]) -> rr.Mesh3D:
-    """Triangles of a skin, and its normals as it stands at first contact: they hardly turn afterwards."""
-    import rerun as rr
-
-    points = info.model.X[nodes]
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    face = np.cross(b - a, c - a)
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(face[:, k], 3), minlength=len(points)) for k in range(3)], axis=1
-    )
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    return rr.Mesh3D.from_fields(triangle_indices=triangles, vertex_normals=normals.astype(np.float32))
-
-
-def _framing(info: RunInfo) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """What the first views show: a box [m], shape (2, 3); where contact is expected [m], or None.
-
-    The box leaves out bodies that are only struck, such as a plate much larger than what strikes it.
-    """
-    points = np.concatenate([info.model.X[info.surfaces[body].nodes] for body in info.striking])
-    focus = info.model.X[info.model.points[0]] if info.model.points[0] >= 0 else None
-    return np.array([points.min(axis=0), points.max(axis=0)]), focus
-
-
-def _bars(position: NDArray[np.floating], index: int, count: int) -> tuple[NDArray, NDArray]:
-    """Centres and widths [mm] of the bars of path `index` of `count`: they share the space between two probes."""
-    position = TO_MM * np.asarray(position)
-    width = np.median(np.abs(np.diff(position))) / count if len(position) > 1 else 1.0
-    return position + (index - 0.5 * (count - 1)) * width, np.full(len(position), width, dtype=np.float32)
 
 
 def _plain(name: str) -> str:

@@ -22,6 +22,8 @@ from warp_mca.base.files import nearest
 from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, apart, check_file
 from warp_mca.recorders.usd_prims import BodyPrim, ContactPrim
+from warp_mca.recorders.usd_setting import Setting, bind, make_material, set_up_axis
+from warp_mca.report.setting import up_of
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
@@ -66,6 +68,7 @@ class UsdFile:
         self.limits: list[float] = []
         self.bodies: dict[str, BodyPrim] = {}
         self.stage: Any = None
+        self.setting: Any = None
         self.contact: Any = None
         self.saved_count = self.unsaved_count = 0  # frames that the file holds, and lacks
 
@@ -97,16 +100,23 @@ class UsdFile:
         except (Tf.ErrorException, OSError) as error:
             raise bad_value("usd", str(self.path), f"it cannot be written ({_reason(error)}); name another") from error
         UsdGeom.SetStageMetersPerUnit(self.stage, 1.0)
-        UsdGeom.SetStageUpAxis(self.stage, UsdGeom.Tokens.z if _vertical(info) == 2 else UsdGeom.Tokens.y)
         self.stage.SetTimeCodesPerSecond(PLAYBACK)
         self.stage.SetFramesPerSecond(PLAYBACK)
         world = UsdGeom.Xform.Define(self.stage, "/World")
         self.stage.SetDefaultPrim(world.GetPrim())
-        contact, *names = apart(["contact", *map(Tf.MakeValidIdentifier, info.surfaces)])
+        set_up_axis(self.stage, world, up_of(info.scene))
+        contact, setting, *names = apart(["contact", "setting", *map(Tf.MakeValidIdentifier, info.surfaces)])
+        UsdGeom.Scope.Define(self.stage, f"/World/{setting}")
+        material = make_material(self.stage, f"/World/{setting}/colours")
         for name, (body, surface) in zip(names, info.surfaces.items(), strict=True):
-            self.bodies[body] = BodyPrim(UsdGeom.Mesh.Define(self.stage, f"/World/{name}"), body, surface)
+            mesh = UsdGeom.Mesh.Define(self.stage, f"/World/{name}")
+            self.bodies[body] = BodyPrim(mesh, body, surface, info.model.X[surface.nodes])
+            bind(material, mesh)
+        self.setting = Setting(self.stage, f"/World/{setting}", material, info)
         size = float(np.ptp(np.concatenate([info.model.X[s.nodes] for s in info.surfaces.values()]), axis=0).max())
-        self.contact = ContactPrim(UsdGeom.Points.Define(self.stage, f"/World/{contact}"), POINT_SIZE * size)
+        points = UsdGeom.Points.Define(self.stage, f"/World/{contact}")
+        self.contact = ContactPrim(points, POINT_SIZE * size)
+        bind(material, points)
         try:
             self._save()
         except OSError as error:
@@ -128,6 +138,7 @@ class UsdFile:
                 for name, body in self.bodies.items():
                     body.write(code, frame.points[name], frame.von_mises[name], frame.plastic_strain[name], limit)
                 self.contact.write(code, frame.contact_points, frame.contact_stick)
+                self.setting.write(code, frame.time)
             self.times.append(frame.time)
             self.limits.append(limit)
             self.unsaved_count += 1
@@ -150,7 +161,7 @@ class UsdFile:
                 if self.unsaved_count:
                     self._save()
             finally:
-                self.stage, self.bodies, self.contact = None, {}, None
+                self.stage, self.bodies, self.contact, self.setting = None, {}, None, None
                 if not self.saved_count:
                     self.path.unlink(missing_ok=True)
 
@@ -222,12 +233,6 @@ def _signals_held() -> Iterator[None]:
             signal.signal(number, handler or signal.SIG_DFL)
         for number in held[:1]:
             signal.raise_signal(number)
-
-
-def _vertical(info: RunInfo) -> int:
-    """Axis along which gravity points; y without gravity."""
-    gravity = np.abs(info.scene.gravity)
-    return int(np.argmax(gravity)) if gravity.any() else 1
 
 
 def _reason(error: Exception) -> str:

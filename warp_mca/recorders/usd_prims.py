@@ -9,16 +9,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.geometry.creases import Creases
 from warp_mca.recorders.colours import PALETTE, SLIP, STICK, levels
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import SurfaceMesh
 
 
-class BodyPrim:
-    """A skin as a mesh."""
+class _Held:
+    """An attribute whose value is kept until another is written; USD interpolates between samples."""
 
-    def __init__(self, mesh: Any, name: str, surface: SurfaceMesh) -> None:
+    def __init__(self, attribute: Any) -> None:
+        self.attribute = attribute
+        self._last: Any = None
+        self._code = 0.0
+
+    def write(self, code: Any, value: Any) -> None:
+        """Set `value` from time `code` on."""
+        if self._last is not None and self._code != code.GetValue() - 1:
+            self.attribute.Set(self._last, code.GetValue() - 1)  # ends the time without change
+        self.attribute.Set(value, code)
+        self._last, self._code = value, code.GetValue()
+
+
+class BodyPrim:
+    """A skin as a mesh, with normals that keep sharp edges."""
+
+    def __init__(self, mesh: Any, name: str, surface: SurfaceMesh, points: NDArray) -> None:
         from pxr import Sdf, UsdGeom, Vt
 
         self.mesh = mesh
@@ -31,10 +48,14 @@ class BodyPrim:
         self.colour = _colours(mesh, _linear(PALETTE / 255.0))
         primvars = UsdGeom.PrimvarsAPI(mesh)
         float_array = Sdf.ValueTypeNames.FloatArray
-        self.stress, self.plastic = (
+        self.stress, plastic = (
             primvars.CreatePrimvar(name, float_array, UsdGeom.Tokens.vertex) for name in ("vonMises", "plasticStrain")
         )
-        self.plastic_max = -1.0
+        self.plastic, self.plastic_sum = _Held(plastic), -1.0
+        self.creases = Creases(surface.quads, points)
+        normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
+        normals.CreateIndicesAttr().Set(Vt.IntArray.FromNumpy(self.creases.group))
+        self.normals = _Held(normals)
 
     def write(self, code: Any, points: NDArray, von_mises: NDArray, plastic: NDArray, limit: float) -> None:
         from pxr import Vt
@@ -42,13 +63,12 @@ class BodyPrim:
         _place(self, code, points)
         self.colour.Set(Vt.IntArray.FromNumpy(levels(von_mises, limit).astype(np.int32)), code)
         self.stress.Set(Vt.FloatArray.FromNumpy(_rounded(von_mises)), code)
-        # Plastic strain only grows, and held values fill the gaps: what does not change costs nothing.
-        if (greatest := float(plastic.sum(dtype=np.float64))) != self.plastic_max:
-            if self.plastic_max >= 0.0 and self._held != code.GetValue() - 1:
-                self.plastic.Set(self._last, code.GetValue() - 1)  # USD interpolates: end the time without change
-            self._last = Vt.FloatArray.FromNumpy(_rounded(plastic))
-            self.plastic.Set(self._last, code)
-            self.plastic_max, self._held = greatest, code.GetValue()
+        # What does not change costs nothing: plastic strain only grows, and bodies hardly turn in an impact.
+        if (now := float(plastic.sum(dtype=np.float64))) != self.plastic_sum:
+            self.plastic.write(code, Vt.FloatArray.FromNumpy(_rounded(plastic)))
+            self.plastic_sum = now
+        if (normals := self.creases.normals(points)) is not None:
+            self.normals.write(code, Vt.Vec3fArray.FromNumpy(normals))
 
 
 class ContactPrim:

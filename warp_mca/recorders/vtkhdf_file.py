@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.recorders.mesh_file import cells
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
+from warp_mca.report.setting import rigid_planes, up_of
 
 if TYPE_CHECKING:
     import h5py
 
     from warp_mca.model.model import Model
     from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.scene import Scene
 
     _Datasets = dict[str, h5py.Dataset]
 
@@ -81,6 +83,7 @@ class VtkHdfFile:
             root = self._file.create_group("VTKHDF")
             self._steps, self._values, self._places = _make_steps(root, count, self.node_count)
             _write_mesh(root, info.model)
+            _write_setting(root, info.scene, count)
             self._file.flush()
             size, free = self._unborn.stat().st_size, shutil.disk_usage(self.path.parent).free
         except (OSError, RuntimeError) as error:
@@ -201,6 +204,18 @@ def _write_mesh(root: h5py.Group, model: Model) -> None:
     root["CellData/body"] = body
     root["CellData/body"].attrs["names"] = list(model.element_start)
     root["CellData/material"] = material
+
+
+def _write_setting(root: h5py.Group, scene: Scene, count: int) -> None:
+    """Which way is up, and the rigid planes, once for all `count` frames; VTK's reader wants the sizes in each."""
+    planes = rigid_planes(scene)
+    vectors = {"up": [up_of(scene)]}
+    if planes:
+        vectors |= {f"plane_{name}": [getattr(p, name) for p in planes] for name in ("point", "normal", "velocity")}
+    for name, rows in vectors.items():
+        root[f"FieldData/{name}"] = np.array(rows, dtype=float)
+        root[f"Steps/FieldDataOffsets/{name}"] = np.zeros(count, dtype=np.int64)
+        root[f"Steps/FieldDataSizes/{name}"] = np.tile(np.array([3, len(rows)]), (count, 1))
 
 
 def _reason(error: Exception) -> str:

@@ -1,10 +1,9 @@
-"""Owns what the command line shows: tables of scenes and mesh quality, a run's summary, the progress bar."""
+"""Owns what the command line shows: tables of scenes and mesh quality, a run's summary."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -28,29 +27,6 @@ class _Console(Console):
 def console() -> Console:
     """Standard output, plain: names and paths are shown as they are."""
     return _Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False, emoji=False)
-
-
-@contextmanager
-def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
-    """A function (stage, share done) that moves a bar with the time left, or None when no one is watching."""
-    if not (sys.stdout.isatty() and sys.stderr.isatty()):
-        yield None
-        return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("{task.description:8}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task, shown = bar.add_task("", total=None), ""
-
-        def tell(stage: str, done: float) -> None:
-            nonlocal shown
-            if stage != shown:
-                bar.reset(task, description=stage, total=None)
-                shown = stage
-            if done > 0.0:
-                bar.update(task, total=1.0, completed=done)
-
-        yield tell
 
 
 def print_scenes(sources: Sequence[SceneSource]) -> None:
@@ -97,7 +73,7 @@ def print_summary(result: Result, files: Sequence[str]) -> None:
     """The main figures of a run, its warnings, and the files written."""
     out = console()
     table = Table.grid(padding=(0, 2, 0, 0))
-    for label, text in _figures(result.summary):
+    for label, text in headlines(result.summary):
         table.add_row(label, text)
     out.print(table)
     for warning in result.warnings:
@@ -106,7 +82,8 @@ def print_summary(result: Result, files: Sequence[str]) -> None:
         out.print(f"wrote {file}", soft_wrap=True)
 
 
-def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def headlines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Name and text of each of the main figures of a run."""
     if summary.get("t_contact") is not None:
         yield (
             "hand-off",
@@ -119,6 +96,7 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "contact", _spans(summary["contacts"])
     yield "sticking", _spans(summary["sticks"])
     yield "plastic strain", f"{summary['max_plastic_strain']:.3g} at most"
+    yield from _sensors(summary)
     yield "energy error", f"{100.0 * summary['energy_error']:.2g} %"
     steps = f"{summary['n_steps']:,} steps of {summary['dt']:.3g} s, {1e3 * summary['simulated_time']:g} ms"
     yield "model", f"{summary['n_elements']:,} elements, {steps if summary['n_steps'] else 'no impact'}"
@@ -131,6 +109,15 @@ def _figures(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     rate = summary["element_steps_per_s"]
     if rate is not None:
         yield "rate", f"{rate / 1e6:.2f} M element-steps/s on {summary['device']}, {summary['precision']}"
+
+
+def _sensors(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """A line with the peaks of each probe and each section."""
+    for item in summary.get("probes", ()):
+        smooth = f" (CFC {item['cfc']:g}: {item['acceleration_cfc_max']:.4g})" if "cfc" in item else ""
+        yield item["name"], f"{item['acceleration_max']:.4g} m/s^2{smooth} and {item['velocity_max']:.4g} m/s at most"
+    for item in summary.get("sections", ()):
+        yield item["name"], f"{_force(item['F_max'])} and {item['M_max']:.4g} N m at most"
 
 
 def _accuracy(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

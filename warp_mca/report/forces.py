@@ -7,6 +7,7 @@ tells compression from restitution.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,7 @@ VELOCITIES = (
     ("tip_vz", r"tip $v_z$", ORANGE, "-.", 1.4),
     ("closing_speed", "closing speed", GREEN, ":", 1.2),
 )
+Velocity = tuple[str, str, str, str, float]
 STRIP = 0.035  # height of the strip of phases, as a share of the axes
 
 
@@ -66,19 +68,23 @@ def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
 
 
 def plot_forces(result: Result) -> Figure:
-    """The figure: F_n and F_t [N or kN] above, tip and plate velocities [m/s] below, over time [ms]."""
-    figure = new_figure(7.0, 5.6)
-    forces, velocities = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    _shade_phases(forces, result, labelled=True)
-    _shade_phases(velocities, result)
+    """The figure: F_n and F_t [N or kN], below them velocities of tip and plate [m/s] if any, over time [ms]."""
+    moving = _shown_velocities(result)
+    figure = new_figure(7.0, 5.6 if moving else 3.6)
+    heights = (3, 2) if moving else (1,)
+    panels = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
+    forces = panels[0]
+    for axes in panels:
+        _shade_phases(axes, result, labelled=axes is forces)
     _draw_forces(forces, result)
-    _draw_velocities(velocities, result)
+    if moving:
+        _draw_velocities(panels[1], result, moving)
     figure.align_ylabels()
-    for axes in (forces, velocities):
+    for axes in panels:
         tidy(axes)
         legend_beside(axes)
-    velocities.set_xlabel("time after first contact [ms]")
-    velocities.set_xlim(0.0, 1e3 * float(result.time[-1]) if len(result.time) else 1.0)
+    panels[-1].set_xlabel("time after first contact [ms]")
+    panels[-1].set_xlim(0.0, 1e3 * float(result.time[-1]) if len(result.time) else 1.0)
     forces.set_title(_title(result), loc="left", fontsize=10)
     return figure
 
@@ -112,14 +118,22 @@ def _draw_forces(axes: Axes, result: Result) -> None:
     axes.set_ylabel(f"contact force [{unit}]")
 
 
-def _draw_velocities(axes: Axes, result: Result) -> None:
-    """Velocities of tip and plate along the axes in which the tip moves, and the closing speed of the contact."""
-    time, shown = 1e3 * result.time, _moving_axes(result)
+def _shown_velocities(result: Result) -> list[Velocity]:
+    """Those of tip and plate along the axes in which the tip moves, and the closing speed of the contact."""
+    axes = _moving_axes(result)
+    return [
+        item
+        for item in VELOCITIES
+        if (item[0][-1] in axes or item[0] == "closing_speed")
+        and np.nan_to_num(result.history.get(item[0], np.zeros(1))).any()
+    ]
+
+
+def _draw_velocities(axes: Axes, result: Result, shown: Sequence[Velocity]) -> None:
+    time = 1e3 * result.time
     axes.axhline(0.0, color="0.5", linewidth=0.8)
-    for column, label, colour, style, width in VELOCITIES:
-        wanted = column[-1] in shown or column == "closing_speed"
-        if wanted and np.nan_to_num(result.history.get(column, np.zeros(1))).any():
-            axes.plot(time, result[column], color=colour, linestyle=style, label=label, linewidth=width)
+    for column, label, colour, style, width in shown:
+        axes.plot(time, result[column], color=colour, linestyle=style, label=label, linewidth=width)
     axes.margins(y=0.08)
     axes.set_ylabel("velocity [m/s]")
 

@@ -31,13 +31,19 @@ WAVES = {"bar": r"$\sqrt{E/\rho}$", "dilatational": r"$c_d$", "shear": r"$c_s$"}
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
 
 
-def plot_paths(time: Array, paths: Sequence[PathHistory], instants: Sequence[float] | None = None) -> Figure:
-    """Stress [MPa] over position [mm], one panel for each path, one curve for each instant.
+def plot_paths(
+    time: Array,
+    paths: Sequence[PathHistory],
+    instants: Sequence[float] | None = None,
+    headings: Mapping[str, str] | None = None,
+) -> Figure:
+    """Stress [MPa] over position [mm], one panel with a scale of its own for each path, one curve for each instant.
 
     Args:
         time: of the samples [s], shape (time_count,).
         paths: at least one.
         instants: when to draw [s]; the nearest samples are taken.
+        headings: of the panels, by the path's name; the names by default.
     """
     from matplotlib import colormaps
 
@@ -46,35 +52,38 @@ def plot_paths(time: Array, paths: Sequence[PathHistory], instants: Sequence[flo
     rows = np.array([np.argmin(np.abs(time - instant)) for instant in instants])
     paths = [path.at(rows) for path in paths]
     figure = new_figure(7.0, 1.0 + 1.9 * len(paths))
-    panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True, sharey=True))
-    # Right at the contact stress is many times that of the waves; curves may leave the panel there.
-    beyond = [path.von_mises[:, path.position >= path.position[0] + NEAR * np.ptp(path.position)] for path in paths]
-    greatest = max(float(np.nanmax(stress, initial=0.0)) for stress in beyond)
-    scale, unit = engineering(greatest, "Pa")
+    panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True))
     for axes, path in zip(panels, paths, strict=True):
+        # Right at the contact stress is many times that of the waves; curves may leave the panel there.
+        beyond = path.von_mises[:, path.position >= path.position[0] + NEAR * np.ptp(path.position)]
+        greatest = float(np.nanmax(beyond, initial=0.0))
+        scale, unit = engineering(greatest, "Pa")
         position, stress = _with_gaps(path)
         for k, row in enumerate(rows):
             colour = colormaps["viridis"](0.9 * k / max(1, len(rows) - 1))
             label = f"{1e6 * time[row]:.0f} µs"
             style = STYLES[k % len(STYLES)]
             axes.plot(1e3 * position, scale * stress[k], color=colour, linestyle=style, label=label)
-        axes.set_title(path.name, loc="left", fontsize=10)
+        axes.set_title((headings or {}).get(path.name, path.name), loc="left", fontsize=10)
         axes.set_ylabel(f"von Mises [{unit}]")
         axes.set_xlim(1e3 * path.position[0], 1e3 * path.position[-1])
+        axes.set_ylim(0.0, 1.05 * scale * greatest or 1.0)
         tidy(axes)
-    panels[0].set_ylim(0.0, 1.05 * scale * greatest or 1.0)
     panels[-1].set_xlabel("position along the path, from the struck end [mm]")
     panels[0].legend(title="after contact", loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure
 
 
-def plot_waves(time: Array, paths: Sequence[PathHistory], speeds: Mapping[str, float]) -> Figure:
-    """Position [mm] over time [µs] with stress as colour, on a log scale, and wave speeds as lines from the struck end.
+def plot_waves(
+    time: Array, paths: Sequence[PathHistory], speeds: Mapping[str, float], headings: Mapping[str, str] | None = None
+) -> Figure:
+    """Position [mm] over time [µs], stress as colour, on a log scale for each path; wave speeds from the struck end.
 
     Args:
         time: of the samples [s], shape (time_count,).
         paths: at least one.
         speeds: by label [m/s].
+        headings: of the panels, by the path's name; the names by default.
     """
     from matplotlib.colors import LogNorm
 
@@ -83,26 +92,23 @@ def plot_waves(time: Array, paths: Sequence[PathHistory], speeds: Mapping[str, f
     far = max(float(path.position[-1]) for path in paths)
     shown = time <= PASSAGES * far / min(speeds.values()) if speeds else np.ones(len(time), dtype=bool)
     time, paths = time[shown], [path.at(shown) for path in paths]
-    drawn = [_with_gaps(path) for path in paths]
-    stress = np.concatenate([stress.ravel() for _, stress in drawn])
-    # A few probes near the contact are far above the waves: the top hundredth may share one colour.
-    limit = float(np.nanpercentile(stress, 99.0)) if stress.size else 0.0
-    scale, unit = engineering(limit, "Pa")
-    image, top = None, scale * limit or 1.0
-    for axes, path, (position, stress) in zip(panels, paths, drawn, strict=True):
+    for axes, path in zip(panels, paths, strict=True):
+        position, stress = _with_gaps(path)
+        # A few probes near the contact are far above the waves: the top hundredth may share one colour.
+        limit = float(np.nanpercentile(stress, 99.0)) if stress.size else 0.0
+        scale, unit = engineering(limit, "Pa")
+        top = scale * limit or 1.0
         value = scale * stress.T
         norm = LogNorm(top / 10.0**DECADES, top, clip=True)
         image = axes.pcolormesh(1e6 * time, 1e3 * position, value, norm=norm, cmap="viridis", rasterized=True)
+        figure.colorbar(image, ax=axes, extend="both").set_label(f"von Mises [{unit}]")
         _draw_speeds(axes, path, speeds)
         axes.set_xlim(0.0, 1e6 * float(time[-1]))
         axes.set_ylim(1e3 * float(path.position[0]), 1e3 * float(path.position[-1]))
-        axes.set_title(path.name, loc="left", fontsize=10)
+        axes.set_title((headings or {}).get(path.name, path.name), loc="left", fontsize=10)
         axes.set_ylabel("position [mm]")
     panels[-1].set_xlabel("time after first contact [µs]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
-    assert image is not None
-    bar = figure.colorbar(image, ax=list(panels), extend="both")
-    bar.set_label(f"von Mises stress [{unit}]")
     return figure
 
 
@@ -131,8 +137,9 @@ def _draw_speeds(axes: Axes, path: PathHistory, speeds: Mapping[str, float]) -> 
 def save_path_figures(directory: str | os.PathLike[str], result: Result) -> list[Path]:
     """Write paths.png and waves.png into `directory` as PNG at 200 dots per inch."""
     folder = Path(directory)
+    headings = result.summary.get("path_headings", {})
     speeds = {WAVES[key]: float(value) for key, value in result.summary.get("wave_speeds", {}).items()}
     return [
-        save_png(plot_paths(result.time, result.paths), folder / "paths.png"),
-        save_png(plot_waves(result.time, result.paths, speeds), folder / "waves.png"),
+        save_png(plot_paths(result.time, result.paths, headings=headings), folder / "paths.png"),
+        save_png(plot_waves(result.time, result.paths, speeds, headings), folder / "waves.png"),
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.force_history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
 from warp_mca.results.paths import PathHistory
+from warp_mca.results.sensor_history import ProbeHistory, SectionHistory
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -44,6 +46,8 @@ class Result:
         contacts: forces of each of the scene's contacts by itself, with one row for each row of the history.
         stopped: which guard stopped this scene of a batch, in one sentence; None if none did. Rows end before it.
         failed: names of recorders that failed: what they write is missing or ends too early.
+        probes: motion of the scene's probes, with one row for each row of the history.
+        sections: resultants of the scene's sections, likewise.
     """
 
     summary: dict[str, Any]
@@ -54,6 +58,8 @@ class Result:
     stopped: str | None = None
     failed: tuple[str, ...] = ()
     contacts: tuple[ContactHistory, ...] = ()
+    probes: tuple[ProbeHistory, ...] = ()
+    sections: tuple[SectionHistory, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -69,6 +75,66 @@ class Result:
     def F_t(self) -> Array:
         """Tangential force on the slaves [N], mean over each output interval, shape (row_count,)."""
         return self.history["F_t_N"]
+
+    def __repr__(self) -> str:
+        """What ran and its main figures, in one line."""
+        told = [f"{len(self.history.get('time_s', ()))} rows"]
+        if (elements := self.summary.get("n_elements")) is not None:
+            told.insert(0, f"{elements:,} elements")
+        if (force := self.summary.get("F_n_max")) is not None:
+            told.append(f"F_n up to {force:.4g} N")
+        if (error := self.summary.get("energy_error")) is not None:
+            told.append(f"energy error {error:.2g}")
+        if self.warnings:
+            told.append(f"{len(self.warnings)} warning{'s' if len(self.warnings) > 1 else ''}")
+        if self.stopped:
+            told.append("stopped by a guard")
+        return f"<Result of {self.summary.get('scene', 'a run')}: {', '.join(told)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the main figures, warnings and contact forces."""
+        from warp_mca.report.notebook import result_html
+
+        return result_html(self)
+
+    def to_pandas(self) -> Any:
+        """History, contacts, probes and sections as a `pandas.DataFrame`, with the time [s] as index.
+
+        `attrs["units"]` has the unit of each column by its name. Columns beside those of `history`: CONTACT.Fx, .Fy,
+        .Fz, .pressure and .closing_speed of each contact; those of probes.csv.
+
+        Raises:
+            RequestError: pandas is not installed.
+        """
+        from warp_mca.results.tables import to_pandas
+
+        return to_pandas(self)
+
+    def to_xarray(self) -> Any:
+        """All that was recorded, stress along paths too, as an `xarray.Dataset` over the time [s].
+
+        Each variable has its unit in `attrs["units"]`. contact_*, probe_* and section_* have a dimension of the names
+        and one of the axes; stress_PATH one of the position along the path and one of the components.
+
+        Raises:
+            RequestError: xarray is not installed.
+        """
+        from warp_mca.results.tables import to_xarray
+
+        return to_xarray(self)
+
+    def to_parquet(self, file: str | os.PathLike[str]) -> Path:
+        """Write the columns of `to_pandas` and the time to a Parquet file, the unit of each in its field's metadata.
+
+        `pandas.read_parquet` gives them with `attrs["units"]`.
+
+        Raises:
+            RequestError: `file` is no path.
+            McaError: it cannot be written.
+        """
+        from warp_mca.results.tables import to_parquet
+
+        return to_parquet(self, file)
 
     def __getitem__(self, column: str) -> Array:
         """The history column of that name, shape (row_count,)."""
@@ -96,6 +162,8 @@ class Result:
             history={**history, "time_s": history["time_s"] - start},
             paths=tuple(path.at(rows) for path in self.paths),
             contacts=tuple(contact.at(rows) for contact in self.contacts),
+            probes=tuple(replace(probe.at(rows), time=self.time[rows] - start) for probe in self.probes),
+            sections=tuple(section.at(rows) for section in self.sections),
         )
 
 

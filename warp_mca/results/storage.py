@@ -19,14 +19,17 @@ from warp_mca.base.files import check_folder, given_path
 from warp_mca.base.folder import Folder, held
 from warp_mca.base.validate import DAMAGE
 from warp_mca.results.contact_history import load_contacts, save_contacts
+from warp_mca.results.csv_table import write_table
 from warp_mca.results.force_history import Array
 from warp_mca.results.paths import load_paths, save_paths
 from warp_mca.results.result import HISTORY_COLUMNS, Result
+from warp_mca.results.sensor_history import CSV, NPZ, load_sensors, save_sensors
 
 FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
 CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
-ALL_FILES = FILES + CONTACT_FILES + PATH_FILES
+PROBE_FILES = (NPZ, CSV, "probes.png")  # of scenes with probes or sections, besides
+ALL_FILES = FILES + CONTACT_FILES + PATH_FILES + PROBE_FILES
 DIGESTS = "files"  # key of summary.json: SHA-256 of each other file of the run, by its name
 
 
@@ -87,6 +90,7 @@ def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
     from warp_mca.report.energies import save_energies
     from warp_mca.report.forces import save_forces
     from warp_mca.report.paths import save_path_figures
+    from warp_mca.report.probes import save_probes
 
     path = folder.path
     try:
@@ -105,6 +109,9 @@ def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
             if result.paths:
                 save_paths(written / "paths.npz", result.time, result.paths)
                 save_path_figures(written, shown)
+            if result.probes or result.sections:
+                save_sensors(written, result.time, result.probes, result.sections)
+                save_probes(written / "probes.png", shown)
             digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
             result = _with_output_time(result, path, time.perf_counter() - begun)
             summary = {**result.summary, "warnings": list(result.warnings), DIGESTS: digests}
@@ -134,6 +141,7 @@ def load(directory: str | os.PathLike[str]) -> Result:
         history = _read_history(path / "history.csv")
         paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
         contacts = load_contacts(path / "forces.npz") if (path / "forces.npz").exists() else ()
+        sensors = load_sensors(path / NPZ) if (path / NPZ).exists() else ((), ())
         strange = _of_other_runs(path, digests)
     except FileNotFoundError as error:
         raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
@@ -142,14 +150,14 @@ def load(directory: str | os.PathLike[str]) -> Result:
     if strange:
         remedy = f"{strange[0]} was changed, or is not of the run that summary.json is of; run again"
         raise bad_value("results", str(path), remedy)
-    return Result(summary, history, path, warnings, paths, contacts=contacts)
+    return Result(summary, history, path, warnings, paths, contacts=contacts, probes=sensors[0], sections=sensors[1])
 
 
 def _of_other_runs(path: Path, digests: Mapping[str, str] | None) -> list[str]:
     """Names of the files with data in `path` that differ from those of the run whose `digests` these are."""
     if digests is None:  # results of an earlier version
         return []
-    found = [name for name in ("history.csv", "forces.npz", "paths.npz") if (path / name).exists()]
+    found = [name for name in ("history.csv", "forces.npz", "paths.npz", NPZ, CSV) if (path / name).exists()]
     return [name for name in found if digests.get(name) != _digest(path / name)]
 
 
@@ -198,10 +206,7 @@ def _write_history(path: Path, history: Mapping[str, Array]) -> None:
     if missing:
         raise RequestError(f"history: the columns {', '.join(missing)} are missing; give every one of HISTORY_COLUMNS")
     names = [*HISTORY_COLUMNS, *(name for name in history if name not in HISTORY_COLUMNS)]
-    rows = np.column_stack([np.asarray(history[name], dtype=np.float64) for name in names])
-    # repr gives the shortest text that reads back as the same float64.
-    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_table(path, {name: history[name] for name in names})
 
 
 def _plain(value: object) -> object:

@@ -40,13 +40,13 @@ def check_scene(field: str, scene: object) -> None:
     validate.kind_of(field, scene, Scene, "give a warp_mca.Scene; mca.make_scene(NAME) makes one by its name")
 
 
-def teller(progress: Progress | None) -> Progress:
+def teller(progress: Progress | bool | None) -> Progress:
     """What is told of stages: `progress`, or nothing.
 
     Raises:
         RequestError: it cannot be called.
     """
-    if progress is None:
+    if progress is None or progress is False:
         return lambda stage, done: None
     if not callable(progress):
         raise bad_value("progress", validate.brief(progress), "give a function progress(stage, done), or leave it out")

@@ -16,6 +16,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
 from warp_mca.runs.arguments import Progress, check_scene, one_at_a_time, span_of, teller
+from warp_mca.runs.progress import shows_progress
 from warp_mca.runs.settings import settings_of
 from warp_mca.runs.simulate import simulate
 from warp_mca.scene import RigidPlane, Scene
@@ -25,6 +26,7 @@ Meshes = Mapping[str, Mesh]
 
 
 @one_at_a_time
+@shows_progress
 def run_batch(
     scenes: Iterable[Scene],
     *,
@@ -37,7 +39,7 @@ def run_batch(
     refine: float | None = None,
     mass_scaling: float | str | None = None,
     meshes: Sequence[Meshes] | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> list[Result]:
     """Run independent scenes at once, each with its own parameters: their elements share every launch.
 
@@ -54,7 +56,7 @@ def run_batch(
             with `force`, results of a larger batch before it are removed.
         refine, mass_scaling: as in `warp_mca.run`, for all scenes.
         meshes: finished meshes by body, for each scene, to save making them again.
-        progress: called with a stage and the share of it that is done.
+        progress: called with a stage and the share of it that is done; True shows a bar, or lines if piped.
 
     Returns:
         The result of each scene. Where a guard stopped one, `Result.stopped` says so, its rows end there, and nothing

@@ -119,6 +119,7 @@ class Checkpoint:
             "method": method,
             "model": digest(solver.model),
             "paths": digest(ready.probes),
+            "sensors": digest(ready.sensors),
             "impact": repr(ready.scene.impact),
             "span": repr(span),
             "dt": repr(solver.dt),

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.cells import nodal_masses
+from warp_mca.results.sensors import locate_sensors
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.runs.arguments import Progress
@@ -46,6 +47,7 @@ def begin_cycle(
         t_end=scene.t_end,
         span=span,
         meshes=made,
+        sensors=locate_sensors(scene, made),
         masses=masses,
         held=held_axes(scene, made),
         first=first,

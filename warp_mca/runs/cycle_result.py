@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from warp_mca.results.contact_history import ContactHistory, contact_names
 from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result, RunFacts, summarise
+from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.cycle_rows import STORED, Columns, Story, tell_story
+from warp_mca.runs.cycle_sensors import cycle_records
 from warp_mca.runs.cycle_setup import Setup
 from warp_mca.runs.parts import ImpactPart, Part
 
@@ -38,7 +40,10 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     stopped = [part.stopped for part in parts if part.stopped]
     summary = results[0].summary if results else _without_impact(setup, history)
     summary = {**summary, **_of_all(setup, impacts, story, results, contacts, t_contact)}
-    return Result(summary, history, None, (*warnings, *stopped), _paths(results, story), contacts=contacts)
+    probes, sections = sensor_histories(setup.scene, history["time_s"], cycle_records(setup, parts))
+    summary |= sensor_figures(probes, sections, history)
+    own = {"contacts": contacts, "probes": probes, "sections": sections}
+    return Result(summary, history, None, (*warnings, *stopped), _paths(results, story), **own)
 
 
 def _contacts(setup: Setup, results: Sequence[Result], story: Story) -> tuple[ContactHistory, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.results.sensors import Sensors
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handoff import HandOff
 from warp_mca.rigid.placement import Placement
@@ -31,6 +32,7 @@ class Setup:
         t_end: time from the release at which the run ends [s].
         span: longest time that an impact lasts [s].
         meshes: of its bodies.
+        sensors: its probes and sections.
         masses: lumped nodal masses [kg] by body, each shape (node_count,), float64.
         held: axes of nodes that are fixed, by body, each shape (node_count, 3), bool.
         first: the first hand-off.
@@ -44,6 +46,7 @@ class Setup:
     t_end: float
     span: float
     meshes: Mapping[str, Mesh]
+    sensors: Sensors
     masses: Mapping[str, Array]
     held: Mapping[str, NDArray[np.bool_]]
     first: HandOff

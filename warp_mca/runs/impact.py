@@ -15,12 +15,14 @@ from warp_mca.model.batch_model import join_models
 from warp_mca.model.floating import with_floating_frames
 from warp_mca.model.layout import offsets
 from warp_mca.results.paths import join_probes
+from warp_mca.results.sensors import join_sensors
 from warp_mca.runs.bending import LOOKS
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.scene_run import SceneRun
 from warp_mca.solve.output import Output
 from warp_mca.solve.records import SceneRecords
+from warp_mca.solve.sensor_stage import SensorStage
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.state import State
 from warp_mca.solve.steps import Part, Steps
@@ -85,6 +87,9 @@ class Impact:
         probes = join_probes([(item.probes, item.model.node_count) for item in ready])
         if skins or len(probes.corner):
             self.solver.output = Output(self.solver, skins or {}, probes, needs)
+        if any(item.sensors.channels for item in ready):
+            sensors = join_sensors([(item.sensors, item.model) for item in ready])
+            self.solver.sensors = SensorStage(self.solver, sensors)
         self.solver.compile()
         self.state = self.solver.new_state()
         if shape:
@@ -99,8 +104,10 @@ class Impact:
 
     def _begin_scenes(self) -> None:
         first = offsets([len(item.probes.corner) for item in self.ready])
+        channel = offsets([item.sensors.channels for item in self.ready])
         self.scene_runs = [
-            SceneRun(item, self.steps, self.solver, self.state, k, int(first[k])) for k, item in enumerate(self.ready)
+            SceneRun(item, self.steps, self.solver, self.state, k, int(first[k]), int(channel[k]))
+            for k, item in enumerate(self.ready)
         ]
 
     def load(self, path: str | os.PathLike[str]) -> None:

@@ -18,6 +18,7 @@ from warp_mca.results.paths import Found, locate
 from warp_mca.rigid.placement import link_placements
 from warp_mca.runs.advice import mesh_warnings
 from warp_mca.runs.cycle_setup import Setup
+from warp_mca.runs.forecast import announce
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.motion import Motion
 from warp_mca.runs.parts import ImpactPart
@@ -65,6 +66,8 @@ class ImpactDriver:
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
         impact = Impact([ready], span, **setup.settings.solver, shape=shape)
         setup.clock.lap("compile")
+        if self.count == 1:
+            announce(impact)
         self._advance(impact)
         setup.clock.lap("fe")
         if impact.stopped[0] is not None:
@@ -115,7 +118,7 @@ class ImpactDriver:
         warnings = tuple(mesh_warnings(setup.scene, setup.meshes, model)) if self.count == 1 else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
         start = setup.first if self.count == 1 else replace(setup.first, **mismatch)  # those are of the first hand-off
-        return Prepared(setup.scene, setup.meshes, start, model, probes, warnings), u, V
+        return Prepared(setup.scene, setup.meshes, start, model, probes, setup.sensors, warnings), u, V
 
     def _shape(
         self, motion: Motion, relaxation: Relaxation, u: ByBody, settled: list[Shape]

@@ -11,6 +11,7 @@ from warp_mca.model.build import Grouping, build_model
 from warp_mca.model.cells import nodal_masses
 from warp_mca.model.model import Model
 from warp_mca.results.paths import Found, Probes, locate
+from warp_mca.results.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.runs.advice import mesh_warnings
 from warp_mca.runs.arguments import Progress
@@ -28,6 +29,7 @@ class Prepared:
         start: the hand-off.
         model: assembled.
         probes: of its paths.
+        sensors: its probes and sections.
         warnings: about its meshes, see `mesh_warnings`.
     """
 
@@ -36,6 +38,7 @@ class Prepared:
     start: HandOff
     model: Model
     probes: Probes
+    sensors: Sensors = NO_SENSORS
     warnings: tuple[str, ...] = ()
 
 
@@ -81,4 +84,5 @@ def prepare(
     model = build_model(scene, meshes, X, V, chain=start.chain, start=start.t_contact or 0.0, grouping=grouping)
     probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
-    return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model)))
+    sensors = locate_sensors(scene, meshes)
+    return Prepared(scene, meshes, start, model, probes, sensors, tuple(mesh_warnings(scene, meshes, model)))

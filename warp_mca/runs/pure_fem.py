@@ -22,6 +22,7 @@ from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress
 from warp_mca.runs.checkpoint import METHOD, Checkpoint, go_on
 from warp_mca.runs.division import coarser
+from warp_mca.runs.forecast import announce
 from warp_mca.runs.impact import Impact
 from warp_mca.runs.prepare import Clock
 from warp_mca.runs.pure_setup import Place, angles_of, check, is_of_link, prepare_release
@@ -81,6 +82,7 @@ class PureRun:
         blocks = math.ceil(latest / (BLOCK * joined * self.fine.interval))
         speed = max(float(np.linalg.norm(v, axis=1).max()) for v in self.touch.velocities.values())
         self.coarse = coarser(self.fine, ready.model, joined, BLOCK * (blocks + 1), speed)
+        announce(self.impact)
         self.impact.divide_anew(self.coarse)
         self.links = [link.body for link in self.touch.chain.links]
         self.passes = [k for k, item in enumerate(ready.model.passes) if is_of_link(scene, item.contact, self.links)]

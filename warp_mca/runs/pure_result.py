@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.paths import PathHistory, path_histories
 from warp_mca.results.result import Result
+from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.rigid.target import target_plane
 from warp_mca.runs.checkpoint import METHOD
 from warp_mca.runs.cycle_rows import STORED
@@ -34,12 +35,17 @@ def pure_result(run: PureRun) -> Result:
     history = {name: np.concatenate([early[name], column]) for name, column in found.history.items()}
     open_contacts = contact_histories(before, [contact.name for contact in found.contacts])
     paths = path_histories(ready.probes, kept.path_stress) if kept.count else ()
+    records = [*kept.sensors, *scene_run.ledger.kept.sensors]
+    probes, sections = sensor_histories(ready.scene, history["time_s"], records)
+    figures = _figures(run, found, origin, touch) | sensor_figures(probes, sections, history)
     return replace(
         found,
-        summary={**found.summary, **_figures(run, found, origin, touch)},
+        summary={**found.summary, **figures},
         history=history,
         contacts=tuple(_joined(a, b) for a, b in zip(open_contacts, found.contacts, strict=True)),
         paths=tuple(_path(a, b) for a, b in zip(paths, found.paths, strict=True)) if paths else found.paths,
+        probes=probes,
+        sections=sections,
     )
 
 

@@ -15,6 +15,7 @@ from warp_mca.model.build import build_model
 from warp_mca.model.cells import nodal_masses
 from warp_mca.model.precision import check_range
 from warp_mca.results.paths import locate
+from warp_mca.results.sensors import locate_sensors
 from warp_mca.rigid.handoff import HandOff, at_release
 from warp_mca.runs.advice import mesh_warnings
 from warp_mca.runs.arguments import Progress
@@ -86,7 +87,8 @@ def prepare_release(
     check_range(model, settings.precision)
     probes = locate(scene, model, meshes)
     clock.lap("mesh")
-    return Prepared(scene, meshes, start, model, probes, tuple(mesh_warnings(scene, meshes, model))), touch
+    sensors, warnings = locate_sensors(scene, meshes), tuple(mesh_warnings(scene, meshes, model))
+    return Prepared(scene, meshes, start, model, probes, sensors, warnings), touch
 
 
 def is_of_link(scene: Scene, contact: int, links: list[str]) -> bool:

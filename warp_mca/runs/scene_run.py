@@ -14,6 +14,7 @@ from warp_mca.model.cells import body_materials
 from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
+from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.element_warnings import element_warnings
@@ -48,7 +49,14 @@ class SceneRun:
     """
 
     def __init__(
-        self, ready: Prepared, steps: Steps, solver: Solver, state: State, index: int = 0, first_probe: int = 0
+        self,
+        ready: Prepared,
+        steps: Steps,
+        solver: Solver,
+        state: State,
+        index: int = 0,
+        first_probe: int = 0,
+        first_channel: int = 0,
     ) -> None:
         """Go on from what the state has recorded.
 
@@ -58,10 +66,12 @@ class SceneRun:
             solver: that runs it.
             state: that it advances.
             index: number of the scene in the solver's layout.
-            first_probe: number of the scene's first probe among the solver's.
+            first_probe: number of the scene's first probe of paths among the solver's.
+            first_channel: number of the first channel of its probes and sections among the solver's.
         """
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
+        self.channels = slice(first_channel, first_channel + ready.sensors.channels)
         tolerance = ready.scene.impact.energy_tolerance
         framed = solver.floating.count > 0
         self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
@@ -78,6 +88,8 @@ class SceneRun:
         finally:
             if self.ready.scene.stress_paths:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
+            if self.ready.sensors.channels:
+                kept.sensors.extend(records["sensors"][rows[: kept.count - first], self.channels])
 
     @cached_property
     def samples(self) -> list[Sample]:
@@ -112,9 +124,11 @@ class SceneRun:
         shares = spring_shares(self.ledger, self.ready.model, names)
         facts = self._facts(wall, shares)
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
-        summary = summarise(history, facts, contacts)
+        probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
+        summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
         warnings = (*self._warnings(shares, stopped), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
-        return Result(summary, history, None, warnings, paths, stopped, contacts=contacts)
+        own = {"contacts": contacts, "probes": probes, "sections": sections}
+        return Result(summary, history, None, warnings, paths, stopped, **own)
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
@@ -152,6 +166,7 @@ class SceneRun:
             more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
         if scene.stress_paths:
             body = scene.body(scene.stress_paths[0].lines[0].body)
+            more["path_headings"] = {path.name: path.heading for path in scene.stress_paths}
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
         return RunFacts(
             scene=scene.name,

@@ -16,6 +16,7 @@ from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress
 from warp_mca.runs.checkpoint import Checkpoint
 from warp_mca.runs.checkpoint import advance as advance_stored
+from warp_mca.runs.forecast import announce
 from warp_mca.runs.prepare import Clock, Prepared, prepare
 from warp_mca.runs.rate_groups import grouping
 from warp_mca.runs.settings import Settings
@@ -70,6 +71,7 @@ def simulate(
         impact.recording = Recording(recorders, info, steps.intervals, steps.per_interval, impact.solver.output)
     if store:
         store.is_for(impact, span, settings, "mca")
+    announce(impact)
     _advance(impact, tell, store)
     clock.lap("fe")
     failed: tuple[str, ...] = ()

@@ -25,6 +25,7 @@ from warp_mca.runs.arguments import (
 )
 from warp_mca.runs.checkpoint import METHOD, Checkpoint, Every, every_of
 from warp_mca.runs.meshing import mesh
+from warp_mca.runs.progress import shows_progress
 from warp_mca.runs.settings import Settings, settings_of
 from warp_mca.runs.simulate import simulate
 from warp_mca.scene import Scene
@@ -34,6 +35,7 @@ __all__ = ["mesh", "run"]
 
 
 @one_at_a_time
+@shows_progress
 def run(
     scene: Scene,
     *,
@@ -49,7 +51,7 @@ def run(
     accuracy: float | str | Accuracy | None = None,
     meshes: Mapping[str, Mesh] | None = None,
     recorders: Sequence[Recorder] = (),
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     method: str = "mca",
     checkpoint: str | Every | None = None,
 ) -> Result:
@@ -72,7 +74,7 @@ def run(
             step and contact springs are then chosen, but those that are given here (docs/accuracy.md).
         meshes: finished meshes by body, to save making them again.
         recorders: what shows or writes the run while it goes on, see `warp_mca.recorders`.
-        progress: called with a stage and the share of it that is done.
+        progress: called with a stage and the share of it that is done; True shows a bar, or lines if piped.
         method: "mca" swings rigid links; "pure-fem" computes the swing by finite elements too.
         checkpoint: how often `out` gets the state, as `Every.parse` has it, from which the same call goes on.
 

@@ -91,8 +91,7 @@ def sweep(
     """
     if isinstance(scenes, str | Mapping) or not isinstance(scenes, Iterable):
         raise bad_value("scenes", validate.brief(scenes), "give a list of scenes; mca.run runs a single one")
-    scenes = list(scenes)
-    for k, scene in enumerate(scenes):
+    for k, scene in enumerate(scenes := list(scenes)):
         check_scene(f"scenes[{k}]", scene)
     changed = tuple(with_options(scene, refine, mass_scaling, None) for scene in scenes)
     path = None if out is None else folder_path("out", out)
@@ -119,8 +118,7 @@ def carry_out(
         executor, workers, force, progress: as in `sweep`.
         meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
-        deadline: no run begins so many seconds after this call [s]; rows of those left out say so, and the table does
-            not have them.
+        deadline: no run begins so many seconds after this call [s]; the others are not in the table, their rows say so.
 
     Raises:
         RequestError, McaError: as in `sweep`.

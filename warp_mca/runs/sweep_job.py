@@ -27,7 +27,8 @@ from warp_mca.scene import Scene, catalogue, model_file
 Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
 
 DONE, STOPPED, FAILED = "done", "stopped", "failed"  # what a row's status may be
-NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files")  # entries of a summary that rows hold otherwise
+# entries of a summary that rows hold otherwise
+NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files", "units")
 BETWEEN = " | "  # between the warnings of a run
 
 

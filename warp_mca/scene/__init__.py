@@ -13,6 +13,7 @@ from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
+from warp_mca.scene.sensors import Probe, Section
 from warp_mca.scene.tied_surfaces import Tie
 
 __all__ = [
@@ -30,10 +31,12 @@ __all__ = [
     "Point",
     "Prescribed",
     "Prismatic",
+    "Probe",
     "Revolute",
     "RigidPhase",
     "RigidPlane",
     "Scene",
+    "Section",
     "Spherical",
     "Slide",
     "Surface",

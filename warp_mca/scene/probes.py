@@ -61,11 +61,13 @@ class Path:
         name: unique in the scene.
         lines: its parts.
         spacing: largest distance between neighbouring probes of a line [m].
+        title: what it is, such as "upper surface", for the panels of figures; None for the name alone.
     """
 
     name: str
     lines: tuple[Line, ...]
     spacing: float
+    title: str | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -74,3 +76,10 @@ class Path:
         validate.members(f"Path {self.name}", Line, lines=self.lines)
         if not self.lines:
             raise bad_value(f"Path {self.name}.lines", self.lines, "give at least one line")
+        if self.title is not None:
+            validate.texts(f"Path {self.name}", title=self.title)
+
+    @property
+    def heading(self) -> str:
+        """Of its panel in figures: the name, and what it is."""
+        return self.name if self.title is None else f"{self.name}: {self.title}"

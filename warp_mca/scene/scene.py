@@ -15,6 +15,7 @@ from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
+from warp_mca.scene.sensors import SAMPLES, Probe, Section
 from warp_mca.scene.tied_surfaces import Tie
 
 _PARTS = {
@@ -25,6 +26,8 @@ _PARTS = {
     "prescribed": Prescribed,
     "absorbing": Absorbing,
     "paths": Path,
+    "probes": Probe,
+    "sections": Section,
 }
 
 
@@ -42,7 +45,11 @@ class Scene:
         joints, contacts, fixed, prescribed, ties: what binds the bodies.
         absorbing: sides of bodies through which waves leave.
         gravity: [m/s^2].
+        up: direction that points up in pictures [-], of any length; None takes the one opposite to gravity, else the
+            normal of the first rigid plane, else y.
         paths: lines along which stress is recorded.
+        probes: points and node sets whose motion is recorded.
+        sections: cuts through bodies whose resultants are recorded.
         tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
         target: point whose velocity the history lists as plate_vx, plate_vy, plate_vz.
         refine: how many times smaller the cells of all bodies are to be than their recipes say [-], with their
@@ -62,7 +69,10 @@ class Scene:
     absorbing: tuple[Absorbing, ...] = ()
     ties: tuple[Tie, ...] = ()
     paths: tuple[Path, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    sections: tuple[Section, ...] = ()
     gravity: Vec3 = (0.0, 0.0, 0.0)
+    up: Vec3 | None = None
     tip: Point | None = None
     target: Point | None = None
     refine: float = 1.0
@@ -94,6 +104,9 @@ class Scene:
         paths = [path.name for path in self.paths]
         if len(set(paths)) != len(paths):
             raise bad_value("Scene.paths", paths, "give each path a name of its own")
+        sensors = [item.name for item in (*self.probes, *self.sections)]
+        if len(set(sensors)) != len(sensors):
+            raise bad_value("Scene.probes", sensors, "give each probe and each section a name of its own")
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
         if len(set(contacts)) != len(contacts):
             raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
@@ -105,10 +118,19 @@ class Scene:
             if pairs.count((slave, master)) > 1:
                 what = f"{slave.nodes} of {slave.body}"
                 raise bad_value("Scene.contacts", what, "it meets the same master twice; list each pair once")
-        validate.vectors("Scene", gravity=self.gravity)
+        validate.vectors("Scene", gravity=self.gravity, **({} if self.up is None else {"up": self.up}))
+        if self.up is not None and not any(self.up):
+            raise bad_value("Scene.up", self.up, "give a vector that is not zero")
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+        for probe in self.probes:
+            if probe.cfc is not None and not SAMPLES * probe.cfc * self.impact.output_interval <= 1.0:
+                remedy = f"rows every {self.impact.output_interval:g} s are too few: SAE J211 wants 10 in 1 / cfc"
+                raise bad_value(f"{probe.title}.cfc", probe.cfc, f"{remedy}; give a smaller output_interval")
+        for section in self.sections:
+            if section.body in self.rigid_names:
+                raise bad_value(f"{section.title}.body", section.body, "it is rigid, without stress; cut another body")
 
     def _check_t_end(self) -> None:
         """Refuse an end that no cycle of swings and impacts can reach.
@@ -141,6 +163,7 @@ class Scene:
         named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
         named += [(f"{t.title}.{name}.body", getattr(t, name).body) for t in self.ties for name in ("slave", "master")]
         named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]
+        named += [(f"{item.title}.body", item.body) for item in (*self.probes, *self.sections)]
         named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
         if self.rigid:
             named.append(("RigidPhase.tip.body", self.rigid.tip.body))

@@ -19,6 +19,8 @@ class SceneRecords:
         sums: columns of each row of the history, see `kernels.records.columns`, each shape (column_count,), float64.
         velocities: of the recorded points at each row [m/s], each shape (point_count, 3), float64.
         path_stress: of the scene's probes [Pa], each shape (row_count, probe_count, 6), float32.
+        sensors: position [m] and velocity [m/s] of the scene's probes, force [N] and moment [N m] of its sections at
+            each row, each shape (channel_count,), float64.
         peaks: of each contact pass at its greatest, sum of normal forces [N] and sum of their squares [N^2], shape
             (pass_count, 2), float64.
         stiffened: of each body, energy that its cells spent on their own stiffness and its strain energy [J], when that
@@ -43,6 +45,7 @@ class SceneRecords:
     sums: list[Array] = field(default_factory=list)
     velocities: list[Array] = field(default_factory=list)
     path_stress: list[NDArray[np.float32]] = field(default_factory=list)
+    sensors: list[Array] = field(default_factory=list)
     peaks: Array = field(default_factory=lambda: np.zeros((0, 2)))
     stiffened: Array = field(default_factory=lambda: np.zeros((0, 2)))
     count: int = 0
@@ -67,7 +70,9 @@ class SceneRecords:
 
     def without_rows(self) -> SceneRecords:
         """What a run goes on with whose history begins anew: sums and extremes so far, no rows."""
-        return replace(self, sums=[], velocities=[], path_stress=[], peaks=self.peaks.copy(), count=0, records=0)
+        return replace(
+            self, sums=[], velocities=[], path_stress=[], sensors=[], peaks=self.peaks.copy(), count=0, records=0
+        )
 
     def arrays(self) -> dict[str, NDArray]:
         """All of it as arrays by name, for a file."""
@@ -83,7 +88,7 @@ class SceneRecords:
         found = SceneRecords(peaks=arrays["peaks"], stiffened=arrays["stiffened"])
         for f in fields(found):
             array = arrays[f.name]
-            if f.name in ("sums", "velocities"):
+            if f.name in ("sums", "velocities", "sensors"):
                 setattr(found, f.name, list(array))
             elif f.name == "path_stress":
                 found.path_stress = [array] if len(array) else []
@@ -97,4 +102,4 @@ class SceneRecords:
         return [name for name in a if a[name].shape != b[name].shape or a[name].tobytes() != b[name].tobytes()]
 
 
-_LISTS = ("sums", "velocities", "path_stress")
+_LISTS = ("sums", "velocities", "path_stress", "sensors")

@@ -39,6 +39,7 @@ from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.replay import Replay
 from warp_mca.solve.resident import resident
 from warp_mca.solve.rigid_stage import RigidStage
+from warp_mca.solve.sensor_stage import SensorStage
 from warp_mca.solve.stage import Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.step_groups import step_groups
@@ -68,6 +69,7 @@ class Solver:
         rigid: rigid bodies.
         floating: frames that elements compute in.
         output: what is read off the state for paths and recorders, or None.
+        sensors: probes and sections.
     """
 
     def __init__(self, model: Model, *, device: str, precision: str, dt: float, threads: int = 1) -> None:
@@ -111,6 +113,7 @@ class Solver:
         self.ties = TieStage(model, self.nodes, self.precision)
         self.floating = FloatingStage(model, self.work)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
+        self.sensors = SensorStage(self, ())
         self.groups = step_groups(self)
         cuda = wp.get_device().is_cuda
         self.chains = Chains(self) if model.rates and cuda else None
@@ -164,13 +167,13 @@ class Solver:
         """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
         stress = bool(self.output and self.output.arrays)
         sums = self.records.kernels() + self.loads.kernels() + self.absorbing.record_kernels()
-        sums += self.rigid.kernels()
+        sums += self.rigid.kernels() + self.sensors.kernels()
         sums += [slide.slide] if len(self.constraints.rails) else []
         sums += [output.nodal_stress] if stress else []
         sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
         movers = (self.nodes, self.absorbing, self.ties, self.floating)
         nodes = [kernel for stage in movers for kernel in stage.kernels()]
-        elements = [kernel for stage in self.elements for kernel in stage.kernels()]
+        elements = [kernel for stage in (*self.elements, *self.sensors.layers) for kernel in stage.kernels()]
         elements += [stage.stress_kernel for stage in self.elements if stress]
         return [
             (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
@@ -288,9 +291,9 @@ class Solver:
         Returns:
             `partial`: partial sums, shape (ROWS, scene_count, columns, SUM_WIDTH), float64; `point_velocity` [m/s],
             shape (ROWS, point_count), vec3d; `flag`, shape (scene_count, 4), int32; `path_stress` [Pa], where the scene
-            has paths, shape (ROWS, probe_count), vec6 of float32.
+            has paths, shape (ROWS, probe_count), vec6 of float32; `sensors`, where it has probes or sections.
         """
         found = {"partial": self.work.partial, "point_velocity": self.work.point_velocity, "flag": state.flag}
         if self.output and self.output.has_probes:
             found["path_stress"] = self.output.path_stress
-        return found
+        return found | self.sensors.rings()

@@ -63,6 +63,7 @@ def _energies(solver: Solver) -> Group:
         solver.nodes.begin_record(step.state)
         if solver.output and step.is_row:
             solver.output.before_step(step.state, step.needs)
+        solver.sensors.before_step(step)
 
     energies = [
         Stage("element energies", lambda s, e=e: e.energies(solver.work, s.state, s.split), only_records=True)
@@ -115,6 +116,7 @@ def _motion(solver: Solver) -> Group:
     def after(step: Step) -> None:
         if solver.output and step.is_row:
             solver.output.after_step(step.state, step.needs)
+        solver.sensors.after_step(step)
 
     motion = [
         Stage(

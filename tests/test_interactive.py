@@ -1,0 +1,78 @@
+"""Tests interactive pictures from recorded files; pyvista is optional."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flying_bars import FlyingBars
+
+import warp_mca as mca
+from warp_mca.base.errors import RequestError
+from warp_mca.recorders import VtkHdfFile
+from warp_mca.report.interactive import plotter
+
+BELT = mca.RigidPlane(point=(0.0, 0.0, -0.001), normal=(0.0, 0.0, 1.0), velocity=(2.0, 0.0, 0.0))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """Three frames of the bars over a belt, z up."""
+    bars = FlyingBars(contacts=(mca.Contact(slave=mca.Surface(body="lower", nodes="zmin"), master=BELT),))
+    recorder = VtkHdfFile(tmp_path / "bars.vtkhdf")
+    recorder.start(bars.info)
+    for index in range(3):
+        recorder.frame(bars.frame(index))
+    recorder.finish(True)
+    return tmp_path / "bars.vtkhdf"
+
+
+def test_vtk_reads_what_is_up_and_the_planes_at_every_frame(file: Path):
+    hdf = pytest.importorskip("vtkmodules.vtkIOHDF")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    reader = hdf.vtkHDFReader()
+    reader.SetFileName(str(file))
+    for step in range(3):
+        reader.SetStep(step)
+        reader.Update()
+        fields = reader.GetOutputDataObject(0).GetFieldData()
+        expected = {
+            "up": BELT.normal,
+            **{f"plane_{name}": getattr(BELT, name) for name in ("point", "normal", "velocity")},
+        }
+        for name, value in expected.items():
+            np.testing.assert_array_equal(vtk_to_numpy(fields.GetArray(name)), [value])
+
+
+def test_the_picture_stands_upright_on_its_floor(file: Path):
+    pytest.importorskip("pyvista")
+    picture = plotter(file, time=1e-9, field="velocity", off_screen=True)
+    assert tuple(picture.camera.up) == (0.0, 0.0, 1.0)
+    bodies, floor = (picture.actors[name].mapper.dataset for name in ("bodies", "plane 0"))
+    assert floor.bounds[4] == floor.bounds[5] == pytest.approx(-0.001)
+    assert bodies.bounds[4] == pytest.approx(0.0, abs=1e-9)
+    speed = np.asarray(bodies.point_data["speed [m/s]"])
+    np.testing.assert_allclose(speed, 3.0, rtol=1e-6)
+    picture.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"field": "heat"}, "field = 'heat': choose one of"),
+        ({"magnify": -1.0}, "magnify = -1.0: give a factor above 0"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(file: Path, options: dict, why: str):
+    with pytest.raises(RequestError, match=why):
+        plotter(file, **options)
+
+
+def test_other_files_are_refused(tmp_path: Path):
+    pytest.importorskip("pyvista")
+    (tmp_path / "a.vtkhdf").write_text("none")
+    for name in ("a.vtkhdf", "missing.vtkhdf"):
+        with pytest.raises(RequestError, match="give a recording that VtkHdfFile or --vtkhdf wrote"):
+            plotter(tmp_path / name)

@@ -1,0 +1,117 @@
+"""Owns interactive pictures of a recorded run, drawn by pyvista: in a window or in a notebook."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.validate import brief, is_number
+from warp_mca.report.magnify import magnified
+from warp_mca.report.setting import EYE, plane_mesh, view_axes
+from warp_mca.report.snapshot import FIELDS
+from warp_mca.scene import RigidPlane
+
+if TYPE_CHECKING:
+    import pyvista  # pyright: ignore[reportMissingImports]
+
+
+def plotter(
+    file: str | os.PathLike[str],
+    *,
+    time: float | None = None,
+    field: str = "von_mises",
+    magnify: float = 1.0,
+    **options: Any,
+) -> pyvista.Plotter:
+    """A scene of pyvista with the bodies of a recording and the rigid planes; `.show()` opens it.
+
+    Args:
+        file: what `VtkHdfFile` or `--vtkhdf` wrote.
+        time: after first contact [s]; the nearest frame is taken, the last one by default.
+        field: that colours it: von_mises, plastic_strain, displacement or velocity.
+        magnify: of the motion of nodes less the rigid motion of their body that is nearest to it.
+        options: of `pyvista.Plotter`, such as off_screen=True.
+
+    Raises:
+        RequestError: pyvista is missing, the file cannot be read, or a value is not one.
+    """
+    if field not in FIELDS:
+        raise bad_value("field", brief(field), f"choose one of {', '.join(FIELDS)}")
+    if not (is_number(magnify) and magnify > 0.0):
+        raise bad_value("magnify", brief(magnify), "give a factor above 0; 1 shows the shape as it is")
+    try:
+        import pyvista as pv  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        raise RequestError(f"pyvista cannot be imported ({error}): install it with pip install pyvista") from error
+    mesh, at = _read(Path(file), time)
+    found = pv.Plotter(**options)
+    value = np.asarray(mesh.point_data[field])
+    words, unit = FIELDS[field].words, FIELDS[field].unit
+    title = f"{words} [{unit or '-'}]"
+    mesh.point_data[title] = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
+    points = _places(mesh, magnify)
+    mesh.points = points
+    found.add_mesh(mesh, name="bodies", scalars=title, cmap="viridis", split_sharp_edges=True, smooth_shading=True)
+    up = np.asarray(mesh.field_data["up"], dtype=float).ravel()
+    for k, plane in enumerate(_planes(mesh, points, up)):
+        squares = pv.PolyData.from_regular_faces(plane.points + plane.shift(at), plane.quads)
+        squares.cell_data["dark"] = plane.dark.astype(np.uint8)
+        found.add_mesh(squares, name=f"plane {k}", scalars="dark", cmap=["#e0e0e6", "#c7c9d1"], show_scalar_bar=False)
+    found.add_text(f"{1e6 * at:.1f} µs after first contact", font_size=10)
+    centre, axes = 0.5 * (points.min(axis=0) + points.max(axis=0)), view_axes(up, np.ptp(points, axis=0))
+    found.camera_position = [centre + EYE @ axes, centre, up]
+    found.reset_camera(bounds=np.stack([points.min(axis=0), points.max(axis=0)], axis=1).ravel().tolist())
+    return found
+
+
+def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
+    """The mesh with its fields at the frame nearest to `time`, and that frame's time [s].
+
+    Raises:
+        RequestError: the file cannot be read, or the time is not one.
+    """
+    import pyvista as pv  # pyright: ignore[reportMissingImports]
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    if time is not None and not is_number(time):
+        raise bad_value("time", brief(time), "give a finite time [s]")
+    reader = vtkHDFReader()
+    if not (path.is_file() and reader.CanReadFile(str(path))):
+        raise bad_value("file", str(path), "give a recording that VtkHdfFile or --vtkhdf wrote")
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    times = np.array(reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()))
+    step = len(times) - 1 if time is None else int(np.argmin(np.abs(times - time)))
+    reader.SetStep(step)
+    reader.Update()
+    mesh = pv.wrap(reader.GetOutputDataObject(0))
+    if "up" not in mesh.field_data:
+        raise bad_value("file", str(path), "it does not say which way is up; record it again with this version")
+    return mesh, float(times[step])
+
+
+def _places(mesh: pyvista.DataSet, magnify: float) -> NDArray[np.float64]:
+    """Points of the deformed mesh [m], shape (point_count, 3)."""
+    places = np.array(mesh.points, dtype=float)
+    displacement = np.asarray(mesh.point_data["displacement"], dtype=float)
+    for body in np.unique(mesh.cell_data["body"]):
+        nodes = np.asarray(mesh.extract_cells(mesh.cell_data["body"] == body).point_data["vtkOriginalPointIds"])
+        places[nodes] = magnified(places[nodes], displacement[nodes], magnify)
+    return places
+
+
+def _planes(mesh: pyvista.DataSet, points: NDArray[np.float64], up: NDArray[np.float64]) -> list[Any]:
+    """Meshes of the rigid planes that the recording names, around `points` [m]."""
+    if "plane_point" not in mesh.field_data:
+        return []
+    columns = (np.asarray(mesh.field_data[f"plane_{name}"]).reshape(-1, 3) for name in ("point", "normal", "velocity"))
+    return [
+        plane_mesh(RigidPlane(point=(*p,), normal=(*n,), velocity=(*v,)), points, up)
+        for p, n, v in zip(*(column.tolist() for column in columns), strict=True)
+    ]

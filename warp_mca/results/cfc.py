@@ -1,0 +1,58 @@
+"""Owns the channel filters of SAE J211: 4-pole phaseless Butterworth, by the channel frequency class (CFC)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
+from warp_mca.scene.sensors import SAMPLES
+
+Array = NDArray[np.float64]
+
+CORNER = 2.0775  # corner of one pass over the class; -3 dB of both passes together are at 1.667 of it, SAE J211-1
+SLACK = 1.01  # of that rate: output intervals are rounded to whole steps
+UNEVEN = 1e-6  # share of the mean interval by which times may be uneven
+
+
+def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
+    """Filter a history as SAE J211-1, Appendix C: a 2-pole Butterworth filter forwards, then backwards.
+
+    Before the start and after the end the history goes on as its own image, turned about its first and last value, so
+    that these stay.
+
+    Args:
+        values: history along the first axis, shape (row_count, ...), float64.
+        interval: between rows [s].
+        cfc: channel frequency class [Hz], 60, 180, 600 or 1000 in the standard.
+
+    Raises:
+        RequestError: the class is no number above 0, or rows are too far apart for it.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    if not (validate.is_number(cfc) and cfc > 0.0):
+        raise bad_value("cfc", validate.brief(cfc), "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
+    if not interval * SAMPLES * cfc <= SLACK:
+        remedy = f"SAE J211 wants {SAMPLES:g} rows in 1 / cfc: take an output_interval of {0.1 / cfc:.3g} s at most"
+        raise bad_value("cfc", cfc, remedy)
+    values = np.asarray(values, dtype=np.float64)
+    if len(values) < 2:
+        return values.copy()
+    sections = butter(2, CORNER * cfc, fs=1.0 / interval, output="sos")
+    period = int(np.ceil(1.0 / (CORNER * cfc * interval)))  # after so many rows the filter has forgotten its start
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, 2 * period)))
+
+
+def is_even(time: Array) -> bool:
+    """Whether rows follow each other at even intervals, other than those of swings and impacts in turn.
+
+    Args:
+        time: of each row [s], shape (row_count,).
+    """
+    steps = np.diff(time)
+    if not len(steps):
+        return True
+    mean, rounding = float(steps.mean()), 4.0 * float(np.spacing(np.abs(time).max()))
+    return float(np.abs(steps - mean).max()) <= max(UNEVEN * mean, rounding)

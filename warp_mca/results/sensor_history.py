@@ -1,0 +1,225 @@
+"""Owns what probes and sections recorded: their histories, probes.npz and probes.csv, their figures in the summary."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import bad_value
+from warp_mca.results.cfc import cfc_filter, is_even
+from warp_mca.results.csv_table import write_table
+from warp_mca.results.npz import load_histories, save_histories
+from warp_mca.results.units import units_of
+from warp_mca.scene import Scene
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.integer] | NDArray[np.bool_]
+
+NPZ, CSV = "probes.npz", "probes.csv"
+UNEVEN = "filter the rows of one impact by themselves, as result.impact(0).probes[0].filtered(180)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbeHistory:
+    """Motion of one probe at the end of each output interval, in the world frame.
+
+    Attributes:
+        name: of the probe.
+        time: of each row [s], shape (row_count,), float64.
+        position: [m], shape (row_count, 3), float64.
+        velocity: [m/s], shape (row_count, 3), float64.
+        cfc: channel frequency class that the scene asks for [Hz], or None.
+    """
+
+    name: str
+    time: Array
+    position: Array
+    velocity: Array
+    cfc: float | None = None
+
+    @property
+    def acceleration(self) -> Array:
+        """Change of the velocity over each output interval [m/s^2], shape (row_count, 3): its mean there, raw.
+
+        So its sum times the interval is the change of the velocity exactly. The first row ends no interval: 0.
+        """
+        found = np.zeros_like(self.velocity)
+        np.divide(np.diff(self.velocity, axis=0), np.diff(self.time)[:, None], out=found[1:])
+        return found
+
+    def filtered(self, cfc: float | None = None) -> Array:
+        """Acceleration by the filter of SAE J211 [m/s^2], shape (row_count, 3), see `cfc_filter`.
+
+        Args:
+            cfc: channel frequency class [Hz]; that of the scene if None.
+
+        Raises:
+            RequestError: no class is given, rows are too far apart for it, or not even.
+        """
+        if not is_even(self.time):
+            raise bad_value(f"probe {self.name}: time between rows", "uneven", UNEVEN)
+        chosen = self.cfc if cfc is None else cfc
+        if chosen is None:
+            raise bad_value("cfc", None, "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
+        interval = float(self.time[-1] - self.time[0]) / max(len(self.time) - 1, 1)
+        return cfc_filter(self.acceleration, interval, chosen)
+
+    @property
+    def own_filtered(self) -> Array | None:
+        """Acceleration filtered as the scene asks [m/s^2], or None: it does not, or rows are not even."""
+        if self.cfc is None or not is_even(self.time):
+            return None
+        return self.filtered()
+
+    def at(self, rows: Rows) -> ProbeHistory:
+        """The same in some output intervals: their numbers, shape (count,), or whether each is, shape (row_count,)."""
+        return replace(self, time=self.time[rows], position=self.position[rows], velocity=self.velocity[rows])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionHistory:
+    """Resultant of one section at the end of each output interval, in the world frame.
+
+    Attributes:
+        name: of the section.
+        force: of the side to which its normal points on the other [N], shape (row_count, 3), float64.
+        moment: of that about the mean place of the nodes in the section [N m], shape (row_count, 3), float64.
+    """
+
+    name: str
+    force: Array
+    moment: Array
+
+    def at(self, rows: Rows) -> SectionHistory:
+        """The same in some output intervals, as `ProbeHistory.at`."""
+        return replace(self, force=self.force[rows], moment=self.moment[rows])
+
+
+Sensors = tuple[tuple[ProbeHistory, ...], tuple[SectionHistory, ...]]
+
+
+def sensor_histories(scene: Scene, time: Array, records: Sequence[Array]) -> Sensors:
+    """What the probes and the sections of a scene recorded.
+
+    Args:
+        scene: whose they are.
+        time: of each row [s], shape (row_count,).
+        records: of each row, as `SceneRecords.sensors` has them.
+    """
+    count = len(scene.probes) + len(scene.sections)
+    if not count:
+        return (), ()
+    parts = np.array(records).reshape(len(time), count, 2, 3)
+    probes = (
+        ProbeHistory(name=probe.name, time=time, position=parts[:, k, 0], velocity=parts[:, k, 1], cfc=probe.cfc)
+        for k, probe in enumerate(scene.probes)
+    )
+    sections = (
+        SectionHistory(name=section.name, force=parts[:, k, 0], moment=parts[:, k, 1])
+        for k, section in enumerate(scene.sections, len(scene.probes))
+    )
+    return tuple(probes), tuple(sections)
+
+
+def sensor_columns(probes: Sequence[ProbeHistory], sections: Sequence[SectionHistory]) -> dict[str, tuple[Array, str]]:
+    """Columns of probes.csv but for the time, each shape (row_count,), and their units, by name."""
+    found: dict[str, tuple[Array, str]] = {}
+
+    def add(name: str, letter: str, vectors: Array, unit: str, ending: str = "") -> None:
+        for k, axis in enumerate("xyz"):
+            found[f"{name}.{letter}{axis}{ending}"] = vectors[:, k], unit
+
+    for probe in probes:
+        add(probe.name, "", probe.position, "m")
+        add(probe.name, "v", probe.velocity, "m/s")
+        add(probe.name, "a", probe.acceleration, "m/s^2")
+        if (smooth := probe.own_filtered) is not None:
+            add(probe.name, "a", smooth, "m/s^2", f"_cfc{probe.cfc:g}")
+    for section in sections:
+        add(section.name, "F", section.force, "N")
+        add(section.name, "M", section.moment, "N m")
+    return found
+
+
+def sensor_figures(
+    probes: Sequence[ProbeHistory], sections: Sequence[SectionHistory], history: Mapping[str, Array]
+) -> dict[str, Any]:
+    """What the summary says of units, and of probes and sections where there are any.
+
+    Args:
+        probes, sections: of the run.
+        history: its columns.
+    """
+    own = {name: unit for name, (_, unit) in sensor_columns(probes, sections).items()}
+    found: dict[str, Any] = {"units": units_of(history) | own}
+    time = history["time_s"]
+    if probes:
+        found["probes"] = [_probe_figures(probe) for probe in probes]
+    if sections:
+        found["sections"] = [
+            {"name": s.name, **_greatest("F_max", s.force, time), **_greatest("M_max", s.moment, time)}
+            for s in sections
+        ]
+    return found
+
+
+def _probe_figures(probe: ProbeHistory) -> dict[str, Any]:
+    raw = _greatest("acceleration_max", probe.acceleration, probe.time)
+    found = {"name": probe.name, **raw, **_greatest("velocity_max", probe.velocity, probe.time)}
+    way = probe.position[-1] - probe.position[0] if len(probe.position) else np.zeros(3)
+    found["displacement_end"] = way.tolist()
+    if (smooth := probe.own_filtered) is not None:
+        found |= {"cfc": probe.cfc, **_greatest("acceleration_cfc_max", smooth, probe.time)}
+    return found
+
+
+def _greatest(key: str, vectors: Array, time: Array) -> dict[str, Any]:
+    """The longest of some vectors and when it occurs; None where there is none."""
+    size = np.nan_to_num(np.linalg.norm(vectors, axis=1))
+    if not size.any():
+        return {key: 0.0, f"{key}_time": None}
+    k = int(size.argmax())
+    return {key: float(size[k]), f"{key}_time": float(time[k])}
+
+
+def save_sensors(folder: Path, time: Array, probes: Sequence[ProbeHistory], sections: Sequence[SectionHistory]) -> None:
+    """Write probes.npz and probes.csv.
+
+    The archive has time_s; of each probe NAME/position_m, NAME/velocity, NAME/acceleration (raw) and NAME/cfc, nan for
+    none; of each section NAME/force_N and NAME/moment_Nm. The table has the columns of `sensor_columns`.
+    """
+    histories: dict[str, Mapping[str, NDArray]] = {
+        probe.name: {
+            "position_m": probe.position,
+            "velocity": probe.velocity,
+            "acceleration": probe.acceleration,
+            "cfc": np.array(np.nan if probe.cfc is None else probe.cfc),
+        }
+        for probe in probes
+    }
+    histories |= {s.name: {"force_N": s.force, "moment_Nm": s.moment} for s in sections}
+    save_histories(folder / NPZ, time, histories)
+    write_table(folder / CSV, {"time_s": time, **{n: c for n, (c, _) in sensor_columns(probes, sections).items()}})
+
+
+def load_sensors(file: str | os.PathLike[str]) -> Sensors:
+    """The probes and sections of a probes.npz."""
+    with np.load(file) as arrays:
+        time = arrays["time_s"]
+    probes = (
+        ProbeHistory(
+            name=name, time=time, position=position, velocity=velocity, cfc=None if np.isnan(cfc) else float(cfc)
+        )
+        for name, (position, velocity, cfc) in load_histories(file, "position_m", "velocity", "cfc").items()
+    )
+    sections = (
+        SectionHistory(name=name, force=force, moment=moment)
+        for name, (force, moment) in load_histories(file, "force_N", "moment_Nm").items()
+    )
+    return tuple(probes), tuple(sections)
