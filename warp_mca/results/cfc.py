@@ -19,8 +19,8 @@ UNEVEN = 1e-6  # share of the mean interval by which times may be uneven
 def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
     """Filter a history as SAE J211-1, Appendix C: a 2-pole Butterworth filter forwards, then backwards.
 
-    Before the start and after the end the history goes on as its own image, turned about its first and last value, so
-    that these stay.
+    Before the start the history has its first value, as before a first touch. After the end it goes on as in a mirror:
+    where it still rings, its last value counts no more than those before it.
 
     Args:
         values: history along the first axis, shape (row_count, ...), float64.
@@ -42,7 +42,9 @@ def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
         return values.copy()
     sections = butter(2, CORNER * cfc, fs=1.0 / interval, output="sos")
     period = int(np.ceil(1.0 / (CORNER * cfc * interval)))  # after so many rows the filter has forgotten its start
-    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, 2 * period)))
+    count = min(len(values) - 1, 2 * period)
+    seen = np.concatenate([np.repeat(values[:1], count, axis=0), values, values[-2 : -2 - count : -1]])
+    return np.asarray(sosfiltfilt(sections, seen, axis=0, padtype=None))[count : count + len(values)]
 
 
 def is_even(time: Array) -> bool:
