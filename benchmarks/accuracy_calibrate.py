@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from warp_mca.accuracy.choice import Choice, choices
+from warp_mca.accuracy.choice import Choice, cheapest, choices
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.store import Family, family_from
@@ -28,9 +28,9 @@ class Trial:
     errors: Mapping[int, Mapping[str, float | None]]
 
     def chosen(self, asked: float, spreads: float) -> Choice | None:
-        """The cheapest variant within what is asked; None if none is."""
-        within = [item for item in self.found if replace(item, spreads=spreads).greatest <= asked]
-        return next((item for item in within if item.number in self.errors), None)
+        """The variant that a run would take; None if none will do."""
+        measured = [replace(item, spreads=spreads) for item in self.found if item.number in self.errors]
+        return cheapest(measured, asked, 1.0)
 
     def worst(self, choice: Choice) -> float:
         """Greatest true error of a choice [-]."""
@@ -49,7 +49,7 @@ def calibrated(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
 def _trial(family: Family, k: int) -> Trial:
     left = family.scenes[k]
     others = replace(family, scenes=family.scenes[:k] + family.scenes[k + 1 :])
-    bound = [name for name in BOUND if name not in family.no_limit]
+    bound = [name for name in BOUND if name not in family.no_limit and family.has(name)]
     return Trial(choices(others, left.parameters, Accuracy(share=0.02), bound, COSTS["H100"], False), left.errors)
 
 

@@ -52,7 +52,7 @@ def test_choices_are_judged_by_true_errors_estimates_and_cost():
     scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
     other = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [poor, run(2.8, 0.1, 0.9)], "cuda:0")
     assert scene["runs"][0]["worst"] == pytest.approx(0.1 / 2.8)
-    assert scene["runs"][0]["cheapest"][1] == 4  # refine 2.0: 0.1 / 2.0 is within 6 %, 0.1 / 1.4 is not
+    assert scene["runs"][0]["cheapest"][1] == 5  # refine 2.0: 0.1 / 2.0 is within 6 %, 0.1 / 1.4 is not
     found = list(counts({"scenes": [scene, other]}).values())
     assert found == [(2, 3), (3, 3), (2, 3), (1, 3), (2, 3)]
     assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
