@@ -161,8 +161,8 @@ KINDS: dict[str, Callable[[str, str], Found]] = {
     group="motion",
     title="Increments of a million revolutions",
     reference="The kernels' functions that turn what keeps a rotation, about one axis: rigid bodies and clusters of "
-    f"pins by some {COARSE} increments of a revolution ({FINE:,} small ones), floating frames fitted {UPDATES:,} times, "
-    "elements at a million angles.",
+    f"pins by some {COARSE} increments of a revolution ({FINE:,} small ones), floating frames fitted {UPDATES:,} "
+    "times, elements at a million angles.",
     values=tuple(KINDS),
     level="long",
     elements=("hex8",),
