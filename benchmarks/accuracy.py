@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
-from benchmarks.accuracy_calibrate import calibrated
+from benchmarks.accuracy_calibrate import calibrated, left_out
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, no_dearer, render
 from benchmarks.accuracy_measure import Job, Table, added, jobs_of, row_of, run_jobs, sampled, stored, truth_of
@@ -52,7 +52,11 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path)
     args = parser.parse_args()
     if args.command == "render":
-        PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), json.loads(JSON.read_text(encoding="utf-8"))))
+        data = json.loads(JSON.read_text(encoding="utf-8"))
+        known = json.loads(OWN.read_text(encoding="utf-8"))["families"]
+        data["left_out"] = [left_out(name, item) for name, item in known.items()]
+        JSON.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), data))
         return
     until = time.monotonic() + args.deadline
     wanted = args.families.split(",") if args.families else [family.scene for family in FAMILIES]

@@ -133,6 +133,32 @@ def _lines(data: Mapping[str, Any]) -> list[str]:
     lines += ["", f"Device: {data['device']}.", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for scene in data["scenes"]:
         lines += [_row(scene, run) for run in scene["runs"]]
+    return [*lines, *_left_out(data["left_out"])] if "left_out" in data else lines
+
+
+def _left_out(families: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Table of choices for the scenes of the store, each foreseen from the others."""
+    head = (
+        "family",
+        "scenes",
+        "chosen from the store",
+        "within",
+        "within twice",
+        "estimates right",
+        "cost at most twice",
+    )
+    lines = ["", "Each scene of the store, left out and foreseen from the others, at 2 % and 5 %:", ""]
+    lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    for item in families:
+        pairs = [
+            ("chosen", "cases"),
+            ("within", "chosen"),
+            ("twice", "chosen"),
+            ("right", "estimates"),
+            ("cheap", "beside"),
+        ]
+        met = [f"{item[part]} of {item[whole]}" for part, whole in pairs]
+        lines.append(f"| `{item['family']}` | {item['scenes']} | {' | '.join(met)} |")
     return lines
 
 

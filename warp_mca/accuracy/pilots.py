@@ -25,8 +25,8 @@ from warp_mca.scene import Scene
 if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
-LEVELS = (0.3, 0.5)  # of the pilots' refine over that of the scene; both take 7 % of a run that is as fine [-]
-LEAST = 0.75  # of a run that is finer than its pilots; below, these would take more than a fifth of the time [-]
+LEVELS = (0.45, 0.64)  # of the pilots' refine over that of the scene; both take a sixth of a run that is as fine [-]
+LEAST = 0.9  # of a run that is finer than its pilots; below, these would take more than a fifth of the time [-]
 STEP = 2.0**0.25  # between meshes that are considered [-]: a factor of two in time
 MOST = 4.0  # greatest refine over that of the scene [-]
 ORDER = 1.5  # assumed before the run [-]
