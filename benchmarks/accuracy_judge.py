@@ -130,7 +130,13 @@ def _lines(data: Mapping[str, Any]) -> list[str]:
     if ratio is not None:
         lines.append(f"| cost of 5 % over that of 2 %, mean | {ratio:.2f} |")
     head = ("scene", "asked", "first peak", "impulse", "duration", "elements", "deciding", "cost over the cheapest's")
-    lines += ["", f"Device, where a scene names no other: {data['device']}.", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    lines += [
+        "",
+        f"Device, where a scene names no other: {data['device']}.",
+        "",
+        f"| {' | '.join(head)} |",
+        "|" + "---|" * len(head),
+    ]
     for scene in data["scenes"]:
         lines += [_row(scene, run) for run in scene["runs"]]
     return [*lines, *_left_out(data["left_out"])] if "left_out" in data else lines
