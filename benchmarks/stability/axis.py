@@ -94,7 +94,7 @@ class Axis:
 
 Builds = TypeVar("Builds", Trial, Direct)
 AXES: dict[str, Axis] = {}
-GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "arm")  # in the order of the page
+GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "rotations", "arm")  # in the order of the page
 
 
 def ordered_axes() -> list[Axis]:

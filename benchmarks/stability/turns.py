@@ -158,7 +158,7 @@ KINDS: dict[str, Callable[[str, str], Found]] = {
 
 
 @axis(
-    group="motion",
+    group="rotations",
     title="Increments of a million revolutions",
     reference="The kernels' functions that turn what keeps a rotation, about one axis: rigid bodies and clusters of "
     f"pins by some {COARSE} increments of a revolution ({FINE:,} small ones), floating frames fitted {UPDATES:,} "
