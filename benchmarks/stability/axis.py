@@ -94,7 +94,8 @@ class Axis:
 
 Builds = TypeVar("Builds", Trial, Direct)
 AXES: dict[str, Axis] = {}
-GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "rotations", "arm")  # in the order of the page
+# In the order of the page.
+GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "rotations", "arm")
 
 
 def ordered_axes() -> list[Axis]:
