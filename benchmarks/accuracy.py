@@ -1,12 +1,14 @@
 """Owns the measurements behind `--accuracy`: the store that choices are made from, and how good the choices are.
 
 python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --workers 10 --deadline 300
+python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --families two_link --add 3 --workers 10 --deadline 300
 python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 --deadline 350
 python -m benchmarks.accuracy render
 
-`learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store;
-`validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
-docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into docs/accuracy.md.
+`learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store,
+with `--add` beside the scenes that it has; `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares
+with references, and writes docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables
+into docs/accuracy.md.
 """
 
 from __future__ import annotations
@@ -20,10 +22,10 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
-from benchmarks.accuracy_calibrate import calibrated
+from benchmarks.accuracy_calibrate import calibrated, left_out
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, no_dearer, render
-from benchmarks.accuracy_measure import Job, Table, jobs_of, row_of, run_jobs, sampled, stored, truth_of
+from benchmarks.accuracy_measure import Job, Table, added, jobs_of, row_of, run_jobs, sampled, stored, truth_of
 from warp_mca.accuracy.store import OWN
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,10 +48,15 @@ def main() -> None:
     parser.add_argument("--deadline", type=float, default=1e9, metavar="SECONDS", help="stop measuring after this")
     parser.add_argument("--reference", type=float, default=1.0, metavar="SCALE", help="refine of references times this")
     parser.add_argument("--families", help="names with commas between them (default: all)")
+    parser.add_argument("--add", type=int, metavar="SEED", help="learn other scenes, beside those of the store")
     parser.add_argument("-o", "--output", type=Path)
     args = parser.parse_args()
     if args.command == "render":
-        PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), json.loads(JSON.read_text(encoding="utf-8"))))
+        data = json.loads(JSON.read_text(encoding="utf-8"))
+        known = json.loads(OWN.read_text(encoding="utf-8"))["families"]
+        data["left_out"] = [left_out(name, item) for name, item in known.items()]
+        JSON.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), data))
         return
     until = time.monotonic() + args.deadline
     wanted = args.families.split(",") if args.families else [family.scene for family in FAMILIES]
@@ -80,12 +87,16 @@ def _tables(jobs: Sequence[Job], workers: int, until: float) -> Iterable[dict[st
 def learn(args: argparse.Namespace, families: list[Family], until: float) -> None:
     """Write the store; families that were not measured stay as they are in it."""
     target = args.output if args.output and args.command == "learn" else OWN
-    scenes = {family.scene: _scenes(args, family, LEARN, GALLERY) for family in families}
+    seed = LEARN if args.add is None else args.add
+    assert seed != HELD_OUT, "these scenes are those that choices are tried on"
+    scenes = {family.scene: _scenes(args, family, seed, GALLERY) for family in families}
     before = json.loads(target.read_text(encoding="utf-8"))["families"] if target.exists() else {}
     found: dict[str, Any] = {}
     for tables in _tables(jobs_of(families, scenes, args.device, args.reference), args.workers, until):
         found = {f.scene: stored(f, scenes[f.scene], tables[f.scene]) for f in families}
         found = {name: item for name, item in found.items() if item["scenes"]}
+        if args.add is not None:
+            found = {name: added(before.get(name), item) for name, item in found.items()}
         target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
     known = {name: calibrated(name, item) for name, item in found.items()}
     target.write_text(json.dumps({"families": {**before, **known}}) + "\n", encoding="utf-8")

@@ -116,6 +116,7 @@ def _plain(refine: float, penalty: float) -> Variant:
 
 RODS = ("section", "ring", "focus_size", "focus_layers", "plate_core_depth", "plate_layers", "plate_extension")
 REFINES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in REFINES))  # softer springs hold flat ends too long
 
 FAMILIES = (
     Family(
@@ -218,8 +219,8 @@ FAMILIES = (
         mesh=("axial", "section"),
         fixed={},
         no_limit={"F_n_first_peak": PEAK_OF_FLAT_ENDS},
-        variants=tuple(_plain(refine, 1.0) for refine in REFINES),
-        fine=_plain(5.0, 1.0),
+        variants=FLAT,
+        fine=_plain(4.0, 3.0),
         partner=4,
         order=1.0,
         sample=lambda rng: {
@@ -234,8 +235,8 @@ FAMILIES = (
         mesh=("axial", "section"),
         fixed={},
         no_limit={"F_n_first_peak": PEAK_OF_FLAT_ENDS},
-        variants=tuple(_plain(refine, 1.0) for refine in REFINES),
-        fine=_plain(4.0, 1.0),
+        variants=FLAT,
+        fine=_plain(4.0, 3.0),
         partner=4,
         order=1.0,
         sample=lambda rng: {

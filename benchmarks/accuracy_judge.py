@@ -130,16 +130,48 @@ def _lines(data: Mapping[str, Any]) -> list[str]:
     if ratio is not None:
         lines.append(f"| cost of 5 % over that of 2 %, mean | {ratio:.2f} |")
     head = ("scene", "asked", "first peak", "impulse", "duration", "elements", "deciding", "cost over the cheapest's")
-    lines += ["", f"Device: {data['device']}.", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    lines += [
+        "",
+        f"Device, where a scene names no other: {data['device']}.",
+        "",
+        f"| {' | '.join(head)} |",
+        "|" + "---|" * len(head),
+    ]
     for scene in data["scenes"]:
         lines += [_row(scene, run) for run in scene["runs"]]
+    return [*lines, *_left_out(data["left_out"])] if "left_out" in data else lines
+
+
+def _left_out(families: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Table of choices for the scenes of the store, each foreseen from the others."""
+    head = (
+        "family",
+        "scenes",
+        "chosen from the store",
+        "within",
+        "within twice",
+        "estimates right",
+        "cost at most twice",
+    )
+    lines = ["", "Each scene of the store, left out and foreseen from the others, at 2 % and 5 %:", ""]
+    lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    for item in families:
+        pairs = [
+            ("chosen", "cases"),
+            ("within", "chosen"),
+            ("twice", "chosen"),
+            ("right", "estimates"),
+            ("cheap", "beside"),
+        ]
+        met = [f"{item[part]} of {item[whole]}" for part, whole in pairs]
+        lines.append(f"| `{item['family']}` | {item['scenes']} | {' | '.join(met)} |")
     return lines
 
 
 def _row(scene: Mapping[str, Any], run: Row) -> str:
     shown = ("mu", "v_plate", "H", "radius", "E_tip", "E_body", "v", "E_ratio", "nu", "length", "ratio")
     own = ", ".join(f"{key}={scene['parameters'][key]:g}" for key in shown if key in scene["parameters"])
-    name = f"`{scene['scene']}` {own}"
+    name = f"`{scene['scene']}` {own}" + (f", on {scene['device']}" if "device" in scene else "")
     if "refused" in run:
         return f"| {name} | {run['asked']:.0%} | refused: {run['refused']} | | | | | |"
     pairs = zip(BOUND, run["errors"], strict=True)

@@ -239,6 +239,14 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
     }
 
 
+def added(before: Mapping[str, Any] | None, found: Mapping[str, Any]) -> dict[str, Any]:
+    """A family of the store with the scenes that it had; those of other variants or features are dropped."""
+    same = before is not None and all(before[key] == found[key] for key in ("variants", "features", "mesh"))
+    kept = before["scenes"] if before is not None and same else []
+    new = [item["parameters"] for item in found["scenes"]]
+    return {**found, "scenes": [item for item in kept if item["parameters"] not in new] + found["scenes"]}
+
+
 def _plain(variant: Variant) -> dict[str, Any]:
     own = {key: value for key, value in variant.knobs.items() if key not in variant.parameters and key != "multi_rate"}
     return {**own, "parameters": dict(variant.parameters)}

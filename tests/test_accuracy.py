@@ -13,9 +13,10 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.accuracy import store
-from warp_mca.accuracy.choice import choices
+from warp_mca.accuracy.choice import cheapest, choices
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
+from warp_mca.accuracy.plan import planned
 from warp_mca.accuracy.prediction import NOISE, gaussian_process
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.cli.main import main
@@ -89,6 +90,38 @@ def test_the_cheapest_variant_within_the_bound_is_chosen(known: store.Family, v:
     assert error.size == pytest.approx(0.04 * v / refine**2, rel=0.2)
 
 
+def test_the_most_accurate_variant_will_do_where_its_expected_errors_leave_a_margin(known: store.Family):
+    careful = replace(known, spreads=50.0)
+    found = choices(careful, {"v": 2.0}, Accuracy(share=0.06), BOUND[:2], COSTS["cpu"], True)
+    assert all(item.greatest > 0.06 for item in found)
+    best = cheapest(found, 0.06, 1.0)
+    assert best is not None
+    assert best.variant.refine == 1.4  # errs by 4.1 %
+    assert cheapest(found, 0.04, 1.0) is None
+    assert cheapest(found, 0.06, 2.0) is None
+    assert known.has("impulse")
+    assert not known.has("contact_duration")
+
+
+def test_variants_may_have_other_elements_unless_the_model_is_to_stay_full(known: store.Family):
+    (file,) = store.user_folder().glob("*.json")
+    data = json.loads(file.read_text())
+    data["families"]["rod_on_wall"]["variants"][1]["element"] = "hex8r"
+    file.write_text(json.dumps(data))
+    scene = mca.make_scene("rod_on_wall", v=1.0)
+    plan = planned(scene, 0.09, {}, "cpu", None, fake)
+    assert plan is not None
+    assert [body.element for body in plan.scene.bodies] == ["hex8r"] * len(scene.bodies)
+    accuracy = plan.judged(fake(plan.scene)).summary["accuracy"]
+    assert accuracy["chosen"]["element"] == "hex8r"
+    words = shlex.split(accuracy["command"])
+    assert words[:3] == ["warp-mca", "run", "rod_on_wall"]
+    assert words[words.index("--element") + 1] == "hex8r"
+    full = planned(scene, Accuracy(share=0.09, full=True), {}, "cpu", None, fake)
+    assert full is not None
+    assert full.variant.element is None
+
+
 def test_what_was_typed_stays(known: store.Family):
     def offered(**typed: object) -> list[float | None]:
         asked = Accuracy(share=0.05, typed=typed)
@@ -137,6 +170,9 @@ def fake(scene: mca.Scene, order: float = 1.5, share: float = 0.0, **options: ob
         "contact_spring_share": {"it": share},
         "n_elements": 100,
         "n_steps": 100,
+        "precision": "mixed",
+        "device": "cpu",
+        "simulated_time": scene.impact.duration,
     }
     return mca.Result(summary, {"time_s": np.array([1e-3]), "F_n_N": np.array([50.0])})
 
@@ -177,6 +213,16 @@ def test_springs_are_made_stiffer_than_the_accuracy_needs():
 
     found = run_pilots(mca.make_scene("rod_on_wall", penalty=1.0), Accuracy(share=0.02), BOUND, springs)
     assert found.variant.parameters["penalty"] == pytest.approx(0.3 * 0.1 / (0.3 * 0.02), rel=0.02)
+
+
+def test_a_guard_that_stiff_springs_trip_leaves_the_scene_its_own():
+    def trips(scene: mca.Scene, **options: object) -> mca.Result:
+        if scene.contacts[0].penalty != 1.0:
+            raise mca.GuardError("too stiff")
+        return fake(scene, share=0.01)
+
+    found = run_pilots(mca.make_scene("rod_on_wall", penalty=1.0), Accuracy(share=0.005), BOUND, trips)
+    assert "penalty" not in found.variant.knobs
 
 
 def test_a_run_tells_its_error_and_can_be_repeated(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -13,7 +13,7 @@ from benchmarks.accuracy import JSON, PAGE
 from benchmarks.accuracy_calibrate import calibrated
 from benchmarks.accuracy_families import FAMILIES
 from benchmarks.accuracy_judge import cost_ratio, counts, judged, render
-from benchmarks.accuracy_measure import FAMILY, FINE, sampled, stored, truth_of, variant_of
+from benchmarks.accuracy_measure import FAMILY, FINE, added, jobs_of, sampled, stored, truth_of, variant_of
 from warp_mca.geometry.refinement import refined
 
 ROD = FAMILY["rod_on_wall"]  # extrapolated with order 1, its first peak has no limit
@@ -45,6 +45,7 @@ def test_references_are_extrapolated_with_the_order_of_the_family():
     assert truth[0] is None
     assert truth[1:] == pytest.approx([2.0, 1e-3], rel=1e-12)
     assert truth_of(ROD, {0: row(0.5)}) is None
+    assert truth_of(ROD, {FINE: row(5.0)}) is None
 
 
 def test_choices_are_judged_by_true_errors_estimates_and_cost():
@@ -52,10 +53,35 @@ def test_choices_are_judged_by_true_errors_estimates_and_cost():
     scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
     other = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [poor, run(2.8, 0.1, 0.9)], "cuda:0")
     assert scene["runs"][0]["worst"] == pytest.approx(0.1 / 2.8)
-    assert scene["runs"][0]["cheapest"][1] == 4  # refine 2.0: 0.1 / 2.0 is within 6 %, 0.1 / 1.4 is not
+    assert scene["runs"][0]["cheapest"][1] == 5  # refine 2.0: 0.1 / 2.0 is within 6 %, 0.1 / 1.4 is not
     found = list(counts({"scenes": [scene, other]}).values())
     assert found == [(2, 3), (3, 3), (2, 3), (1, 3), (2, 3)]
     assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
+
+
+def test_scenes_of_all_families_are_measured_in_turn_each_reference_with_its_partner_first():
+    links, rods = FAMILY["two_link"], ROD
+    scenes = {family.scene: sampled(family, 1, 7) for family in (links, rods)}
+    jobs = jobs_of([links, rods], scenes, "cuda:0", 1.0)
+    assert {job.family for job in jobs[: len(jobs) // 4]} == {"two_link", "rod_on_wall"}
+    for family in (links, rods):
+        own = [job for job in jobs if job.family == family.scene]
+        measured = sorted((scene, job.variant) for job in own for scene in job.scenes)
+        assert measured == [(k, n) for k in range(7) for n in range(FINE, len(family.variants))]
+    alone = [job for job in jobs if job.family == "rod_on_wall"]
+    assert [job.variant for job in alone[:2]] == [FINE, rods.partner]
+    assert {len({values["duration"] for values in job.values}) for job in jobs if job.family == "two_link"} == {1}
+
+    few = jobs_of([rods], scenes, "cpu", 1.0, lambda family, scene, variant: scene == 3)
+    assert sum(len(job.scenes) for job in few if job.variant not in (FINE, rods.partner)) == len(rods.variants) - 1
+
+
+def test_scenes_are_added_to_those_of_the_store():
+    first, second = (stored(ROD, sampled(ROD, seed, 2), dict.fromkeys(range(2), TABLE)) for seed in (1, 3))
+    assert len(added(first, second)["scenes"]) == 4
+    assert added(first, first)["scenes"] == first["scenes"]
+    assert added({**first, "variants": []}, second) == second
+    assert added(None, second) == second
 
 
 def test_what_is_stored_can_be_chosen_from():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from benchmarks.stability import turns
 from benchmarks.stability.axis import AXES, with_element
 from benchmarks.stability.bars import cantilever, struck
 from benchmarks.stability.contact import flyer
@@ -55,6 +56,17 @@ CHEAP = [
 def test_cheap_cells_are_as_stored(wanted):
     (stored,) = (item for item in STORED if key(item) == wanted)
     assert shown(cell(wanted[0], wanted[1], wanted[2], wanted[3], "cpu")) == shown(stored)
+
+
+@pytest.mark.parametrize("kind", list(turns.KINDS))
+def test_increments_keep_rotations(kind, monkeypatch):
+    """A hundred revolutions in place of a million: what is left is rounding, and the lag of floating frames."""
+    monkeypatch.setattr(turns, "REVOLUTIONS", 100)
+    monkeypatch.setattr(turns, "UPDATES", 1000)
+    figures, steps = turns.KINDS[kind]("float64", "cpu")
+    assert steps >= 100
+    allowed = 1e-5 if kind == "floating frame" else 1e-10
+    assert all(figure.error < allowed for figure in figures), figures
 
 
 def test_a_wrong_number_is_seen():

@@ -4,6 +4,7 @@
     python -m benchmarks.stability --level long                 millions of steps: minutes to an hour
     python -m benchmarks.stability --only poisson friction      these axes only
     python -m benchmarks.stability --level quick                a few values of each; prints, stores nothing
+    python -m benchmarks.stability --level long --missing       those of them that are not stored yet
     python -m benchmarks.stability --render                     write the page from what is stored
 
 Cells replace those of the same axis, value, element and precision.
@@ -33,13 +34,14 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--level", default="full", choices=("quick", "full", "long"))
     parser.add_argument("--only", nargs="*", default=(), choices=tuple(AXES), metavar="AXIS")
+    parser.add_argument("--missing", action="store_true", help="only cells that are not stored")
     parser.add_argument("--data", type=Path, default=DOCS / "stability.json", help="where cells are kept")
     parser.add_argument("--render", action="store_true", help="only write the page from the cells kept")
     args = parser.parse_args()
     stored: list[dict[str, Any]] = json.loads(args.data.read_text(encoding="utf-8")) if args.data.exists() else []
     if not args.render:
         new = []
-        for task in tasks(args.only, args.level):
+        for task in tasks(args.only, args.level, stored if args.missing else ()):
             new.append(task(args.device))
             print(line(new[-1]), flush=True)
             if args.level != "quick":

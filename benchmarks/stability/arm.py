@@ -27,7 +27,7 @@ def figures(result: mca.Result) -> tuple[float, float]:
 
 
 @cache
-def finer(value: str, device: str = "cpu") -> tuple[float, float]:
+def finer(value: str, device: str) -> tuple[float, float]:
     """The figures of a finer mesh in float64, with `hex8r`."""
     scene = with_element(arm(value), "hex8r")
     return figures(mca.run(scene, precision="float64", device=device, refine=1.0))
@@ -45,7 +45,7 @@ def compliance(value: str, element: str) -> Trial:
 
     def read(result: mca.Result) -> list[Figure]:
         peak, impulse = figures(result)
-        other_peak, other_impulse = finer(value)
+        other_peak, other_impulse = finer(value, str(result.summary["device"]).split(" ")[0])
         return [
             Figure("first peak of F_n", peak, other_peak, 0.15),
             Figure("impulse", impulse, other_impulse, 0.15),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import warp_mca as mca
 
@@ -53,6 +53,19 @@ class Trial:
 
 
 @dataclass(frozen=True)
+class Direct:
+    """A measurement that needs no run.
+
+    Attributes:
+        measure: figures and number of steps, with a precision, on a device.
+        unit: of the figures, whose errors are shown in it.
+    """
+
+    measure: Callable[[str, str], tuple[list[Figure], int]]
+    unit: str
+
+
+@dataclass(frozen=True)
 class Axis:
     """A table: one parameter over its range.
 
@@ -73,14 +86,16 @@ class Axis:
     title: str
     reference: str
     values: tuple[Value, ...]
-    build: Callable[[Any, str], Trial]
+    build: Callable[[Any, str], Trial | Direct]
     level: Level = "full"
     elements: tuple[str, ...] | None = None
     quick: tuple[Value, ...] = ()
 
 
+Builds = TypeVar("Builds", Trial, Direct)
 AXES: dict[str, Axis] = {}
-GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "arm")  # in the order of the page
+# In the order of the page.
+GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "rotations", "arm")
 
 
 def ordered_axes() -> list[Axis]:
@@ -97,10 +112,10 @@ def axis(
     level: Level = "full",
     elements: tuple[str, ...] | None = None,
     quick: tuple[Value, ...] = (),
-) -> Callable[[Callable[[Any, str], Trial]], Callable[[Any, str], Trial]]:
+) -> Callable[[Callable[[Any, str], Builds]], Callable[[Any, str], Builds]]:
     """Register the function below as the builder of the axis of its name."""
 
-    def register(build: Callable[[Any, str], Trial]) -> Callable[[Any, str], Trial]:
+    def register(build: Callable[[Any, str], Builds]) -> Callable[[Any, str], Builds]:
         name: str = build.__name__  # type: ignore[attr-defined]
         assert name not in AXES, name
         assert set(quick) <= set(values), name

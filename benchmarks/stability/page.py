@@ -49,12 +49,17 @@ def percent(share: float) -> str:
     return "0" if share == 0.0 else "< 0.001 %" if share < 1e-5 else f"{100.0 * share:.2g} %"
 
 
+def size(error: float, unit: str | None) -> str:
+    """An error in its unit, or as a share in percent."""
+    return f"{error:.1e} {unit}" if unit else percent(error)
+
+
 def shown(found: Cell) -> str:
     """A cell of a table."""
     said = ", ".join(dict.fromkeys(map(word, found["said"])))
     if "error" not in found:
         return f"{found['status']}: {said}"
-    error = percent(found["error"])
+    error = size(found["error"], found.get("unit"))
     error = error if found["within"] else f"**{error}**"
     return f"{error} UNWARNED" if wrong(found) else f"{error} ({said})" if said else error
 
@@ -87,11 +92,12 @@ def _number(value: object) -> str:
 
 def tolerances(cells: Iterable[Cell]) -> str:
     """Largest tolerances of an axis, in words."""
-    found: dict[str, float] = {}
+    found: dict[tuple[str, str | None], float] = {}
     for cell in cells:
         if "error" in cell:
-            found[cell["figure"]] = max(found.get(cell["figure"], 0.0), cell["tolerance"])
-    return ", ".join(f"{name} {percent(value)}" for name, value in found.items())
+            name = cell["figure"], cell.get("unit")
+            found[name] = max(found.get(name, 0.0), cell["tolerance"])
+    return ", ".join(f"{name} {size(value, unit)}" for (name, unit), value in found.items())
 
 
 def summary(cells: Sequence[Cell]) -> str:

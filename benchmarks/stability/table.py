@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
-from benchmarks.stability import arm, bars, bodies, contact, material, motion, options  # noqa: F401  (they register axes)
+from benchmarks.stability import (  # noqa: F401  (they register axes)
+    arm,
+    bars,
+    bodies,
+    contact,
+    material,
+    motion,
+    options,
+    turns,
+)
 from benchmarks.stability.axis import AXES, Level, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, cell
 from warp_mca.elements import ELEMENTS
@@ -33,11 +42,12 @@ def keys(names: Iterable[str] = (), level: Level | None = None) -> Iterator[Key]
                     yield item.name, value, element, precision
 
 
-def tasks(names: Iterable[str], level: Level) -> Iterator[Callable[[str], Cell]]:
-    """A function of the device for each cell; axes that are named are run at any level."""
-    chosen = tuple(names)
+def tasks(names: Iterable[str], level: Level, stored: Iterable[Cell] = ()) -> Iterator[Callable[[str], Cell]]:
+    """A function of the device for each cell that is not stored; axes that are named are run at any level."""
+    chosen, known = tuple(names), {key(item) for item in stored}
     for name, value, element, precision in keys(chosen, None if chosen and level == "full" else level):
-        yield partial(cell, name, value, element, precision)  # type: ignore[arg-type]
+        if (name, value, element, precision) not in known:
+            yield partial(cell, name, value, element, precision)  # type: ignore[arg-type]
 
 
 def merged(stored: Iterable[Cell], new: Iterable[Cell]) -> list[Cell]:

@@ -12,6 +12,8 @@ from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
 from warp_mca.runs.rate_groups import StepCost
 
+MARGIN = 0.8  # of what was asked that the expected errors of the most accurate variant may reach [-]
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -30,6 +32,11 @@ class Choice:
     errors: Mapping[str, Expected | None]
     cost: float
     spreads: float = 1.0
+
+    @property
+    def likely(self) -> float:
+        """The greatest expected size of an error [-]; infinite where one is not known."""
+        return max((math.inf if error is None else error.size for error in self.errors.values()), default=math.inf)
 
     @property
     def greatest(self) -> float:
@@ -59,6 +66,19 @@ def choices(
         if keeps(variant, asked) and family.sizes[k].steps > 0.0 and not (asked.full and variant.element)
     ]
     return sorted(found, key=lambda choice: choice.cost)
+
+
+def cheapest(found: Sequence[Choice], share: float, scale: float) -> Choice | None:
+    """The first of `found`, which are in the order of their costs, whose errors stay within a share.
+
+    Where none does by all the spreads allowed for, the one with the least expected errors, if these leave a margin;
+    `scale` is that of estimates. None where that is not so.
+    """
+    within = next((item for item in found if item.greatest <= share), None)
+    if within is not None or not found:
+        return within
+    best = min(found, key=lambda item: item.likely)
+    return best if max(scale, 1.0) * best.likely <= MARGIN * share else None
 
 
 def keeps(variant: Variant, asked: Accuracy) -> bool:

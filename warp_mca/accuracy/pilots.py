@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from warp_mca.accuracy.convergence import limit_of
 from warp_mca.accuracy.figures import Figures, figures_of
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
-from warp_mca.base.errors import bad_value
+from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.runs.spring_share import PEAK_LOSS
 from warp_mca.scene import Scene
 
@@ -93,11 +94,7 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     typed = asked.typed.get("refine")
     base = float(typed) if isinstance(typed, int | float) else scene.refine
     start = Variant(refine=LEVELS[0] * base, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
-    first = _pilot(scene, start, run)
-    stiffer = _stiffer(scene, asked, first)
-    if stiffer is not None:
-        start = replace(start, **stiffer)
-        first = _pilot(scene, start, run)
+    start, first = _with_springs(scene, asked, start, run)
     begin = time.perf_counter()
     second = _pilot(scene, replace(start, refine=LEVELS[1] * base), run)
     wall = time.perf_counter() - begin
@@ -111,7 +108,7 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     worst = max(errors, key=lambda name: errors[name], default="")
     at = f" after coarse runs that leave {errors[worst]:.1%} in {worst}" if worst else ""
     variant = replace(start, refine=level * base)
-    stiff = f", penalty {penalty_of(start):g}" if stiffer else ""
+    stiff = f", penalty {start.knobs['penalty']:g}" if "penalty" in start.knobs else ""
     return Pilots(
         variant=variant,
         why=f"refine {level * base:.3g}{stiff}{at}",
@@ -123,6 +120,20 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
         result=second if level == LEVELS[1] else None,
         wall=wall,
     )
+
+
+def _with_springs(scene: Scene, asked: Accuracy, start: Variant, run: Callable[..., Result]) -> tuple[Variant, Result]:
+    """The first pilot, and the model that it had: with contact springs as stiff as the accuracy needs.
+
+    Where a guard stops it with these, the scene keeps its own; what they give away then asks for a finer mesh.
+    """
+    first = _pilot(scene, start, run)
+    stiffer = _stiffer(scene, asked, first)
+    if stiffer is not None:
+        with suppress(GuardError):
+            stiff = replace(start, **stiffer)
+            return stiff, _pilot(scene, stiff, run)
+    return start, first
 
 
 def _pilot(scene: Scene, variant: Variant, run: Callable[..., Result]) -> Result:
@@ -164,11 +175,6 @@ def _stiffer(scene: Scene, asked: Accuracy, first: Result) -> Mapping[str, Any] 
     source = source_of(scene)
     by_name = source is not None and "penalty" in source.parameters
     return {"parameters": {"penalty": wanted}} if by_name else {"penalty": wanted}
-
-
-def penalty_of(variant: Variant) -> float:
-    """The penalty that a variant sets."""
-    return float(variant.knobs["penalty"])
 
 
 def _foreseen(first: float | None, second: float | None) -> float | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.accuracy.catalogued import source_of
-from warp_mca.accuracy.choice import Choice, choices
+from warp_mca.accuracy.choice import Choice, cheapest, choices
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import Pilots, run_pilots
@@ -165,27 +165,26 @@ def _from_family(
 ) -> Plan | None:
     """By what scenes of the same family have shown; None where no variant is accurate enough."""
     cpu = device.startswith("cpu")
-    found = choices(family, scene.parameters, asked, bound, cost_of(device), cpu)
-    within = [item for item in found if item.greatest <= asked.share]
-    if not within:
+    found = choices(family, scene.parameters, asked, [name for name in bound if family.has(name)], cost_of(device), cpu)
+    chosen = cheapest(found, asked.share, family.scale)
+    if chosen is None:
         return None
-    chosen = within[0]
     variant = replace(chosen.variant, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
     return Plan(
         scene=variant.applied(scene),
         variant=variant,
         asked=asked,
-        why=_why(chosen, found, len(family.scenes), family.sizes[chosen.number].elements),
+        why=_why(chosen, found, len(family.scenes), family.sizes[chosen.number].elements, asked.share),
         reasons=reasons,
         expected={name: family.scale * error.size for name, error in chosen.errors.items() if error is not None},
     )
 
 
-def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float) -> str:
+def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float, share: float) -> str:
     """One sentence: what is chosen among which variants, the errors expected, and the next cheaper one's."""
     errors = ", ".join(f"{NAMES[name]} {error.size:.1%}" for name, error in chosen.errors.items() if error)
     cheaper = found[: found.index(chosen)]
-    beside = ""
+    rank, beside = "cheapest" if chosen.greatest <= share else "most accurate", ""
     if cheaper and any(cheaper[-1].errors.values()):
         name, error = max(
             cheaper[-1].errors.items(), key=lambda item: item[1].bound(chosen.spreads) if item[1] else 0.0
@@ -193,7 +192,7 @@ def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float) 
         if error is not None:
             beside = f"; the next cheaper one may miss the {NAMES[name]} by {error.bound(chosen.spreads):.1%}"
     return (
-        f"refine {chosen.variant.refine:.3g} with {elements:,.0f} elements is the cheapest of {len(found)} variants "
+        f"refine {chosen.variant.refine:.3g} with {elements:,.0f} elements is the {rank} of {len(found)} variants "
         f"that {scenes} scenes like this one allow; errors expected: {errors}{beside}"
     )
 

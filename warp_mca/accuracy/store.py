@@ -86,6 +86,11 @@ class Family:
     spreads: float = 1.0
     scale: float = 1.0
 
+    def has(self, figure: str) -> bool:
+        """Whether any of its runs has a figure."""
+        errors = (run for scene in self.scenes for run in scene.errors.values())
+        return any(run.get(figure) is not None for run in errors)
+
     def coordinates(self, parameters: Mapping[str, Any]) -> list[float]:
         """Features of a scene of the family [-], logarithms of those that are "log"."""
         values = {name: float(parameters.get(name, self.defaults[name])) for name in self.features}
