@@ -107,6 +107,8 @@ class Scene:
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
         if len(set(contacts)) != len(contacts):
             raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
+        if shared := sorted(set(sensors) & set(contacts)):
+            raise bad_value("Scene.probes", shared, "contacts have these names too, and columns of tables; rename them")
         joints = [joint.name for joint in self.joints]
         if len(set(joints)) != len(joints):
             raise bad_value("Scene.joints", joints, "give each joint a name of its own")
