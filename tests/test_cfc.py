@@ -64,7 +64,10 @@ def test_a_constant_and_three_components_stay_what_they_are():
     assert cfc_filter(np.array([4.0]), 1e-5, 1000) == pytest.approx([4.0])
 
 
-@pytest.mark.parametrize(("cfc", "words"), [(0, "cfc = 0"), ("60", "cfc = '60'"), (1000, "interval of 0.0001 s")])
+REFUSED = ((0, "cfc = 0"), ("60", "cfc = '60'"), (1000, "interval of 0.0001 s"), (1e-3, "would be 5e.06 rows"))
+
+
+@pytest.mark.parametrize(("cfc", "words"), REFUSED)
 def test_what_it_cannot_filter_is_refused(cfc, words):
     with pytest.raises(mca.RequestError, match=words):
         cfc_filter(np.zeros(10), 2e-4, cfc)

@@ -41,6 +41,8 @@ SOUND: dict[type, Any] = {
     mca.Point: mca.Point(body="low", at=(0.0, 0.0, 0.0)),
     mca.Line: LINE,
     mca.Path: mca.Path(name="p", lines=(LINE,), spacing=0.005),
+    mca.Probe: mca.Probe(name="a", body="low", at=(0.0, 0.0, 0.0), cfc=1000.0),
+    mca.Section: mca.Section(name="c", body="low", at=(0.0, 0.005, 0.0), normal=(0.0, 1.0, 0.0)),
     mca.Surface: TOP,
     mca.RigidPlane: WALL,
     mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
@@ -163,10 +165,14 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], master=item),)}
         case mca.Line():
             change = {"paths": (dataclasses.replace(SOUND[mca.Path], lines=(item,)),)}
+        case mca.Section():
+            halves = mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 2, 1))
+            change = {"sections": (item,), "bodies": (dataclasses.replace(low, geometry=halves), up)}
         case _:
             name = {
                 mca.Point: "tip",
                 mca.Path: "paths",
+                mca.Probe: "probes",
                 mca.Contact: "contacts",
                 mca.Fixed: "fixed",
                 mca.Prescribed: "prescribed",

@@ -304,6 +304,7 @@ def test_results_are_written_and_read_back(tmp_path: Path, monkeypatch: pytest.M
             "Section a.at .* one side",
         ),
         ({"probes": PROBES, "sections": (replace(SECTIONS[0], name="face"),)}, "a name of its own"),
+        ({"probes": (replace(PROBES[0], name="meet"),), "contacts": "meet"}, "contacts have these names too"),
         ({"probes": (replace(PROBES[0], cfc=2e5),)}, "Probe corner.cfc = 200000.0: rows every 1e-06 s"),
         ({"sections": SECTIONS, "bodies": "rigid"}, "Section small cut.body = 'small': it is rigid"),
     ],
@@ -311,8 +312,19 @@ def test_results_are_written_and_read_back(tmp_path: Path, monkeypatch: pytest.M
 def test_what_cannot_be_recorded_is_refused(change: dict, words: str):
     if change.get("bodies") == "rigid":
         change = {**change, "bodies": tuple(replace(body, rigid=True) for body in oblique().bodies)}
+    if name := change.get("contacts"):
+        change = {**change, "contacts": (replace(oblique().contacts[0], name=name),)}
     with pytest.raises(mca.RequestError, match=words):
         begun(replace(oblique(), **change))
+
+
+def test_a_run_that_a_guard_stops_at_once_has_no_rows_of_probes():
+    impact = begun(watched(oblique()))
+    impact.state.u.fill_(np.nan)
+    impact.advance()
+    result = result_of(impact)
+    assert impact.stopped[0] is not None and result.probes[1].filtered().shape == (0, 3)
+    assert result.summary["probes"][1]["acceleration_cfc_max"] == 0.0 and result.sections[0].force.shape == (0, 3)
 
 
 @pytest.mark.parametrize(

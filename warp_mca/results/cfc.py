@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.scene.sensors import SAMPLES
+from warp_mca.scene.sensors import check_class
 
 Array = NDArray[np.float64]
 
 CORNER = 2.0775  # corner of one pass over the class; -3 dB of both passes together are at 1.667 of it, SAE J211-1
-SLACK = 1.01  # of that rate: output intervals are rounded to whole steps
+SLACK = 1.01  # of the sampling rate: output intervals are rounded to whole steps
 UNEVEN = 1e-6  # share of the mean interval by which times may be uneven
 
 
@@ -28,15 +28,13 @@ def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
         cfc: channel frequency class [Hz], 60, 180, 600 or 1000 in the standard.
 
     Raises:
-        RequestError: the class is no number above 0, or rows are too far apart for it.
+        RequestError: the class is no number above 0, or rows are too far apart for it, or too near each other.
     """
     from scipy.signal import butter, sosfiltfilt
 
     if not (validate.is_number(cfc) and cfc > 0.0):
         raise bad_value("cfc", validate.brief(cfc), "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
-    if not interval * SAMPLES * cfc <= SLACK:
-        remedy = f"SAE J211 wants {SAMPLES:g} rows in 1 / cfc: take an output_interval of {0.1 / cfc:.3g} s at most"
-        raise bad_value("cfc", cfc, remedy)
+    check_class("cfc", cfc, interval, SLACK)
     values = np.asarray(values, dtype=np.float64)
     if len(values) < 2:
         return values.copy()

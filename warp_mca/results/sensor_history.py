@@ -67,8 +67,9 @@ class ProbeHistory:
         chosen = self.cfc if cfc is None else cfc
         if chosen is None:
             raise bad_value("cfc", None, "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
-        interval = float(self.time[-1] - self.time[0]) / max(len(self.time) - 1, 1)
-        return cfc_filter(self.acceleration, interval, chosen)
+        if len(self.time) < 2:  # a guard stopped the run at once
+            return self.acceleration
+        return cfc_filter(self.acceleration, float(self.time[-1] - self.time[0]) / (len(self.time) - 1), chosen)
 
     @property
     def own_filtered(self) -> Array | None:

@@ -15,7 +15,7 @@ from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
-from warp_mca.scene.sensors import SAMPLES, Probe, Section
+from warp_mca.scene.sensors import Probe, Section, check_class
 from warp_mca.scene.tied_surfaces import Tie
 
 _PARTS = {
@@ -110,6 +110,8 @@ class Scene:
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
         if len(set(contacts)) != len(contacts):
             raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
+        if shared := sorted(set(sensors) & set(contacts)):
+            raise bad_value("Scene.probes", shared, "contacts have these names too, and columns of tables; rename them")
         joints = [joint.name for joint in self.joints]
         if len(set(joints)) != len(joints):
             raise bad_value("Scene.joints", joints, "give each joint a name of its own")
@@ -125,9 +127,8 @@ class Scene:
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
         for probe in self.probes:
-            if probe.cfc is not None and not SAMPLES * probe.cfc * self.impact.output_interval <= 1.0:
-                remedy = f"rows every {self.impact.output_interval:g} s are too few: SAE J211 wants 10 in 1 / cfc"
-                raise bad_value(f"{probe.title}.cfc", probe.cfc, f"{remedy}; give a smaller output_interval")
+            if probe.cfc is not None:
+                check_class(f"{probe.title}.cfc", probe.cfc, self.impact.output_interval)
         for section in self.sections:
             if section.body in self.rigid_names:
                 raise bad_value(f"{section.title}.body", section.body, "it is rigid, without stress; cut another body")

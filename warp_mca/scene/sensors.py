@@ -9,6 +9,21 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
 
 SAMPLES = 10.0  # sampling rate over the channel frequency class at least, SAE J211-1
+MOST_SAMPLES = 1e6  # from which on the coefficients of the filter lose their digits
+
+
+def check_class(field: str, cfc: float, interval: float, slack: float = 1.0) -> None:
+    """Refuse a channel frequency class [Hz] that rows at an interval [s] are too few or too many for.
+
+    Raises:
+        RequestError: so it is.
+    """
+    samples = 1.0 / (interval * cfc) if interval * cfc > 0.0 else MOST_SAMPLES
+    if samples * slack < SAMPLES:
+        remedy = f"SAE J211 wants {SAMPLES:g} rows in 1 / cfc: take an output_interval of {0.1 / cfc:.3g} s at most"
+        raise bad_value(field, cfc, f"rows every {interval:.3g} s are too few; {remedy}")
+    if samples >= MOST_SAMPLES:
+        raise bad_value(field, cfc, f"there would be {samples:.2g} rows in 1 / cfc; take a greater class, as 60 Hz")
 
 
 @dataclass(frozen=True, kw_only=True)
