@@ -13,6 +13,8 @@ from test_full_disk import files_up_to
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.base.rotation import rotation_matrix
+from warp_mca.cli import run
+from warp_mca.cli.parser import make_parser
 from warp_mca.recorders import AnimationFile, SnapshotFile
 from warp_mca.recorders.pictures import Subject
 from warp_mca.recorders.recorder import SURFACE, VOLUME
@@ -162,3 +164,14 @@ def test_what_ffmpeg_says_is_told(bars: FlyingBars, tmp_path: Path, monkeypatch:
     monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
     with pytest.raises(OSError, match=r"ffmpeg failed \(no such codec\)"):
         film(tmp_path / "a.mp4", bars, 1)
+
+
+def test_the_command_line_draws_what_is_asked_for(tmp_path: Path):
+    words = ["run", "two_link", "--snapshot", "5e-6", "--animate", str(tmp_path / "a.gif"), "--frames", "7"]
+    args = make_parser().parse_args([*words, "--field", "velocity", "--magnify", "30"])
+    animation, snapshot = run._recorders(args, tmp_path)
+    assert isinstance(animation, AnimationFile) and isinstance(snapshot, SnapshotFile)
+    assert animation.cadence.frames == 7
+    assert snapshot.path.name == "snapshot-5us-velocity.png"
+    for recorder in (animation, snapshot):
+        assert (recorder.subject.field, recorder.subject.magnify) == ("velocity", 30.0)
