@@ -65,7 +65,8 @@ def plotter(
     found.add_text(f"{1e6 * at:.1f} µs after first contact", font_size=10)
     centre, axes = 0.5 * (points.min(axis=0) + points.max(axis=0)), view_axes(up, np.ptp(points, axis=0))
     found.camera_position = [centre + EYE @ axes, centre, up]
-    found.reset_camera(bounds=np.stack([points.min(axis=0), points.max(axis=0)], axis=1).ravel().tolist())
+    bounds = np.stack([points.min(axis=0), points.max(axis=0)], axis=1).ravel().tolist()
+    found.reset_camera(bounds=bounds)  # pyright: ignore[reportCallIssue]  (a decorator hides its first argument)
     return found
 
 

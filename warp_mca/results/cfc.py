@@ -42,7 +42,7 @@ def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
     period = int(np.ceil(1.0 / (CORNER * cfc * interval)))  # after so many rows the filter has forgotten its start
     count = min(len(values) - 1, 2 * period)
     seen = np.concatenate([np.repeat(values[:1], count, axis=0), values, values[-2 : -2 - count : -1]])
-    return np.asarray(sosfiltfilt(sections, seen, axis=0, padtype=None))[count : count + len(values)]
+    return np.asarray(sosfiltfilt(sections, seen, axis=0, padlen=0))[count : count + len(values)]
 
 
 def is_even(time: Array) -> bool:
