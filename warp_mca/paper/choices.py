@@ -38,7 +38,7 @@ DURATIONS = ("published", "1", "0.33", "1.39", "0.22", "1.57", "0.14")
 SPRINGS_TRIED = {
     MAIN: "1, main mesh",
     MESH: "1, other mesh",
-    PENALTY: "0.3, other mesh",
+    PENALTY: "0.5, other mesh",
     SPRINGS: "0.3, cells of 1.2 mm at the tip",
 }
 DURATIONS_CAPTION = (

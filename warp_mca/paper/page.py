@@ -68,7 +68,7 @@ class Page:
             f"Of {len(self.verdicts)} claims, our own counted, {count[True]} agree, {count[False]} differ, and "
             f"{count[None]} have no run.",
             "“mesh” is the change of our number from the main mesh to the other one; “penalty” its change, on the "
-            "other mesh, from the factor 0.1 to 0.3 (Figs. 16 to 18: from 1 to 0.3). “Unsure” is what one of them "
+            "other mesh, from the factor 0.1 to 0.3 (Figs. 16 to 18: from 1 to 0.5). “Unsure” is what one of them "
             "changes by more than the tolerance.",
         ]
 
