@@ -13,7 +13,7 @@ import pytest
 import warp_mca as mca
 from benchmarks.pages import run_page
 from warp_mca.geometry.refinement import refined_count
-from warp_mca.recorders import UsdFile
+from warp_mca.recorders import UsdFile, VtkHdfFile
 
 PAGES = ("accuracy.md", "batch.md", "hinges.md", "less.md", "theory.md", "visualise.md")
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
@@ -91,9 +91,12 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("stand_ins")
 @pytest.mark.parametrize("page", PAGES)
-def test_blocks_run(page: str, tmp_path: Path):
+def test_blocks_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     if page == "visualise.md":
-        mca.run(small(), device="cpu", recorders=[UsdFile(tmp_path / "two_link.usdc")])
+        plotter = pytest.importorskip("pyvista").Plotter
+        monkeypatch.setattr(plotter, "show", lambda self: self.show_axes())  # no window
+        recorders = [UsdFile(tmp_path / "two_link.usdc"), VtkHdfFile(tmp_path / "drop.vtkhdf")]
+        mca.run(small(), device="cpu", recorders=recorders)
     given = {"mca": mca, "scene": small(), "tip": SURFACE, "top": WALL}
     given |= {"dataclasses": dataclasses, "refined_count": refined_count}
     assert run_page(page, tmp_path, given)

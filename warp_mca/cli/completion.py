@@ -17,8 +17,9 @@ def answer(parser: argparse.ArgumentParser) -> None:
     if ASKED in os.environ:
         with suppress(ImportError):
             import argcomplete  # pyright: ignore[reportMissingImports]
+            from argcomplete.completers import FilesCompleter  # pyright: ignore[reportMissingImports]
 
-            _add_completers(parser, argcomplete.FilesCompleter((".py", ".mca")))
+            _add_completers(parser, FilesCompleter((".py", ".mca")))
             argcomplete.autocomplete(parser)
 
 
