@@ -27,8 +27,8 @@ CASES = (
     ),
     (
         "quick",
-        "`two_link`, `quick`, on 12 CPU cores",
-        "warp-mca tradeoff two_link --threads 12 --budget 210 --out DIR",
+        "`two_link`, `quick`, on two CPU cores",
+        "warp-mca tradeoff two_link --threads 2 --budget 1150 --out DIR",
     ),
     (
         "standard",
