@@ -16,10 +16,8 @@ LANES = 256  # threads of a block on a GPU; one on a CPU
 @wp.func
 def sum_of_block(x: wp.vec3d):
     """Sum of a vector of each thread of a block, in an order of its own that is fixed."""
-    a = wp.tile_sum(wp.tile(x[0]))
-    b = wp.tile_sum(wp.tile(x[1]))
-    c = wp.tile_sum(wp.tile(x[2]))
-    return wp.vec3d(a[0], b[0], c[0])
+    found = wp.tile_sum(wp.tile(x, preserve_type=True))
+    return found[0]
 
 
 @wp.kernel(enable_backward=False)
