@@ -7,13 +7,17 @@ from warp_mca.paper import word_checks as check
 from warp_mca.paper.claims import Claim
 
 _SOFT = "these runs take penalty 1; the contact's springs decide: the table of durations has what others give"
+_LIGHT = (
+    "from 1 ms on ours presses with a hundredth of its peak between three compressions, and when it parts hangs on the "
+    "mesh and the hinge: at 1.79 ms with 1,408 elements, with pins at 1.68"
+)
 _STICK = (
     "ours counts the time in which sticking nodes carry half of the normal force; the paper gives no numbers, and says "
     "that “compliances increase” both of stiffer and of softer bodies: its durations fall as they increase"
 )
 
 
-def _compliance(study: str, figure: str, soft: float, stiff: float, reason: str) -> tuple[Claim, ...]:
+def _compliance(study: str, figure: str, soft: float, stiff: float, reason: str = _SOFT) -> tuple[Claim, ...]:
     what = {"tip": "tip", "body": "rod body", "rod": "whole rod"}[study]
     return (
         Claim(
@@ -41,15 +45,15 @@ def _compliance(study: str, figure: str, soft: float, stiff: float, reason: str)
             check.of(study, 7000.0, read.event_duration),
             "ms",
             0.12,
-            reason,
+            _SOFT,
         ),
     )
 
 
 COMPLIANCE: tuple[Claim, ...] = (
-    *_compliance("tip", "16", 1.0, 0.33, _SOFT),
-    *_compliance("body", "17", 1.39, 0.22, _SOFT),
-    *_compliance("rod", "18", 1.57, 0.14, _SOFT),
+    *_compliance("tip", "16", 1.0, 0.33),
+    *_compliance("body", "17", 1.39, 0.22),
+    *_compliance("rod", "18", 1.57, 0.14, _LIGHT),
     Claim(
         "body_succession",
         "Fig. 17",

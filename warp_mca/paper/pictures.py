@@ -61,10 +61,14 @@ def _curves(evidence: Evidence, study: str, panels: Sequence[Panel]) -> Figure:
     values = evidence.values(study)
     named = [(f"{value:g}", evidence.run(study, value)) for value in values]
     figure = _panels(named, panels)
-    figure.axes[0].legend(
-        title=STUDIES[study].quantity, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=9
-    )
+    _legend_outside(figure, STUDIES[study].quantity)
     return figure
+
+
+def _legend_outside(figure: Figure, title: str) -> None:
+    """One legend beside all panels, which does not push them apart."""
+    lines, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(lines, labels, title=title, loc="outside right upper", frameon=False, fontsize=9)
 
 
 def _panels(named: Sequence[tuple[str, Result]], panels: Sequence[Panel]) -> Figure:
@@ -87,7 +91,7 @@ def _panels(named: Sequence[tuple[str, Result]], panels: Sequence[Panel]) -> Fig
 def _meshes(evidence: Evidence) -> Figure:
     named = [(f"{r.summary['n_elements']:,}", r) for r in evidence.results(MESHES)]
     figure = _panels(named, FORCES[:1])
-    figure.axes[0].legend(title="elements", loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    _legend_outside(figure, "elements")
     return figure
 
 
