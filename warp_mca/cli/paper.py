@@ -47,9 +47,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def _seconds(text: str) -> float:
     """A number of seconds, 0 or more."""
-    if not float(text) >= 0.0:
-        raise ValueError(text)
-    return float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not value >= 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a number of seconds, 0 or more")
+    return value
 
 
 def _carry_out(args: argparse.Namespace) -> None:
