@@ -116,7 +116,9 @@ def _plain(refine: float, penalty: float) -> Variant:
 
 RODS = ("section", "ring", "focus_size", "focus_layers", "plate_core_depth", "plate_layers", "plate_extension")
 REFINES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
-FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in REFINES))  # softer springs hold flat ends too long
+BETWEEN = (0.6, 0.85, 1.2, 1.7, 2.4)
+# Softer springs hold flat ends too long.
+FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in (*REFINES, *BETWEEN)))
 
 FAMILIES = (
     Family(
@@ -154,6 +156,11 @@ FAMILIES = (
             _links(2 / 3, 28, 1.0, 1.5, "hex8r"),
             _links(1.0, 28, 1.0, 1.5, "hex8r"),
             _links(4 / 3, 42, 1.0, 1.5, "hex8r"),
+            _links(1.0, 42, 1.5, 2.2),
+            _links(1.0, 42, 2.0, 2.0),
+            _links(4 / 3, 42, 2.0, 2.2),
+            _links(5 / 3, 56, 2.0, 2.2),
+            _links(2.0, 64, 2.0, 2.0),
         ),
         fine=_links(3.0, 72, 3.0, None),
         partner=10,
@@ -175,6 +182,9 @@ FAMILIES = (
             _axial(1.5, 42, 2.0),
             _axial(2.0, 42, 2.0),
             _axial(2.5, 56, 2.0, None),
+            _axial(1.0, 28, 2.0, 2.2),
+            _axial(1.5, 42, 2.0, 2.2),
+            _axial(2.0, 42, 2.0, 2.2),
         ),
         fine=_axial(4.0, 72, 3.0, None),
         partner=5,
