@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
-from benchmarks.accuracy_calibrate import calibrated, left_out
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, no_dearer, render
+from benchmarks.accuracy_left_out import left_out
 from benchmarks.accuracy_measure import (
     Job,
     Table,
@@ -107,8 +107,6 @@ def learn(args: argparse.Namespace, families: list[Family], until: float) -> Non
     for item in measured(args, families, before, until):
         found = item
         target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
-    known = {name: calibrated(name, item) for name, item in found.items()}
-    target.write_text(json.dumps({"families": {**before, **known}}) + "\n", encoding="utf-8")
     print({name: len(item["scenes"]) for name, item in found.items()})
 
 

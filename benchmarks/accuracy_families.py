@@ -14,6 +14,7 @@ from warp_mca.scene.catalogue import load_source
 Values = dict[str, Any]
 
 PEAK_OF_FLAT_ENDS = "flat ends meet at once: the force overshoots its plateau, and higher and shorter as cells shrink"
+ROLLS_ON = "a sphere that rolls stays in contact"
 PEAK_OF_BOUNCES = "the sphere is pressed from the start: its first peak is a bounce that small cells shorten"
 
 # Duration of contact [s] at 0.7, 70 and 7000 GPa of the tip, the rods' cylinders, or both (paper, Table 3, Fig. 16-18).
@@ -216,7 +217,7 @@ FAMILIES = (
         features={"v": "log", "mu": "linear"},
         mesh=("section", "pole_size", "pole_layers"),
         fixed={},
-        no_limit={"F_n_first_peak": PEAK_OF_BOUNCES},
+        no_limit={"F_n_first_peak": PEAK_OF_BOUNCES, "contact_duration": ROLLS_ON},
         variants=tuple(_plain(refine, 1.0) for refine in REFINES),
         fine=_plain(4.0, 1.0),
         partner=4,

@@ -27,6 +27,9 @@ LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, t
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
 NEAR = 0.02  # distance from the median within which it is none [-]
 FEWEST = 4  # scenes from which anything is foreseen
+LOW, HIGH = 0.5, 3.0  # estimates over true errors between which they are right [-]
+SMALL = 0.2  # of what was asked: errors below it need not be told apart [-]
+SIZES = tuple(1e-4 * 1.04**k for k in range(220))  # estimates that are considered [-], up to 0.54
 
 
 @dataclass(frozen=True)
@@ -46,9 +49,24 @@ class Expected:
         """Root of the expected square [-]."""
         return math.hypot(self.mean, self.spread)
 
-    def bound(self, spreads: float) -> float:
-        """Size of the error that many standard deviations from the mean [-]."""
-        return abs(self.mean) + spreads * self.spread
+    def within(self, share: float) -> float:
+        """Probability that the error is no larger than a share [-]."""
+        return _normal((share - self.mean) / self.spread) - _normal((-share - self.mean) / self.spread)
+
+    def estimate(self, small: float) -> float:
+        """The size that is most probably right [-]: LOW to HIGH times the true one, or both of them below `small`."""
+
+        def right(size: float) -> float:
+            if size < small:
+                return self.within(max(size / LOW, small))
+            return self.within(size / LOW) - self.within(size / HIGH)
+
+        return max(SIZES, key=lambda size: (right(size), -abs(math.log(size / self.size))))
+
+
+def _normal(x: float) -> float:
+    """Probability that a value of the standard normal distribution is below x."""
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
 def expected_errors(
