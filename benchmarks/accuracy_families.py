@@ -117,9 +117,12 @@ def _plain(refine: float, penalty: float) -> Variant:
 
 RODS = ("section", "ring", "focus_size", "focus_layers", "plate_core_depth", "plate_layers", "plate_extension")
 REFINES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+ALONG = ((0.7, 80), (0.7, 112), (1.0, 80), (1.0, 112), (1.0, 160), (1.4, 160))
 BETWEEN = (0.6, 0.85, 1.2, 1.7, 2.4)
 # Softer springs hold flat ends too long.
 FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in (*REFINES, *BETWEEN)))
+# With more cells along rods than across them.
+FLAT += tuple(_axial(refine, axial, 3.0, None) for refine, axial in ALONG)
 
 FAMILIES = (
     Family(
