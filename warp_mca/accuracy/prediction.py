@@ -23,7 +23,7 @@ from warp_mca.accuracy.store import Family
 Array = NDArray[np.float64]
 
 NOISE = 2e-3  # error of the references themselves [-]
-INTERVAL = 4e-3  # the same of durations, which are known to the output interval [-]
+INTERVAL = 5e-3  # the same of durations, which are known to the output interval [-]
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
 NEAR = 0.02  # distance from the median within which it is none [-]
