@@ -2,13 +2,14 @@
 
 python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --workers 10 --deadline 300
 python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --families two_link --add 3 --workers 10 --deadline 300
+python -m benchmarks.accuracy learn --device cuda:0 --families two_link --lacking --workers 10 --deadline 300
 python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 --deadline 350
 python -m benchmarks.accuracy render
 
 `learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store,
-with `--add` beside the scenes that it has; `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares
-with references, and writes docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables
-into docs/accuracy.md.
+with `--add` beside the scenes that it has; with `--lacking` it runs these scenes with variants that they lack.
+`validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
+docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into docs/accuracy.md.
 """
 
 from __future__ import annotations
@@ -22,10 +23,22 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
-from benchmarks.accuracy_calibrate import calibrated, left_out
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from benchmarks.accuracy_judge import judged, no_dearer, render
-from benchmarks.accuracy_measure import Job, Table, added, jobs_of, row_of, run_jobs, sampled, stored, truth_of
+from benchmarks.accuracy_left_out import left_out
+from benchmarks.accuracy_measure import (
+    Job,
+    Table,
+    added,
+    completed,
+    jobs_of,
+    lacking,
+    row_of,
+    run_jobs,
+    sampled,
+    stored,
+    truth_of,
+)
 from warp_mca.accuracy.store import OWN
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,6 +62,7 @@ def main() -> None:
     parser.add_argument("--reference", type=float, default=1.0, metavar="SCALE", help="refine of references times this")
     parser.add_argument("--families", help="names with commas between them (default: all)")
     parser.add_argument("--add", type=int, metavar="SEED", help="learn other scenes, beside those of the store")
+    parser.add_argument("--lacking", action="store_true", help="learn variants that scenes of the store lack")
     parser.add_argument("-o", "--output", type=Path)
     args = parser.parse_args()
     if args.command == "render":
@@ -87,20 +101,37 @@ def _tables(jobs: Sequence[Job], workers: int, until: float) -> Iterable[dict[st
 def learn(args: argparse.Namespace, families: list[Family], until: float) -> None:
     """Write the store; families that were not measured stay as they are in it."""
     target = args.output if args.output and args.command == "learn" else OWN
+    before = json.loads(target.read_text(encoding="utf-8"))["families"] if target.exists() else {}
+    measured = _completed if args.lacking else _sampled
+    found: dict[str, Any] = {}
+    for item in measured(args, families, before, until):
+        found = item
+        target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
+    print({name: len(item["scenes"]) for name, item in found.items()})
+
+
+def _sampled(
+    args: argparse.Namespace, families: list[Family], before: Mapping[str, Any], until: float
+) -> Iterable[dict[str, Any]]:
+    """Families with random scenes, as far as these are measured."""
     seed = LEARN if args.add is None else args.add
     assert seed != HELD_OUT, "these scenes are those that choices are tried on"
     scenes = {family.scene: _scenes(args, family, seed, GALLERY) for family in families}
-    before = json.loads(target.read_text(encoding="utf-8"))["families"] if target.exists() else {}
-    found: dict[str, Any] = {}
     for tables in _tables(jobs_of(families, scenes, args.device, args.reference), args.workers, until):
-        found = {f.scene: stored(f, scenes[f.scene], tables[f.scene]) for f in families}
+        found = {f.scene: stored(f, scenes[f.scene], tables.get(f.scene, {})) for f in families}
         found = {name: item for name, item in found.items() if item["scenes"]}
         if args.add is not None:
             found = {name: added(before.get(name), item) for name, item in found.items()}
-        target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
-    known = {name: calibrated(name, item) for name, item in found.items()}
-    target.write_text(json.dumps({"families": {**before, **known}}) + "\n", encoding="utf-8")
-    print({name: len(item["scenes"]) for name, item in found.items()})
+        yield found
+
+
+def _completed(
+    args: argparse.Namespace, families: list[Family], before: Mapping[str, Any], until: float
+) -> Iterable[dict[str, Any]]:
+    """Families of the store with the variants that their scenes lack, as far as these are measured."""
+    known = [family for family in families if family.scene in before]
+    for tables in _tables(lacking(known, before, args.device), args.workers, until):
+        yield {f.scene: completed(f, before[f.scene], tables.get(f.scene, {})) for f in known}
 
 
 def validate(args: argparse.Namespace, families: list[Family], until: float) -> None:
@@ -116,7 +147,7 @@ def validate(args: argparse.Namespace, families: list[Family], until: float) -> 
         found = []
         for family in families:
             for k, values in enumerate(scenes[family.scene]):
-                table = tables[family.scene].get(k, {})
+                table = tables.get(family.scene, {}).get(k, {})
                 truth = truth_of(family, table)
                 own = [run for run in runs if (run["scene"], run["number"]) == (family.scene, k)]
                 if truth is not None and own:

@@ -14,6 +14,7 @@ from warp_mca.scene.catalogue import load_source
 Values = dict[str, Any]
 
 PEAK_OF_FLAT_ENDS = "flat ends meet at once: the force overshoots its plateau, and higher and shorter as cells shrink"
+ROLLS_ON = "a sphere that rolls stays in contact"
 PEAK_OF_BOUNCES = "the sphere is pressed from the start: its first peak is a bounce that small cells shorten"
 
 # Duration of contact [s] at 0.7, 70 and 7000 GPa of the tip, the rods' cylinders, or both (paper, Table 3, Fig. 16-18).
@@ -116,7 +117,12 @@ def _plain(refine: float, penalty: float) -> Variant:
 
 RODS = ("section", "ring", "focus_size", "focus_layers", "plate_core_depth", "plate_layers", "plate_extension")
 REFINES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
-FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in REFINES))  # softer springs hold flat ends too long
+ALONG = ((0.7, 80), (0.7, 112), (1.0, 80), (1.0, 112), (1.0, 160), (1.4, 160))
+BETWEEN = (0.6, 0.85, 1.2, 1.7, 2.4)
+# Softer springs hold flat ends too long.
+FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in (*REFINES, *BETWEEN)))
+# With more cells along rods than across them.
+FLAT += tuple(_axial(refine, axial, 3.0, None) for refine, axial in ALONG)
 
 FAMILIES = (
     Family(
@@ -154,6 +160,13 @@ FAMILIES = (
             _links(2 / 3, 28, 1.0, 1.5, "hex8r"),
             _links(1.0, 28, 1.0, 1.5, "hex8r"),
             _links(4 / 3, 42, 1.0, 1.5, "hex8r"),
+            _links(1.0, 42, 1.5, 2.2),
+            _links(1.0, 42, 1.5, 2.4),
+            _links(1.0, 42, 2.0, 2.0),
+            _links(4 / 3, 42, 2.0, 2.2),
+            _links(4 / 3, 42, 3.0, 2.2),
+            _links(5 / 3, 56, 2.0, 2.2),
+            _links(2.0, 64, 2.0, 2.0),
         ),
         fine=_links(3.0, 72, 3.0, None),
         partner=10,
@@ -175,6 +188,9 @@ FAMILIES = (
             _axial(1.5, 42, 2.0),
             _axial(2.0, 42, 2.0),
             _axial(2.5, 56, 2.0, None),
+            _axial(1.0, 28, 2.0, 2.2),
+            _axial(1.5, 42, 2.0, 2.2),
+            _axial(2.0, 42, 2.0, 2.2),
         ),
         fine=_axial(4.0, 72, 3.0, None),
         partner=5,
@@ -206,7 +222,7 @@ FAMILIES = (
         features={"v": "log", "mu": "linear"},
         mesh=("section", "pole_size", "pole_layers"),
         fixed={},
-        no_limit={"F_n_first_peak": PEAK_OF_BOUNCES},
+        no_limit={"F_n_first_peak": PEAK_OF_BOUNCES, "contact_duration": ROLLS_ON},
         variants=tuple(_plain(refine, 1.0) for refine in REFINES),
         fine=_plain(4.0, 1.0),
         partner=4,

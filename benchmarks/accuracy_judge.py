@@ -8,36 +8,38 @@ from typing import Any
 from benchmarks.accuracy_families import Family, Values
 from benchmarks.accuracy_measure import COMPUTED, FINE, Row, Table, errors_of
 from warp_mca.accuracy.choice import cost_of
-from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.figures import BOUND, bound_errors
+from warp_mca.accuracy.prediction import HIGH, LOW, SMALL
 from warp_mca.accuracy.store import Size, families
 from warp_mca.runs.rate_groups import COSTS, StepCost
 
 START, END = "<!-- accuracy: measured -->", "<!-- accuracy: end -->"  # around what is rendered
 MARGIN = 1.5  # costs by the store, means over its scenes, over those of the run [-]
-LOW, HIGH, SMALL = 0.5, 3.0, 0.2  # of estimates over true errors; share of what was asked below which both are small
 
 
 def judged(
     family: Family, values: Values, table: Table, truth: Sequence[float | None], runs: Sequence[Row], device: str
 ) -> dict[str, Any]:
     """What came of the runs of one scene."""
-    bound = [k for k, name in enumerate(BOUND) if name not in family.no_limit]
+
+    def bound(figures: Sequence[float | None]) -> list[float | None]:
+        return list(bound_errors(errors_of(figures, truth), family.no_limit).values())
+
     rows = []
     for run in sorted(runs, key=lambda item: item["asked"]):
         if "refused" in run:
             rows.append(dict(run))
             continue
-        errors = errors_of(run["figures"], truth)
         within = [
             (cost(row, device), number)
             for number, row in table.items()
-            if number != FINE and _worst(errors_of(row["figures"], truth), bound) <= run["asked"]
+            if number != FINE and _worst(bound(row["figures"])) <= run["asked"]
         ]
         rows.append(
             {
                 **run,
-                "errors": errors,
-                "worst": _worst(errors, bound),
+                "errors": bound(run["figures"]),
+                "worst": _worst(bound(run["figures"])),
                 "cost": cost(run, device),
                 "cheapest": min(within, default=(None, None)),
             }
@@ -73,9 +75,8 @@ def no_dearer(runs: Iterable[Row], device: str) -> Callable[[str, int, int], boo
     return wanted
 
 
-def _worst(errors: Sequence[float | None], bound: Iterable[int]) -> float:
-    found = [abs(error) for k in bound if (error := errors[k]) is not None]
-    return max(found, default=0.0)
+def _worst(errors: Iterable[float | None]) -> float:
+    return max((abs(error) for error in errors if error is not None), default=0.0)
 
 
 def counts(data: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
@@ -99,9 +100,14 @@ def _estimates(run: Row) -> list[bool]:
         share = run["estimate"][name]
         if share is None or error is None:
             continue
-        small = max(share, abs(error)) < SMALL * run["asked"]
-        found.append(small or LOW * abs(error) <= share <= HIGH * abs(error))
+        found.append(right(share, error, run["asked"]))
     return found
+
+
+def right(estimate: float, error: float, asked: float) -> bool:
+    """Whether an estimate is LOW to HIGH times the true error, or both are below SMALL of what was asked."""
+    true = abs(error)
+    return max(estimate, true) < SMALL * asked or LOW * true <= estimate <= HIGH * true
 
 
 def _count(items: Iterable[bool]) -> tuple[int, int]:
@@ -151,7 +157,9 @@ def _left_out(families: Iterable[Mapping[str, Any]]) -> list[str]:
         "within",
         "within twice",
         "estimates right",
-        "cost at most twice",
+        "cost at most twice the cheapest's",
+        "median of that",
+        "5 % over 2 %",
     )
     lines = ["", "Each scene of the store, left out and foreseen from the others, at 2 % and 5 %:", ""]
     lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
@@ -164,7 +172,8 @@ def _left_out(families: Iterable[Mapping[str, Any]]) -> list[str]:
             ("cheap", "beside"),
         ]
         met = [f"{item[part]} of {item[whole]}" for part, whole in pairs]
-        lines.append(f"| `{item['family']}` | {item['scenes']} | {' | '.join(met)} |")
+        costs = ["" if item[key] is None else f"{item[key]:.2f}" for key in ("median", "ratio")]
+        lines.append(f"| `{item['family']}` | {item['scenes']} | {' | '.join([*met, *costs])} |")
     return lines
 
 

@@ -215,19 +215,7 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
         truth = truth_of(family, table)
         if truth is None:
             continue
-        runs = [
-            {
-                "variant": number,
-                "errors": [None if e is None else round(e, 5) for e in errors_of(row["figures"], truth)],
-                "elements": row["elements"],
-                "steps": row["steps"],
-                "computed": round(
-                    (row["computed"] or COMPUTED) * WORK.get(family.variants[number].element or "", 1.0), 3
-                ),
-            }
-            for number, row in sorted(table.items())
-            if number != FINE
-        ]
+        runs = [_run(family, number, row, truth) for number, row in sorted(table.items()) if number != FINE]
         entries.append({"parameters": values, "truth": truth, "runs": runs})
     return {
         "features": dict(family.features),
@@ -237,6 +225,42 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
         "variants": [_plain(item) for item in family.variants],
         "scenes": entries,
     }
+
+
+def _run(family: Family, number: int, row: Row, truth: Sequence[float | None]) -> dict[str, Any]:
+    """A run as the store has it."""
+    work = WORK.get(family.variants[number].element or "", 1.0)
+    return {
+        "variant": number,
+        "errors": [None if e is None else round(e, 5) for e in errors_of(row["figures"], truth)],
+        "elements": row["elements"],
+        "steps": row["steps"],
+        "computed": round((row["computed"] or COMPUTED) * work, 3),
+    }
+
+
+def lacking(families: Sequence[Family], known: Mapping[str, Any], device: str) -> list[Job]:
+    """Jobs of the variants that scenes of the store have not been run with; their limits are known."""
+    have = {
+        (family.scene, k): {run["variant"] for run in item["runs"]}
+        for family in families
+        for k, item in enumerate(known[family.scene]["scenes"])
+    }
+    scenes = {family.scene: [item["parameters"] for item in known[family.scene]["scenes"]] for family in families}
+    jobs = jobs_of(families, scenes, device, 1.0, lambda name, scene, number: number not in have[name, scene])
+    return [job for job in jobs if job.variant not in (FINE, FAMILY[job.family].partner)]
+
+
+def completed(family: Family, before: Mapping[str, Any], tables: Mapping[int, Table]) -> dict[str, Any]:
+    """A family of the store with runs of variants that its scenes lacked; new variants come after those it has."""
+    variants = [_plain(item) for item in family.variants]
+    assert variants[: len(before["variants"])] == before["variants"], "variants of the store have changed"
+    scenes = []
+    for k, item in enumerate(before["scenes"]):
+        runs = {run["variant"]: run for run in item["runs"]}
+        runs |= {number: _run(family, number, row, item["truth"]) for number, row in tables.get(k, {}).items()}
+        scenes.append({**item, "runs": [runs[number] for number in sorted(runs)]})
+    return {**before, "variants": variants, "scenes": scenes}
 
 
 def added(before: Mapping[str, Any] | None, found: Mapping[str, Any]) -> dict[str, Any]:

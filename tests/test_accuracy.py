@@ -7,18 +7,21 @@ import math
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
 
 import warp_mca as mca
 from warp_mca.accuracy import store
-from warp_mca.accuracy.choice import cheapest, choices
+from warp_mca.accuracy.choice import LEAST, WORTH, Choice, best, choices
+from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
 from warp_mca.accuracy.plan import planned
-from warp_mca.accuracy.prediction import NOISE, gaussian_process
+from warp_mca.accuracy.prediction import HIGH, LOW, NOISE, Expected, gaussian_process
 from warp_mca.accuracy.request import Accuracy, accuracy_of
+from warp_mca.accuracy.variant import Variant
 from warp_mca.cli.main import main
 from warp_mca.runs.rate_groups import COSTS
 
@@ -83,24 +86,50 @@ def known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> store.Family:
 def test_the_cheapest_variant_within_the_bound_is_chosen(known: store.Family, v: float, asked: float, refine: float):
     found = choices(known, {"v": v}, Accuracy(share=asked), BOUND[:2], COSTS["cpu"], True)
     assert [item.variant.refine for item in found] == list(REFINES)
-    within = [item for item in found if item.greatest <= asked]
-    assert within[0].variant.refine == refine
-    error = within[0].errors["F_n_first_peak"]
+    chosen = best(found, asked)
+    assert chosen is not None
+    assert chosen.variant.refine == refine
+    error = chosen.errors["F_n_first_peak"]
     assert error is not None
     assert error.size == pytest.approx(0.04 * v / refine**2, rel=0.2)
 
 
-def test_the_most_accurate_variant_will_do_where_its_expected_errors_leave_a_margin(known: store.Family):
-    careful = replace(known, spreads=50.0)
-    found = choices(careful, {"v": 2.0}, Accuracy(share=0.06), BOUND[:2], COSTS["cpu"], True)
-    assert all(item.greatest > 0.06 for item in found)
-    best = cheapest(found, 0.06, 1.0)
-    assert best is not None
-    assert best.variant.refine == 1.4  # errs by 4.1 %
-    assert cheapest(found, 0.04, 1.0) is None
-    assert cheapest(found, 0.06, 2.0) is None
-    assert known.has("impulse")
-    assert not known.has("contact_duration")
+def offer(chance: float, cost: float) -> Choice:
+    """A choice whose only error is within 1 % with this probability."""
+    spread = 0.01 / NormalDist().inv_cdf(0.5 + 0.5 * chance)
+    return Choice(variant=Variant(), number=0, errors={"impulse": Expected(0.0, spread)}, cost=cost)
+
+
+def test_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
+    cheap, dear = offer(0.75, 1.0), offer(0.75 + 0.9 * WORTH, 2.0)
+    assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
+    assert best([cheap, dear], 0.01) is cheap
+    assert best([cheap, offer(0.75 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
+    assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
+    assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
+    assert replace(dear, errors={**dear.errors, "F_n_first_peak": None}).chance(0.01) == 0.0
+
+
+def test_nothing_is_chosen_where_no_variant_is_accurate_enough(known: store.Family):
+    found = choices(known, {"v": 2.0}, Accuracy(share=0.03), BOUND[:2], COSTS["cpu"], True)
+    assert best(found, 0.03) is None  # refine 1.4 errs by 4.1 %
+
+
+def test_estimates_are_those_most_probably_right():
+    """About no mean, d/de [Phi(e / LOW s) - Phi(e / HIGH s)] = 0 has a closed form."""
+    c = math.sqrt(2.0 * math.log(HIGH / LOW) / (LOW**-2 - HIGH**-2))
+    assert Expected(0.0, 0.01).estimate(0.0) == pytest.approx(0.01 * c, rel=0.02)
+    mean = Expected(0.04, 0.001).estimate(0.0)
+    assert LOW * 0.043 < mean < HIGH * 0.037  # sure to be right
+    assert mean == pytest.approx(0.04, rel=0.02)
+    assert Expected(0.0, 0.006).estimate(0.01) < 0.01 < Expected(0.03, 0.006).estimate(0.01)
+
+
+def test_impulses_of_contacts_that_are_cut_off_are_not_bound():
+    assert bound_errors([0.1, 0.2, 0.3], {}) == {"F_n_first_peak": 0.1, "impulse": 0.2, "contact_duration": 0.3}
+    assert bound_errors([0.1, 0.2, None], {})["impulse"] is None
+    found = bound_errors([0.1, 0.2, None], {"contact_duration": "it rolls on", "F_n_first_peak": "it bounces"})
+    assert found == {"F_n_first_peak": None, "impulse": 0.2, "contact_duration": None}
 
 
 def test_variants_may_have_other_elements_unless_the_model_is_to_stay_full(known: store.Family):
@@ -117,6 +146,12 @@ def test_variants_may_have_other_elements_unless_the_model_is_to_stay_full(known
     words = shlex.split(accuracy["command"])
     assert words[:3] == ["warp-mca", "run", "rod_on_wall"]
     assert words[words.index("--element") + 1] == "hex8r"
+    cut_off = fake(plan.scene)
+    cut_off.summary["contact_open_at_end"] = True
+    accuracy = replace(plan, reasons={}).judged(cut_off).summary["accuracy"]
+    assert accuracy["estimate"]["impulse"] is None
+    assert "lengthen duration" in accuracy["reasons"]["impulse"]
+    assert accuracy["estimate"]["F_n_first_peak"] is not None
     full = planned(scene, Accuracy(share=0.09, full=True), {}, "cpu", None, fake)
     assert full is not None
     assert full.variant.element is None
@@ -149,8 +184,9 @@ def test_the_package_has_measurements_of_its_own():
     for family in store._read(store.OWN).values():
         assert len(family.sizes) == len(family.variants)
         assert min(size.steps * size.elements * size.computed for size in family.sizes) > 0.0
+        scene = mca.make_scene(family.scene)
         for variant in family.variants:
-            variant.applied(mca.make_scene(family.scene))
+            variant.applied(scene)
 
 
 def test_point_and_line_loads_have_no_limit():
@@ -166,6 +202,7 @@ def fake(scene: mca.Scene, order: float = 1.5, share: float = 0.0, **options: ob
     summary = {
         "F_n_peaks": [[1e-4, peak]],
         "contact_duration": 1e-3,
+        "contact_open_at_end": False,
         "max_plastic_strain": 0.0,
         "contact_spring_share": {"it": share},
         "n_elements": 100,

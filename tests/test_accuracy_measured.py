@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 import warp_mca as mca
 from benchmarks.accuracy import JSON, PAGE
-from benchmarks.accuracy_calibrate import calibrated
 from benchmarks.accuracy_families import FAMILIES
 from benchmarks.accuracy_judge import cost_ratio, counts, judged, render
-from benchmarks.accuracy_measure import FAMILY, FINE, added, jobs_of, sampled, stored, truth_of, variant_of
+from benchmarks.accuracy_left_out import left_out
+from benchmarks.accuracy_measure import (
+    FAMILY,
+    FINE,
+    added,
+    completed,
+    jobs_of,
+    lacking,
+    sampled,
+    stored,
+    truth_of,
+    variant_of,
+)
 from warp_mca.geometry.refinement import refined
 
 ROD = FAMILY["rod_on_wall"]  # extrapolated with order 1, its first peak has no limit
@@ -53,7 +65,7 @@ def test_choices_are_judged_by_true_errors_estimates_and_cost():
     scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
     other = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [poor, run(2.8, 0.1, 0.9)], "cuda:0")
     assert scene["runs"][0]["worst"] == pytest.approx(0.1 / 2.8)
-    assert scene["runs"][0]["cheapest"][1] == 5  # refine 2.0: 0.1 / 2.0 is within 6 %, 0.1 / 1.4 is not
+    assert scene["runs"][0]["cheapest"][1] == 10  # refine 1.7: 0.1 / 1.7 is within 6 %, 0.1 / 1.4 is not
     found = list(counts({"scenes": [scene, other]}).values())
     assert found == [(2, 3), (3, 3), (2, 3), (1, 3), (2, 3)]
     assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
@@ -92,9 +104,21 @@ def test_what_is_stored_can_be_chosen_from():
         [0.1 / (item.refine or 1.0) for item in ROD.variants], abs=1e-5
     )
     json.dumps(data)
-    found = calibrated("rod_on_wall", data)
-    assert found["spreads"] == 0.3
-    assert 0.5 <= found["scale"] <= 1.4
+    found = left_out("rod_on_wall", data)
+    assert found["chosen"] == found["within"] == found["beside"] == 6
+    assert found["right"] == found["estimates"] == 12
+
+
+def test_variants_that_scenes_lack_are_added_to_the_store():
+    few = replace(ROD, variants=ROD.variants[:6])
+    scenes = sampled(ROD, 1, 3)
+    before = stored(few, scenes, {k: {n: TABLE[n] for n in range(FINE, 6)} for k in range(3)})
+    jobs = lacking([ROD], {"rod_on_wall": before}, "cpu")
+    new = set(range(6, len(ROD.variants)))
+    assert {(job.variant, job.scenes) for job in jobs} == {(number, (k,)) for number in new for k in range(3)}
+    rows = {k: {number: TABLE[number] for number in new} for k in range(3)}
+    assert completed(ROD, before, rows) == stored(ROD, scenes, dict.fromkeys(range(3), TABLE))
+    assert completed(ROD, before, {})["scenes"] == before["scenes"]
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.scene)

@@ -12,7 +12,9 @@ from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
 from warp_mca.runs.rate_groups import StepCost
 
-MARGIN = 0.8  # of what was asked that the expected errors of the most accurate variant may reach [-]
+# Probabilities that all errors of a choice are within what was asked, from measured scenes that are left out in turn:
+LEAST = 0.7  # below this none is made [-]
+WORTH = 0.2  # what twice the cost must add [-]
 
 
 @dataclass(frozen=True)
@@ -24,25 +26,16 @@ class Choice:
         number: of the variant in its family.
         errors: expected, by figure; None where too few scenes tell.
         cost: of its steps, as stored for the device [s].
-        spreads: as in `Family`.
     """
 
     variant: Variant
     number: int
     errors: Mapping[str, Expected | None]
     cost: float
-    spreads: float = 1.0
 
-    @property
-    def likely(self) -> float:
-        """The greatest expected size of an error [-]; infinite where one is not known."""
-        return max((math.inf if error is None else error.size for error in self.errors.values()), default=math.inf)
-
-    @property
-    def greatest(self) -> float:
-        """The greatest error that is allowed for [-]; infinite where one is not known."""
-        bounds = [math.inf if error is None else error.bound(self.spreads) for error in self.errors.values()]
-        return max(bounds, default=0.0)
+    def chance(self, share: float) -> float:
+        """Probability that all errors are within a share [-]; 0 where one is not known."""
+        return math.prod(0.0 if error is None else error.within(share) for error in self.errors.values())
 
 
 def choices(
@@ -60,7 +53,6 @@ def choices(
             number=k,
             errors=expected_errors(family, parameters, k, figures),
             cost=cost_of(family.sizes[k], step, cpu),
-            spreads=family.spreads,
         )
         for k, variant in enumerate(variants)
         if keeps(variant, asked) and family.sizes[k].steps > 0.0 and not (asked.full and variant.element)
@@ -68,17 +60,10 @@ def choices(
     return sorted(found, key=lambda choice: choice.cost)
 
 
-def cheapest(found: Sequence[Choice], share: float, scale: float) -> Choice | None:
-    """The first of `found`, which are in the order of their costs, whose errors stay within a share.
-
-    Where none does by all the spreads allowed for, the one with the least expected errors, if these leave a margin;
-    `scale` is that of estimates. None where that is not so.
-    """
-    within = next((item for item in found if item.greatest <= share), None)
-    if within is not None or not found:
-        return within
-    best = min(found, key=lambda item: item.likely)
-    return best if max(scale, 1.0) * best.likely <= MARGIN * share else None
+def best(found: Sequence[Choice], share: float) -> Choice | None:
+    """The choice whose errors are within a share most probably, for its cost; None where that is hardly probable."""
+    likely = [item for item in found if item.chance(share) >= LEAST]
+    return max(likely, key=lambda item: item.chance(share) - WORTH * math.log2(item.cost), default=None)
 
 
 def keeps(variant: Variant, asked: Accuracy) -> bool:

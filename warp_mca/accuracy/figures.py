@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -45,6 +45,18 @@ def errors(found: Figures, truth: Figures) -> dict[str, float | None]:
         value, true = found.get(name), truth.get(name)
         shares[name] = None if value is None or not true else value / true - 1.0
     return shares
+
+
+def bound_errors(shares: Sequence[float | None], no_limit: Container[str]) -> dict[str, float | None]:
+    """Errors of a run that an asked accuracy binds, by figure, of those in the order of BOUND [-].
+
+    The impulse of a contact that is still open, where durations have a limit, is that so far: it depends on when the
+    run ends, and has None.
+    """
+    found = dict(zip(BOUND, shares, strict=True))
+    if found["contact_duration"] is None and "contact_duration" not in no_limit:
+        found["impulse"] = None
+    return {name: None if name in no_limit else error for name, error in found.items()}
 
 
 def worst(shares: Mapping[str, float | None]) -> float:

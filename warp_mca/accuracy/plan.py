@@ -10,10 +10,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.accuracy.catalogued import source_of
-from warp_mca.accuracy.choice import Choice, cheapest, choices
+from warp_mca.accuracy.choice import Choice, best, choices
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import Pilots, run_pilots
+from warp_mca.accuracy.prediction import SMALL
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.store import Family, family_of
 from warp_mca.accuracy.variant import Variant
@@ -33,7 +34,10 @@ NAMES = {
     "contact_duration": "contact duration",
     "max_plastic_strain": "greatest plastic strain",
 }
+OPEN = "still in contact at the end of the run; lengthen duration"
 STRAIN = "it grows without bound at the edge of the contact as cells shrink"
+
+AT_END = ("contact_duration", "impulse")  # figures that depend on when a run ends in contact
 
 Run = Callable[..., "Result"]  # a scene, and options of `warp_mca.run`
 
@@ -78,6 +82,8 @@ class Plan:
         estimate = self.pilots.estimate(result) if self.pilots else self.expected
         share: dict[str, float | None] = dict.fromkeys(FIGURES)
         reasons = dict(self.reasons)
+        if result.summary["contact_open_at_end"] and "contact_duration" not in reasons:
+            reasons |= dict.fromkeys(AT_END[:1] if self.pilots else AT_END, OPEN)
         for name in FIGURES:
             value = estimate.get(name, "it was not measured")
             if name in reasons:
@@ -165,8 +171,8 @@ def _from_family(
 ) -> Plan | None:
     """By what scenes of the same family have shown; None where no variant is accurate enough."""
     cpu = device.startswith("cpu")
-    found = choices(family, scene.parameters, asked, [name for name in bound if family.has(name)], cost_of(device), cpu)
-    chosen = cheapest(found, asked.share, family.scale)
+    found = choices(family, scene.parameters, asked, bound, cost_of(device), cpu)
+    chosen = best(found, asked.share)
     if chosen is None:
         return None
     variant = replace(chosen.variant, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
@@ -176,24 +182,19 @@ def _from_family(
         asked=asked,
         why=_why(chosen, found, len(family.scenes), family.sizes[chosen.number].elements, asked.share),
         reasons=reasons,
-        expected={name: family.scale * error.size for name, error in chosen.errors.items() if error is not None},
+        expected={name: error.estimate(SMALL * asked.share) for name, error in chosen.errors.items() if error},
     )
 
 
 def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float, share: float) -> str:
-    """One sentence: what is chosen among which variants, the errors expected, and the next cheaper one's."""
+    """One sentence: what is chosen among which variants, how probable it is to do, and the next cheaper one."""
     errors = ", ".join(f"{NAMES[name]} {error.size:.1%}" for name, error in chosen.errors.items() if error)
     cheaper = found[: found.index(chosen)]
-    rank, beside = "cheapest" if chosen.greatest <= share else "most accurate", ""
-    if cheaper and any(cheaper[-1].errors.values()):
-        name, error = max(
-            cheaper[-1].errors.items(), key=lambda item: item[1].bound(chosen.spreads) if item[1] else 0.0
-        )
-        if error is not None:
-            beside = f"; the next cheaper one may miss the {NAMES[name]} by {error.bound(chosen.spreads):.1%}"
+    beside = f"; of the next cheaper one {cheaper[-1].chance(share):.0%}" if cheaper else ""
     return (
-        f"refine {chosen.variant.refine:.3g} with {elements:,.0f} elements is the {rank} of {len(found)} variants "
-        f"that {scenes} scenes like this one allow; errors expected: {errors}{beside}"
+        f"refine {chosen.variant.refine:.3g} with {elements:,.0f} elements, by {scenes} scenes like this one and "
+        f"{len(found)} variants; errors expected: {errors}; probability that all are within {share:.3g}: "
+        f"{chosen.chance(share):.0%}{beside}"
     )
 
 

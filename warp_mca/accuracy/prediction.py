@@ -23,10 +23,14 @@ from warp_mca.accuracy.store import Family
 Array = NDArray[np.float64]
 
 NOISE = 2e-3  # error of the references themselves [-]
+INTERVAL = 5e-3  # the same of durations, which are known to the output interval [-]
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
 NEAR = 0.02  # distance from the median within which it is none [-]
 FEWEST = 4  # scenes from which anything is foreseen
+LOW, HIGH = 0.5, 3.0  # estimates over true errors between which they are right [-]
+SMALL = 0.2  # of what was asked: errors below it need not be told apart [-]
+SIZES = tuple(1e-4 * 1.04**k for k in range(220))  # estimates that are considered [-], up to 0.54
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,24 @@ class Expected:
         """Root of the expected square [-]."""
         return math.hypot(self.mean, self.spread)
 
-    def bound(self, spreads: float) -> float:
-        """Size of the error that many standard deviations from the mean [-]."""
-        return abs(self.mean) + spreads * self.spread
+    def within(self, share: float) -> float:
+        """Probability that the error is no larger than a share [-]."""
+        return _normal((share - self.mean) / self.spread) - _normal((-share - self.mean) / self.spread)
+
+    def estimate(self, small: float) -> float:
+        """The size that is most probably right [-]: LOW to HIGH times the true one, or both of them below `small`."""
+
+        def right(size: float) -> float:
+            if size < small:
+                return self.within(max(size / LOW, small))
+            return self.within(size / LOW) - self.within(size / HIGH)
+
+        return max(SIZES, key=lambda size: (right(size), -abs(math.log(size / self.size))))
+
+
+def _normal(x: float) -> float:
+    """Probability that a value of the standard normal distribution is below x."""
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
 def expected_errors(
@@ -66,28 +85,30 @@ def _expected(family: Family, parameters: Mapping[str, object], variant: int, fi
     points = np.array([family.coordinates(scene.parameters) for scene, _ in known])
     here = np.array(family.coordinates(parameters))
     scale = np.maximum(points.std(axis=0), 1e-12 + 1e-3 * np.abs(points).max(axis=0))
-    return gaussian_process(points / scale, np.array([error for _, error in known]), here / scale)
+    noise = INTERVAL if figure == "contact_duration" else NOISE
+    return gaussian_process(points / scale, np.array([error for _, error in known]), here / scale, noise)
 
 
-def gaussian_process(points: Array, errors: Array, here: Array) -> Expected:
+def gaussian_process(points: Array, errors: Array, here: Array, noise: float = NOISE) -> Expected:
     """What values at scaled points tell of another point.
 
     Args:
         points: features of the measured scenes [-], shape (count, feature_count).
         errors: measured there [-], shape (count,).
         here: features of the scene in question [-], shape (feature_count,).
+        noise: of the errors [-].
     """
     errors = _without_outliers(errors)
     middle = float(np.mean(errors))
     about = errors - middle
-    variance = float(np.mean(about**2)) + NOISE**2
+    variance = float(np.mean(about**2)) + noise**2
     squares = ((points[:, None] - points[None]) ** 2).sum(axis=2)
     lengths = [scale * math.sqrt(points.shape[1]) for scale in LENGTHS]
-    length = max(lengths, key=lambda item: _likelihood(squares, about, variance, item))
-    K = _covariance(squares, variance, length)
+    length = max(lengths, key=lambda item: _likelihood(_covariance(squares, variance, item, noise), about))
+    K = _covariance(squares, variance, length, noise)
     k = variance * np.exp(-((points - here) ** 2).sum(axis=1) / (2.0 * length**2))
     weights = np.linalg.solve(K, k)
-    left = max(variance - float(k @ weights), 0.0) + NOISE**2
+    left = max(variance - float(k @ weights), 0.0) + noise**2
     return Expected(middle + float(weights @ about), math.sqrt(left))
 
 
@@ -98,12 +119,12 @@ def _without_outliers(errors: Array) -> Array:
     return np.clip(errors, middle - reach, middle + reach)
 
 
-def _covariance(squares: Array, variance: float, length: float) -> Array:
-    return variance * np.exp(-squares / (2.0 * length**2)) + NOISE**2 * np.eye(len(squares))
+def _covariance(squares: Array, variance: float, length: float, noise: float) -> Array:
+    return variance * np.exp(-squares / (2.0 * length**2)) + noise**2 * np.eye(len(squares))
 
 
-def _likelihood(squares: Array, about: Array, variance: float, length: float) -> float:
+def _likelihood(covariance: Array, about: Array) -> float:
     """Logarithm of the probability of each value, given all others, summed up (Rasmussen and Williams, 5.10)."""
-    inverse = np.linalg.inv(_covariance(squares, variance, length))
+    inverse = np.linalg.inv(covariance)
     own = 1.0 / np.diag(inverse)
     return float(-0.5 * (np.log(own) + (inverse @ about) ** 2 * own).sum())

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_mca.accuracy.catalogued import source_of
-from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import bad_value
 from warp_mca.scene import Scene
@@ -69,9 +69,6 @@ class Family:
         variants: from which to choose.
         sizes: of each variant.
         scenes: measured.
-        spreads: standard deviations by which an expected error must stay within what is asked [-].
-        scale: of estimated errors over expected ones [-]; this and `spreads` are those that suit the measured scenes
-            best when each is foreseen from the others.
     """
 
     scene: str
@@ -83,13 +80,6 @@ class Family:
     variants: tuple[Variant, ...]
     sizes: tuple[Size, ...]
     scenes: tuple[Measured, ...]
-    spreads: float = 1.0
-    scale: float = 1.0
-
-    def has(self, figure: str) -> bool:
-        """Whether any of its runs has a figure."""
-        errors = (run for scene in self.scenes for run in scene.errors.values())
-        return any(run.get(figure) is not None for run in errors)
 
     def coordinates(self, parameters: Mapping[str, Any]) -> list[float]:
         """Features of a scene of the family [-], logarithms of those that are "log"."""
@@ -156,7 +146,8 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
     )
     scenes = tuple(
         Measured(
-            item["parameters"], {run["variant"]: dict(zip(BOUND, run["errors"], strict=True)) for run in item["runs"]}
+            item["parameters"],
+            {run["variant"]: bound_errors(run["errors"], data["no_limit"]) for run in item["runs"]},
         )
         for item in data["scenes"]
     )
@@ -170,8 +161,6 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
         variants=variants,
         sizes=_sizes(len(variants), data["scenes"]),
         scenes=scenes,
-        spreads=data.get("spreads", 1.0),
-        scale=data.get("scale", 1.0),
     )
 
 

@@ -1,0 +1,93 @@
+"""Owns how good choices of `--accuracy` are for the scenes of the store, each foreseen from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from statistics import fmean, median
+from typing import Any
+
+from benchmarks.accuracy_judge import right
+from warp_mca.accuracy.choice import Choice, best, choices
+from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.prediction import SMALL
+from warp_mca.accuracy.request import Accuracy
+from warp_mca.accuracy.store import Family, family_from
+from warp_mca.runs.rate_groups import COSTS
+
+COARSE, FINE = 0.05, 0.02  # shares that are asked for
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A scene that was left out, with what the others foresee for each of its variants, and its true errors."""
+
+    found: Sequence[Choice]
+    errors: Mapping[int, Mapping[str, float | None]]
+
+    def chosen(self, asked: float) -> Choice | None:
+        """The variant that a run would take; None if none will do, or no figure of it is bound."""
+        choice = best([item for item in self.found if item.number in self.errors], asked)
+        return choice if choice is not None and self._sizes(choice) else None
+
+    def dearer(self, choice: Choice, asked: float) -> float | None:
+        """Cost of a choice over that of the cheapest variant within what is asked; None if none is."""
+        known = [item for item in self.found if item.number in self.errors]
+        within = [item for item in known if self._sizes(item) and self.worst(item) <= asked]
+        return choice.cost / within[0].cost if within else None
+
+    def worst(self, choice: Choice) -> float:
+        """Greatest true error of a choice [-]."""
+        return max(self._sizes(choice), default=0.0)
+
+    def marks(self, choice: Choice, asked: float) -> list[bool]:
+        """Whether its estimates are right, as in `accuracy_judge`."""
+        errors = self.errors[choice.number]
+        pairs = [(own.estimate(SMALL * asked), errors[name]) for name, own in choice.errors.items() if own]
+        return [right(estimate, true, asked) for estimate, true in pairs if true is not None]
+
+    def _sizes(self, choice: Choice) -> list[float]:
+        errors = self.errors[choice.number]
+        return [abs(error) for name in choice.errors if (error := errors[name]) is not None]
+
+
+def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
+    """How good choices of 2 % and 5 % are for each scene of a family of the store: numbers of cases.
+
+    `chosen` of `cases` found a variant; of these `within` what was asked, and `twice`, within twice that; `right` of
+    `estimates`; `cheap` cost at most twice the cheapest variant within, where there is one (`beside`). `median` is the
+    middle of these costs [-], `ratio` the mean cost of 5 % over that of 2 % [-]; None where there is none.
+    """
+    family = family_from(name, data)
+    trials = [_trial(family, k) for k in range(len(family.scenes))]
+    pairs = [(trial, asked, trial.chosen(asked)) for trial in trials for asked in (FINE, COARSE)]
+    made = [(trial, asked, choice) for trial, asked, choice in pairs if choice is not None]
+    shares = [trial.worst(choice) / asked for trial, asked, choice in made]
+    beside = [ratio for trial, asked, choice in made if (ratio := trial.dearer(choice, asked)) is not None]
+    marks = [mark for trial, asked, choice in made for mark in trial.marks(choice, asked)]
+    both = [
+        coarse.cost / fine.cost
+        for (_, _, fine), (_, _, coarse) in zip(pairs[::2], pairs[1::2], strict=True)
+        if fine and coarse
+    ]
+    return {
+        "family": name,
+        "scenes": len(trials),
+        "cases": len(pairs),
+        "chosen": len(made),
+        "within": sum(item <= 1.0 for item in shares),
+        "twice": sum(item <= 2.0 for item in shares),
+        "right": sum(marks),
+        "estimates": len(marks),
+        "cheap": sum(item <= 2.0 for item in beside),
+        "beside": len(beside),
+        "median": round(median(beside), 3) if beside else None,
+        "ratio": round(fmean(both), 3) if both else None,
+    }
+
+
+def _trial(family: Family, k: int) -> Trial:
+    left = family.scenes[k]
+    others = replace(family, scenes=family.scenes[:k] + family.scenes[k + 1 :])
+    bound = [name for name in BOUND if name not in family.no_limit]
+    return Trial(choices(others, left.parameters, Accuracy(share=FINE), bound, COSTS["H100"], False), left.errors)
