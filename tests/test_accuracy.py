@@ -101,10 +101,10 @@ def offer(chance: float, cost: float) -> Choice:
 
 
 def test_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
-    cheap, dear = offer(0.75, 1.0), offer(0.75 + 0.9 * WORTH, 2.0)
-    assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
+    cheap, dear = offer(0.85, 1.0), offer(0.85 + 0.9 * WORTH, 2.0)
+    assert cheap.chance(0.01) == pytest.approx(0.85, rel=1e-12)
     assert best([cheap, dear], 0.01) is cheap
-    assert best([cheap, offer(0.75 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
+    assert best([cheap, offer(0.85 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
     assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
     assert replace(dear, errors={**dear.errors, "F_n_first_peak": None}).chance(0.01) == 0.0
