@@ -247,18 +247,18 @@ class _Loop:
             return
         if part.begins_check and self.written == ROWS:
             self._send()
+        if part.begins_check:
+            self._record(end - first, row, part.begins_search)
+            return
         if part.begins_search:
             self.solver.search(self.state)
-        if part.begins_check:
-            self._record(end - first, row)
-        else:
-            self.solver.step(self.state, end - first)
+        self.solver.step(self.state, end - first)
 
-    def _record(self, count: int, row: int | None) -> None:
+    def _record(self, count: int, row: int | None, searches: bool = False) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
         recording = self.impact.recording
         needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
-        self.solver.record_and_step(self.state, count, needs, row is not None)
+        self.solver.record_and_step(self.state, count, needs, row is not None, searches)
         self.written += 1
         if recording and row is not None:
             recording.take(row, needs)

@@ -183,9 +183,13 @@ class Solver:
             ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
         ]
 
+    @property
+    def _replays_search(self) -> bool:
+        return any(stage.is_replayable for stage in self.contacts)
+
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
-        if any(stage.is_replayable for stage in self.contacts):
+        if self._replays_search:
             self._replay.graph(state, "search", lambda: self._search(state))
         else:
             with wp.ScopedDevice(self.device):
@@ -240,19 +244,28 @@ class Solver:
             stage.schedule()
 
     def record_and_step(
-        self, state: State, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True
+        self,
+        state: State,
+        count: int,
+        needs: frozenset[str] = frozenset(),
+        is_row: bool = True,
+        searches: bool = False,
     ) -> None:
         """Record the state, as a row of the history or as a check between two, then advance `count` steps.
 
-        A row may come with a frame of `needs`.
+        A row may come with a frame of `needs`. If it `searches`, a search comes first; on a GPU elements are computed
+        beside it.
 
         Raises:
             Exception: what a thread raised.
         """
-        name = f"{'record' if is_row else 'check'} {sorted(needs)}"
+        if searches and not self._replays_search:
+            self.search(state)
+            searches = False
+        name = f"{'search, ' if searches else ''}{'record' if is_row else 'check'} {sorted(needs)}"
 
         def record(split: Split = whole) -> None:
-            self._step(Step(state, split, True, is_row, needs))
+            self._step(Step(state, split, True, is_row, needs, searches))
 
         if self._replay.pool:
             self._replay.stages(state, name, record)

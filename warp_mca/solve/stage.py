@@ -13,7 +13,8 @@ from warp_mca.solve.threads import Split, whole
 if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
-MAIN, BESIDE, ASIDE, SUMS = "main", "beside", "aside", "sums"  # streams of a GPU; a CPU runs stages one by one
+# streams of a GPU; a CPU runs stages one by one
+MAIN, BESIDE, ASIDE, TOUCH, SUMS, SHOWN = "main", "beside", "aside", "touch", "sums", "shown"
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Step:
         records: whether the step also records the state at its start.
         is_row: whether the record is a row of the history, and not a check between two.
         needs: of recorders, that a frame of this step must hold.
+        searches: whether the search for contact is one of its stages.
     """
 
     state: State
@@ -33,6 +35,7 @@ class Step:
     records: bool = False
     is_row: bool = False
     needs: frozenset[str] = frozenset()
+    searches: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,8 @@ class Stage:
     Attributes:
         name: as docs/architecture.md lists it.
         launch: launches its kernels for a step.
-        stream: MAIN; BESIDE or ASIDE others of its group; SUMS, which nothing waits for before the end of the step.
+        stream: MAIN; BESIDE or ASIDE others of its group; TOUCH, beside those of the next group too; SUMS or SHOWN, which
+            nothing waits for before the end of the step.
         only_records: whether it is launched only in steps that record.
     """
 
@@ -59,24 +63,24 @@ class Streams:
     """Launches groups of stages: those of a group may overlap on a GPU, one group follows the other."""
 
     def __init__(self, cuda: bool) -> None:
-        """On the current device. Streams beside the main one have few threads and wait long for memory: they take what
-        room there is first."""
-        self.streams: dict[str, Any] = {BESIDE: None, ASIDE: None, SUMS: None}
+        """On the current device."""
+        self.streams: dict[str, Any] = dict.fromkeys((BESIDE, ASIDE, TOUCH, SUMS, SHOWN))
         if cuda:
             self.streams = {name: wp.Stream(priority=-1) for name in self.streams}
 
     def run(self, groups: Sequence[Group], step: Step) -> None:
         """Launch the stages of a step in their order."""
-        summing = False
+        before: set[str] = set()  # streams of the group before
+        summing: set[str] = set()
         for group in groups:
             stages = [stage for stage in group if step.records or not stage.only_records]
-            if stages:
-                summing = summing or any(stage.stream == SUMS for stage in stages)
-                self._run_group(stages, step)
-        if summing and self.streams[SUMS]:
-            wp.wait_stream(self.streams[SUMS])
+            used = self._run_group(stages, step) if stages else set()
+            self._join(used & {BESIDE, ASIDE} | before & {TOUCH})
+            before, summing = used, summing | used & {SUMS, SHOWN}
+        self._join(before & {TOUCH} | summing)
 
-    def _run_group(self, stages: Group, step: Step) -> None:
+    def _run_group(self, stages: Group, step: Step) -> set[str]:
+        """The streams beside the main one in which there is something."""
         used = {stage.stream for stage in stages if stage.stream != MAIN and self.streams[stage.stream]}
         before = wp.record_event() if used else None
         entered: set[str] = set()
@@ -89,6 +93,8 @@ class Streams:
                     wp.wait_event(before)
                     entered.add(stage.stream)
                 stage.launch(step)
-        for name in (BESIDE, ASIDE):
-            if name in used:
-                wp.wait_stream(self.streams[name])
+        return used
+
+    def _join(self, names: set[str]) -> None:
+        for name in (name for name in self.streams if name in names):
+            wp.wait_stream(self.streams[name])

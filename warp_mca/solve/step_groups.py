@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.stage import ASIDE, BESIDE, SUMS, Group, Stage, Step
+from warp_mca.solve.stage import ASIDE, BESIDE, SHOWN, SUMS, TOUCH, Group, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -47,17 +47,18 @@ def _forces(solver: Solver, level: int | None, common: bool, chain: int | None =
     work, nodes = solver.work, solver.nodes
     active = [e for e in solver.elements if level is None or e.parts(level, chain)]
     found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level, chain)) for e in active]
-    found += [
-        Stage("contact", lambda s, c=c: c.launch(work, s.state, nodes.dt, s.split), BESIDE)
-        for c in (solver.contacts if common else [])
-    ]
+    for contact in solver.contacts if common else []:
+        found += [
+            Stage("search", lambda s, c=contact: s.searches and c.search(work, s.state), TOUCH, only_records=True),
+            Stage("contact", lambda s, c=contact: c.launch(work, s.state, nodes.dt, s.split), TOUCH),
+        ]
     if common and solver.couplings.count:
         found.append(Stage("couplings: responses", solver.couplings.find_responses, ASIDE))
     return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
 
 
 def _energies(solver: Solver) -> Group:
-    """Stresses and energies at t(n), before nodes move."""
+    """Stresses and energies at t(n), before nodes move; contact may go on meanwhile."""
 
     def before(step: Step) -> None:
         solver.nodes.begin_record(step.state)
@@ -73,12 +74,26 @@ def _energies(solver: Solver) -> Group:
 
 
 def _sums(solver: Solver) -> Group:
-    """Sums over springs and elements."""
+    """Sums over springs and elements, and what is shown of stresses at their corners."""
     records = solver.records
+
+    def show(step: Step) -> None:
+        if solver.output and step.is_row:
+            solver.output.show(step.needs)
+
+    def touch(step: Step) -> None:
+        if solver.output and step.is_row:
+            solver.output.before_motion(step.state, step.needs)
+
     springs = [
-        Stage("spring sums", lambda s, c=c: records.sum_springs(s, c), SUMS, only_records=True) for c in solver.contacts
+        Stage("spring sums", lambda s, c=c: records.sum_springs(s, c), TOUCH, only_records=True) for c in solver.contacts
     ]
-    return [*springs, Stage("element sums", records.sum_elements, SUMS, only_records=True)]
+    return [
+        Stage("frames: contact", touch, only_records=True),
+        Stage("element sums", records.sum_elements, SUMS, only_records=True),
+        *springs,
+        Stage("paths, frames: nodal stress", show, SHOWN, only_records=True),
+    ]
 
 
 def _advance(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
