@@ -62,6 +62,7 @@ def wholes(impact: Impact) -> Iterator[Part]:
         solver._schedule()
         solver._step(Step(state, records=True, is_row=True))
         solver._steps(state, count - 1)
+        solver._streams.finish()
 
     yield "substep", steps, count * (rates.substeps if rates else 1)
     yield "interval with its record", interval, 1

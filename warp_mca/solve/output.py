@@ -54,12 +54,9 @@ class NodalStress:
         self.plastic = wp.zeros(len(nodes), dtype=wp.float32)
 
     def launch(self, state: State) -> None:
-        """Compute stresses at the corners of elements for the state's displacements."""
+        """Compute it for the state's displacements."""
         for stage, element, first in self.parts:
             stage.stresses(self.solver.work, state, element, first, self.points)
-
-    def gather(self) -> None:
-        """Mean of these at nodes."""
         outputs = [self.tensor, self.von_mises, self.plastic]
         wp.launch(output.nodal_stress, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
 
@@ -120,42 +117,30 @@ class Output:
 
     def before_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
-        for stress in self._stresses(needs):
-            stress.launch(state)
-        work = self.solver.work
+        work, u = self.solver.work, self.solver.work.at_record(state)
+        if self.has_probes:
+            self.probe_stress.launch(state)
+            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, work.row]
+            outputs = [self.path_stress, self.arrays[PATHS]["von_mises"]]
+            wp.launch(output.sample_probes, len(self.probe_corner), inputs=inputs, outputs=outputs)
         if SURFACE in needs:
+            self.skin_stress.launch(state)
             points = self.arrays[SURFACE]["points"]
-            wp.launch(output.positions, len(points), inputs=[work.X, state.u, self.skin_node], outputs=[points])
+            wp.launch(output.positions, len(points), inputs=[work.X, u, self.skin_node], outputs=[points])
         if VOLUME in needs:
+            self.volume_stress.launch(state)
             to = self.arrays[VOLUME]["displacement"]
-            wp.launch(output.displacements, len(to), inputs=[state.u], outputs=[to])
+            wp.launch(output.displacements, len(to), inputs=[u], outputs=[to])
 
-    def before_motion(self, state: State, needs: frozenset[str]) -> None:
-        """Launch what is read off springs, when contact has been computed too."""
-        if CONTACT not in needs:
-            return
-        work, first = self.solver.work, 0
-        for stage in self.solver.contacts:
-            inputs = [work.X, state.u, stage.slave, stage.mu, stage.sides, first]
+    def contact_points(self, state: State, needs: frozenset[str]) -> None:
+        """Launch what is read off springs, once contact is computed and before nodes move."""
+        first = 0
+        for stage in self.solver.contacts if CONTACT in needs else []:
+            inputs = [self.solver.work.X, state.u, stage.slave, stage.mu, stage.sides, first]
             inputs.append(state.contacts[stage.index].spring)
             outputs = list(self.arrays[CONTACT].values())
             wp.launch(output.contact_points, len(stage.slave), inputs=inputs, outputs=outputs)
             first += len(stage.slave)
-
-    def show(self, needs: frozenset[str]) -> None:
-        """Launch what follows from the stresses of `before_step`, while nodes move."""
-        for stress in self._stresses(needs):
-            stress.gather()
-        if self.has_probes:
-            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, self.solver.work.row]
-            outputs = [self.path_stress, self.arrays[PATHS]["von_mises"]]
-            wp.launch(output.sample_probes, len(self.probe_corner), inputs=inputs, outputs=outputs)
-
-    def _stresses(self, needs: frozenset[str]) -> list[NodalStress]:
-        """Those of probes, and those that a frame needs."""
-        found = [self.probe_stress] if self.has_probes else []
-        found += [self.skin_stress] if SURFACE in needs else []
-        return found + ([self.volume_stress] if VOLUME in needs else [])
 
     def after_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what needs the velocities on both sides of t(n)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import warp as wp
 
@@ -13,8 +13,14 @@ from warp_mca.solve.threads import Split, whole
 if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
-# streams of a GPU; a CPU runs stages one by one
-MAIN, BESIDE, ASIDE, TOUCH, SUMS, SHOWN = "main", "beside", "aside", "touch", "sums", "shown"
+# Streams of a GPU; a CPU runs stages one by one. The main one waits for BESIDE and ASIDE at the end of their group, for
+# BEYOND at the end of the next, for SUMS, SHOWN, SPRINGS and LISTS at the end of the step, for LAST at the end of the
+# steps that are launched together.
+MAIN, BESIDE, ASIDE, BEYOND = "main", "beside", "aside", "beyond"
+SUMS, SHOWN, SPRINGS, LISTS, LAST = "sums", "shown", "springs", "lists", "last"
+_WITHIN, _ENDS = {BESIDE, ASIDE}, {SUMS, SHOWN, SPRINGS, LISTS}
+
+Search = Literal["", "before", "after"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class Step:
         records: whether the step also records the state at its start.
         is_row: whether the record is a row of the history, and not a check between two.
         needs: of recorders, that a frame of this step must hold.
-        searches: whether the search for contact is one of its stages.
+        search: of contact as one of its stages: "" for none, else before the contact of this step or after it.
     """
 
     state: State
@@ -35,7 +41,7 @@ class Step:
     records: bool = False
     is_row: bool = False
     needs: frozenset[str] = frozenset()
-    searches: bool = False
+    search: Search = ""
 
 
 @dataclass(frozen=True)
@@ -45,15 +51,16 @@ class Stage:
     Attributes:
         name: as docs/architecture.md lists it.
         launch: launches its kernels for a step.
-        stream: MAIN; BESIDE or ASIDE others of its group; TOUCH, beside those of the next group too; SUMS or SHOWN, which
-            nothing waits for before the end of the step.
+        stream: MAIN, or what else stands at the head of this module.
         only_records: whether it is launched only in steps that record.
+        after: streams of which it waits for what is in them so far.
     """
 
     name: str
     launch: Callable[[Step], None]
     stream: str = MAIN
     only_records: bool = False
+    after: tuple[str, ...] = ()
 
 
 Group = Sequence[Stage]
@@ -64,20 +71,24 @@ class Streams:
 
     def __init__(self, cuda: bool) -> None:
         """On the current device."""
-        self.streams: dict[str, Any] = dict.fromkeys((BESIDE, ASIDE, TOUCH, SUMS, SHOWN))
+        self.streams: dict[str, Any] = dict.fromkeys((*sorted(_WITHIN), BEYOND, *sorted(_ENDS), LAST))
+        self._open: set[str] = set()
         if cuda:
-            self.streams = {name: wp.Stream(priority=-1) for name in self.streams}
+            self.streams = {name: wp.Stream() for name in self.streams}
 
     def run(self, groups: Sequence[Group], step: Step) -> None:
-        """Launch the stages of a step in their order."""
+        """Launch the stages of a step in their order; `finish` follows steps that record."""
         before: set[str] = set()  # streams of the group before
-        summing: set[str] = set()
         for group in groups:
             stages = [stage for stage in group if step.records or not stage.only_records]
             used = self._run_group(stages, step) if stages else set()
-            self._join(used & {BESIDE, ASIDE} | before & {TOUCH})
-            before, summing = used, summing | used & {SUMS, SHOWN}
-        self._join(before & {TOUCH} | summing)
+            self._join(used & _WITHIN | before & {BEYOND})
+            before = used
+        self._join(self._open - {LAST})
+
+    def finish(self) -> None:
+        """Wait for all that is under way."""
+        self._join(self._open)
 
     def _run_group(self, stages: Group, step: Step) -> set[str]:
         """The streams beside the main one in which there is something."""
@@ -92,9 +103,13 @@ class Streams:
                 if before and stage.stream not in entered:
                     wp.wait_event(before)
                     entered.add(stage.stream)
+                for name in (name for name in stage.after if name in entered):
+                    wp.wait_stream(self.streams[name])
                 stage.launch(step)
+        self._open |= used
         return used
 
     def _join(self, names: set[str]) -> None:
-        for name in (name for name in self.streams if name in names):
+        for name in sorted(names & self._open):
             wp.wait_stream(self.streams[name])
+        self._open -= names

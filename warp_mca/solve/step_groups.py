@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warp_mca.solve.stage import ASIDE, BESIDE, SHOWN, SUMS, TOUCH, Group, Stage, Step
+from warp_mca.solve.stage import (
+    ASIDE,
+    BESIDE,
+    BEYOND,
+    LAST,
+    LISTS,
+    MAIN,
+    SHOWN,
+    SPRINGS,
+    SUMS,
+    Group,
+    Search,
+    Stage,
+    Step,
+)
 
 if TYPE_CHECKING:
     from warp_mca.solve.solver import Solver
@@ -44,55 +58,87 @@ def _forces(solver: Solver, level: int | None, common: bool, chain: int | None =
     Elements go before contact: blocks of threads that find a multiprocessor at rest divide its memory as they want it,
     and patches want another division than contact.
     """
-    work, nodes = solver.work, solver.nodes
+    work = solver.work
     active = [e for e in solver.elements if level is None or e.parts(level, chain)]
     found = [Stage("element forces", lambda s, e=e: e.launch(work, s.state, s.split, level, chain)) for e in active]
-    for contact in solver.contacts if common else []:
-        found += [
-            Stage("search", lambda s, c=contact: s.searches and c.search(work, s.state), TOUCH, only_records=True),
-            Stage("contact", lambda s, c=contact: c.launch(work, s.state, nodes.dt, s.split), TOUCH),
-        ]
+    if common:
+        found += _contact(solver)
     if common and solver.couplings.count:
         found.append(Stage("couplings: responses", solver.couplings.find_responses, ASIDE))
-    return [*found, Stage("next record", solver.records.next_row, BESIDE, only_records=True)]
+    return [
+        *found,
+        Stage("next record", solver.records.next_row, BESIDE, only_records=True),
+        Stage("displacements kept", lambda s: work.keep(s.state), BESIDE, only_records=True),
+        *(_late_search(solver) if common else []),
+    ]
+
+
+def _contact(solver: Solver) -> Group:
+    """Contact of each pass, after the search or ahead of it."""
+    work, dt = solver.work, solver.nodes.dt
+    passes = [Stage("contact", lambda s, c=c: c.launch(work, s.state, dt, s.split), BEYOND) for c in solver.contacts]
+    search = Stage("search before contact", lambda s: _search(solver, s, "before"), BEYOND, only_records=True)
+    return [search, *passes] if passes else []
+
+
+def _late_search(solver: Solver) -> Group:
+    """Search while nodes move, for the steps that follow."""
+    if not solver.contacts:
+        return []
+
+    def search(step: Step) -> None:
+        _search(solver, step, "after")
+
+    return [Stage("search after contact", search, LISTS, only_records=True, after=(BESIDE, BEYOND))]
+
+
+def _search(solver: Solver, step: Step, when: Search) -> None:
+    """Search in steps that do so then, with the displacements at their start."""
+    if step.search == when:
+        for contact in solver.contacts:
+            contact.search(solver.work, step.state, solver.work.at_record(step.state))
 
 
 def _energies(solver: Solver) -> Group:
-    """Stresses and energies at t(n), before nodes move; contact may go on meanwhile."""
+    """Stresses and energies at t(n); a GPU takes them from the displacements that were kept, while nodes move."""
+    work = solver.work
 
-    def before(step: Step) -> None:
-        solver.nodes.begin_record(step.state)
+    def show(step: Step) -> None:
         if solver.output and step.is_row:
             solver.output.before_step(step.state, step.needs)
-        solver.sensors.before_step(step)
 
     energies = [
-        Stage("element energies", lambda s, e=e: e.energies(solver.work, s.state, s.split), only_records=True)
+        Stage(
+            "element energies",
+            lambda s, e=e: e.energies(work, s.state, s.split, work.at_record(s.state)),
+            SUMS,
+            only_records=True,
+        )
         for e in solver.elements
     ]
-    return [Stage("paths, frames: stress", before, BESIDE, only_records=True), *energies]
+    return [
+        *energies,
+        Stage("paths, frames: stress", show, SHOWN, only_records=True),
+        Stage("places, sections", lambda s: solver.sensors.before_step(s), BESIDE, only_records=True),
+    ]
 
 
 def _sums(solver: Solver) -> Group:
-    """Sums over springs and elements, and what is shown of stresses at their corners."""
+    """Sums over springs and elements."""
     records = solver.records
 
     def show(step: Step) -> None:
         if solver.output and step.is_row:
-            solver.output.show(step.needs)
-
-    def touch(step: Step) -> None:
-        if solver.output and step.is_row:
-            solver.output.before_motion(step.state, step.needs)
+            solver.output.contact_points(step.state, step.needs)
 
     springs = [
-        Stage("spring sums", lambda s, c=c: records.sum_springs(s, c), TOUCH, only_records=True) for c in solver.contacts
+        Stage("spring sums", lambda s, c=c: records.sum_springs(s, c), SPRINGS, only_records=True)
+        for c in solver.contacts
     ]
     return [
-        Stage("frames: contact", touch, only_records=True),
+        Stage("frames: contact", show, only_records=True),
         Stage("element sums", records.sum_elements, SUMS, only_records=True),
         *springs,
-        Stage("paths, frames: nodal stress", show, SHOWN, only_records=True),
     ]
 
 
@@ -122,11 +168,17 @@ def _follow(solver: Solver, common: bool) -> Group:
     found = [Stage("slaves of ties", solver.ties.follow)] if common and solver.ties.count else []
     if common and solver.model.hinge_loads:
         found.append(Stage("joint torques", lambda s: solver.loads.torques(s.state, dt, dt)))
+    if solver.nodes.rated:
+        found.append(Stage("velocities kept", lambda s: solver.nodes.end_record(s.state), only_records=True))
     return found
 
 
 def _motion(solver: Solver) -> Group:
-    """Sums over nodes and velocities at t(n), from those half a step before and after it."""
+    """Sums over nodes and velocities at t(n), from those half a step before and after it.
+
+    Where nodes have kept all that the sums read, these may go on beside later steps.
+    """
+    kept = solver.nodes.rated and not solver.constraints.driven
 
     def after(step: Step) -> None:
         if solver.output and step.is_row:
@@ -137,6 +189,7 @@ def _motion(solver: Solver) -> Group:
         Stage(
             "motion sums",
             lambda s: solver.records.sum_motion(s, solver.constraints, solver.nodes),
+            LAST if kept else MAIN,
             only_records=True,
         ),
         Stage("frames: velocity", after, only_records=True),
