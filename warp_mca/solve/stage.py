@@ -100,7 +100,7 @@ class Streams:
                 stage.launch(step)
                 continue
             with wp.ScopedStream(self.streams[stage.stream], sync_enter=False):
-                if before and stage.stream not in entered:
+                if before is not None and stage.stream not in entered:
                     wp.wait_event(before)
                     entered.add(stage.stream)
                 for name in (name for name in stage.after if name in entered):
