@@ -210,16 +210,27 @@ class ContactStage:
 
     def search(self, work: Workspace, state: State, u: wp.array | None = None) -> None:
         """Broad phase: list what each slave may touch until the next search; by the state's displacements, or u [m]."""
+        u = state.u if u is None else u
+        self.find_boxes(work, u)
+        self.list_faces(work, state, u)
+
+    def find_boxes(self, work: Workspace, u: wp.array) -> None:
+        """First part of a search: boxes around the master's faces, and the tree of these."""
         if self.on_plane:
             return
-        u = state.u if u is None else u
-        own, slaves = state.contacts[self.index], [work.X, u, self.slave]
         inputs = [work.X, u, self.face, self.face_scene, self.origin, self.margin]
-        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper, own.face_count])
+        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper])
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
         else:
             self.bvh.refit()
+
+    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
+        """Second part of a search: the lists, which contact reads."""
+        if self.on_plane:
+            return
+        own, slaves = state.contacts[self.index], [work.X, u, self.slave]
+        own.face_count.zero_()
         wp.launch(
             self.find,
             len(self.slave),

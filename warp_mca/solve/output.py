@@ -54,9 +54,12 @@ class NodalStress:
         self.plastic = wp.zeros(len(nodes), dtype=wp.float32)
 
     def launch(self, state: State) -> None:
-        """Compute it for the state's displacements."""
+        """Stress at the corners of elements for the displacements of the record."""
         for stage, element, first in self.parts:
             stage.stresses(self.solver.work, state, element, first, self.points)
+
+    def gather(self) -> None:
+        """Their means at nodes."""
         outputs = [self.tensor, self.von_mises, self.plastic]
         wp.launch(output.nodal_stress, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
 
@@ -118,19 +121,29 @@ class Output:
     def before_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
         work, u = self.solver.work, self.solver.work.at_record(state)
-        if self.has_probes:
-            self.probe_stress.launch(state)
-            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, work.row]
-            outputs = [self.path_stress, self.arrays[PATHS]["von_mises"]]
-            wp.launch(output.sample_probes, len(self.probe_corner), inputs=inputs, outputs=outputs)
+        for stress in self._stresses(needs):
+            stress.launch(state)
         if SURFACE in needs:
-            self.skin_stress.launch(state)
             points = self.arrays[SURFACE]["points"]
             wp.launch(output.positions, len(points), inputs=[work.X, u, self.skin_node], outputs=[points])
         if VOLUME in needs:
-            self.volume_stress.launch(state)
             to = self.arrays[VOLUME]["displacement"]
             wp.launch(output.displacements, len(to), inputs=[u], outputs=[to])
+
+    def nodal_stress(self, needs: frozenset[str]) -> None:
+        """Launch what follows from stresses at corners, whatever the state is by then."""
+        for stress in self._stresses(needs):
+            stress.gather()
+        if self.has_probes:
+            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, self.solver.work.row]
+            outputs = [self.path_stress, self.arrays[PATHS]["von_mises"]]
+            wp.launch(output.sample_probes, len(self.probe_corner), inputs=inputs, outputs=outputs)
+
+    def _stresses(self, needs: frozenset[str]) -> list[NodalStress]:
+        """Of probes, and those that a frame needs."""
+        found = [self.probe_stress] if self.has_probes else []
+        found += [self.skin_stress] if SURFACE in needs else []
+        return found + ([self.volume_stress] if VOLUME in needs else [])
 
     def contact_points(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off springs, once contact is computed and before nodes move."""

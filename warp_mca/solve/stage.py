@@ -103,10 +103,10 @@ class Streams:
                 if before is not None and stage.stream not in entered:
                     wp.wait_event(before)
                     entered.add(stage.stream)
-                for name in (name for name in stage.after if name in entered):
+                for name in (name for name in stage.after if name in self._open):
                     wp.wait_stream(self.streams[name])
                 stage.launch(step)
-        self._open |= used
+                self._open.add(stage.stream)
         return used
 
     def _join(self, names: set[str]) -> None:

@@ -15,7 +15,6 @@ from warp_mca.solve.stage import (
     SPRINGS,
     SUMS,
     Group,
-    Search,
     Stage,
     Step,
 )
@@ -76,9 +75,13 @@ def _forces(solver: Solver, level: int | None, common: bool, chain: int | None =
 def _contact(solver: Solver) -> Group:
     """Contact of each pass, after the search or ahead of it."""
     work, dt = solver.work, solver.nodes.dt
+
+    def search(step: Step) -> None:
+        for contact in solver.contacts if step.search == "before" else []:
+            contact.search(work, step.state)
+
     passes = [Stage("contact", lambda s, c=c: c.launch(work, s.state, dt, s.split), BEYOND) for c in solver.contacts]
-    search = Stage("search before contact", lambda s: _search(solver, s, "before"), BEYOND, only_records=True)
-    return [search, *passes] if passes else []
+    return [Stage("search before contact", search, BEYOND, only_records=True), *passes] if passes else []
 
 
 def _late_search(solver: Solver) -> Group:
@@ -86,24 +89,27 @@ def _late_search(solver: Solver) -> Group:
     if not solver.contacts:
         return []
 
-    def search(step: Step) -> None:
-        _search(solver, step, "after")
+    work = solver.work
 
-    return [Stage("search after contact", search, LISTS, only_records=True, after=(BESIDE, BEYOND))]
+    def boxes(step: Step) -> None:
+        for contact in solver.contacts if step.search == "after" else []:
+            contact.find_boxes(work, work.at_record(step.state))
 
+    def lists(step: Step) -> None:
+        for contact in solver.contacts if step.search == "after" else []:
+            contact.list_faces(work, step.state, work.at_record(step.state))
 
-def _search(solver: Solver, step: Step, when: Search) -> None:
-    """Search in steps that do so then, with the displacements at their start."""
-    if step.search == when:
-        for contact in solver.contacts:
-            contact.search(solver.work, step.state, solver.work.at_record(step.state))
+    return [
+        Stage("boxes of faces", boxes, LISTS, only_records=True, after=(BESIDE,)),
+        Stage("search after contact", lists, LISTS, only_records=True, after=(BEYOND,)),
+    ]
 
 
 def _energies(solver: Solver) -> Group:
     """Stresses and energies at t(n); a GPU takes them from the displacements that were kept, while nodes move."""
     work = solver.work
 
-    def show(step: Step) -> None:
+    def stress(step: Step) -> None:
         if solver.output and step.is_row:
             solver.output.before_step(step.state, step.needs)
 
@@ -118,27 +124,32 @@ def _energies(solver: Solver) -> Group:
     ]
     return [
         *energies,
-        Stage("paths, frames: stress", show, SHOWN, only_records=True),
+        Stage("paths, frames: stress", stress, SHOWN, only_records=True),
         Stage("places, sections", lambda s: solver.sensors.before_step(s), BESIDE, only_records=True),
     ]
 
 
 def _sums(solver: Solver) -> Group:
-    """Sums over springs and elements."""
+    """Sums over springs and elements, and what is shown of springs and of stresses at the corners of elements."""
     records = solver.records
 
-    def show(step: Step) -> None:
+    def points(step: Step) -> None:
         if solver.output and step.is_row:
             solver.output.contact_points(step.state, step.needs)
+
+    def nodal(step: Step) -> None:
+        if solver.output and step.is_row:
+            solver.output.nodal_stress(step.needs)
 
     springs = [
         Stage("spring sums", lambda s, c=c: records.sum_springs(s, c), SPRINGS, only_records=True)
         for c in solver.contacts
     ]
     return [
-        Stage("frames: contact", show, only_records=True),
+        Stage("frames: contact", points, only_records=True),
         Stage("element sums", records.sum_elements, SUMS, only_records=True),
         *springs,
+        Stage("paths, frames: nodal stress", nodal, LAST, only_records=True, after=(SHOWN,)),
     ]
 
 
