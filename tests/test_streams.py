@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
-from impacts import begun
+import warp as wp
+from impacts import begun, figures, finished
 from test_multi_rate import hinged
 
 from warp_mca.solve import stage
+from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.replay import Replay
 from warp_mca.solve.solver import Solver
 from warp_mca.solve.stage import Stage, Step, Streams
+from warp_mca.solve.state import State
+from warp_mca.solve.threads import flushing
 
 ENERGIES = {"element energies", "paths, frames: stress", "element sums", "spring sums"}
 Done = set[str]
@@ -101,3 +107,34 @@ def test_steps_without_a_record_wait_for_contact_before_nodes_move(monkeypatch: 
     assert order.waits["free nodes"] == order.waits["joints, driven nodes"] == {"element forces", "contact"}
     assert order.waits["contact"] == set() and order.main.done == set(order.waits)
     streams.finish()
+
+
+def eager(self: Replay, state: State, name: str, body: Callable[[], None]) -> None:
+    """In place of `Replay.graph`: a CPU's graphs hold no search."""
+    with wp.ScopedDevice(self.device), flushing(self.device):
+        body()
+
+
+@pytest.mark.parametrize("groups", [None, 3])
+def test_a_search_behind_contact_gives_the_bits_of_one_before_it(groups: int | None, monkeypatch: pytest.MonkeyPatch):
+    """As on a GPU: contact of the step that records takes the lists of the search before."""
+    scene = hinged(duration=4e-5)
+    plain = finished(scene, multi_rate=groups)
+    assert plain.steps.spare and plain.state.contacts[0].count.numpy().any()
+    monkeypatch.setattr(Replay, "graph", eager)
+    monkeypatch.setattr(ContactStage, "is_replayable", property(lambda own: own.bvh is not None))
+    late = begun(scene, multi_rate=groups)
+    late.solver.work.u_record = wp.zeros(late.solver.model.node_count, dtype=wp.vec3d, device="cpu")
+    listed = []
+    own = ContactStage.list_faces
+
+    def list_faces(self: ContactStage, *given: Any) -> None:
+        listed.append(self.index)
+        own(self, *given)
+
+    monkeypatch.setattr(ContactStage, "list_faces", list_faces)
+    late.advance()
+    assert len(listed) > late.steps.intervals // late.steps.intervals_per_search
+    assert late.state.differences(plain.state) == []
+    known, found = figures(plain), figures(late)
+    assert [name for name in known if known[name].tobytes() != found[name].tobytes()] == []
