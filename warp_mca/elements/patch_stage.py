@@ -115,11 +115,8 @@ class PatchStage(ElementStage):
         self.blocks = min(len(self.patches.head), max(self.most // 2, self.most - room))
 
     def schedule(self) -> None:
-        """Patches in which elements yield come before the others, because they take longer.
-
-        Not where elements take steps of their own: few launches are of all patches then.
-        """
-        if not self.scheduled or self.chains or self.blocks >= len(self.patches.head):
+        """Patches in which elements yield come before the others, because they take longer."""
+        if not self.scheduled or self.blocks >= len(self.patches.head):
             return
         for kernel, inputs, output in (
             (patch.count_flowing, [self.flowing], self.flowing_of_run),

@@ -215,6 +215,8 @@ class Solver:
             self._step(Step(state))
 
     def _schedule(self) -> None:
+        if self.chains:  # few launches are of all elements then
+            return
         for stage in self.elements:
             stage.schedule()
 
