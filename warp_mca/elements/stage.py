@@ -175,9 +175,11 @@ class ElementStage:
 
         split(self.count, launch, ELEMENTS)
 
-    def stresses(self, work: Workspace, state: State, element: wp.array, first: int, stress: wp.array) -> None:
-        """Stress [Pa] and plastic strain [-] at the corners of some elements at a record, from slot `first` on."""
-        own, u = state.elements[self.index], work.at_record(state)
+    def stresses(
+        self, work: Workspace, state: State, u: wp.array, element: wp.array, first: int, stress: wp.array
+    ) -> None:
+        """Stress [Pa] and plastic strain [-] at the corners of some elements with displacements u, from `first` on."""
+        own = state.elements[self.index]
         inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, u, element, first]
         inputs += self.more(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)

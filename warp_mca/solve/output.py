@@ -54,9 +54,14 @@ class NodalStress:
         self.plastic = wp.zeros(len(nodes), dtype=wp.float32)
 
     def launch(self, state: State) -> None:
-        """Stress at the corners of elements for the displacements of the record."""
+        """Compute it for the state's displacements."""
+        self.find_corners(state, state.u)
+        self.gather()
+
+    def find_corners(self, state: State, u: wp.array) -> None:
+        """Stress at the corners of elements with displacements u [m]."""
         for stage, element, first in self.parts:
-            stage.stresses(self.solver.work, state, element, first, self.points)
+            stage.stresses(self.solver.work, state, u, element, first, self.points)
 
     def gather(self) -> None:
         """Their means at nodes."""
@@ -122,7 +127,7 @@ class Output:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
         work, u = self.solver.work, self.solver.work.at_record(state)
         for stress in self._stresses(needs):
-            stress.launch(state)
+            stress.find_corners(state, u)
         if SURFACE in needs:
             points = self.arrays[SURFACE]["points"]
             wp.launch(output.positions, len(points), inputs=[work.X, u, self.skin_node], outputs=[points])
