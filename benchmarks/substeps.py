@@ -49,6 +49,12 @@ def repeated(launch: Body) -> Body:
     return body
 
 
+def recording(impact: Impact) -> Step:
+    """A step that records a row and, on a GPU, searches for contact."""
+    search = "after" if impact.solver._replays_search else ""
+    return Step(impact.state, records=True, is_row=True, search=search)
+
+
 def wholes(impact: Impact) -> Iterator[Part]:
     """Graphs of a run, and the search between them."""
     solver, state, count = impact.solver, impact.state, impact.steps.per_interval
@@ -60,8 +66,9 @@ def wholes(impact: Impact) -> Iterator[Part]:
 
     def interval() -> None:
         solver._schedule()
-        solver._step(Step(state, records=True, is_row=True))
+        solver._step(recording(impact))
         solver._steps(state, count - 1)
+        solver._streams.finish()
 
     yield "substep", steps, count * (rates.substeps if rates else 1)
     yield "interval with its record", interval, 1
@@ -70,9 +77,14 @@ def wholes(impact: Impact) -> Iterator[Part]:
 
 def record_parts(impact: Impact) -> Iterator[Part]:
     """Steps of all elements, with a record and without, and the stages of a record by themselves."""
-    solver, step = impact.solver, Step(impact.state, records=True, is_row=True)
+    solver, step = impact.solver, recording(impact)
+
+    def whole(kind: Step) -> None:
+        solver._streams.run(solver.groups, kind)
+        solver._streams.finish()
+
     for name, kind in (("step of all elements", Step(impact.state)), ("the same with a record", step)):
-        yield name, repeated(lambda kind=kind: solver._streams.run(solver.groups, kind)), TURNS
+        yield name, repeated(lambda kind=kind: whole(kind)), TURNS
     yield "order of patches", repeated(solver._schedule), TURNS
     for group in solver.groups:
         for stage in group:

@@ -398,6 +398,7 @@ def test_a_uniform_strain_gives_a_uniform_stress_that_turns_with_the_body(precis
     X = held.solver.model.X
     held.state.u.assign(X @ (turn @ (np.eye(3) + strain)).T - X)
     output.before_step(held.state, frozenset((SURFACE, VOLUME)))
+    output.nodal_stress(frozenset((SURFACE, VOLUME)))
     K, G = STEEL.bulk_modulus, STEEL.shear_modulus
     deviator = strain - np.trace(strain) / 3.0 * np.eye(3)
     sigma = turn @ (2.0 * G * deviator + K * np.trace(strain) * np.eye(3)) @ turn.T
@@ -417,6 +418,7 @@ def test_plastic_strain_at_nodes():
     X = held.solver.model.X
     held.forces(X * [5e-3, 0.0, 0.0])
     output.before_step(held.state, frozenset((SURFACE, VOLUME)))
+    output.nodal_stress(frozenset((SURFACE, VOLUME)))
     G, H = metal.shear_modulus, metal.hardening_modulus
     p = (2.0 * G * 5e-3 - 200e6) / (3.0 * G + H)
     np.testing.assert_allclose(output.arrays[SURFACE]["plastic_strain"].numpy(), p, rtol=1e-4)

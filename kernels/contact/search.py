@@ -18,7 +18,7 @@ FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
 def bounds_kernel(each: bool) -> Any:
     """Kernel: bounding box of each face, extended inwards by the size of the face and by the margin on all sides.
 
-    Boxes are relative to `origin`, so that float32 is fine enough. Clears the counts that `find_candidates` raises.
+    Boxes are relative to `origin`, so that float32 is fine enough.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
@@ -32,7 +32,6 @@ def bounds_kernel(each: bool) -> Any:
         scene_margin: Real,
         lower_out: wp.array(dtype=wp.vec3f),
         upper_out: wp.array(dtype=wp.vec3f),
-        face_count_out: wp.array(dtype=wp.int32),
     ):
         f = wp.tid()
         k = of(scene, f)
@@ -52,7 +51,6 @@ def bounds_kernel(each: bool) -> Any:
         upper = wp.max(upper, upper + inward) + reach
         lower_out[f] = wp.vec3f(wp.float32(lower[0]), wp.float32(lower[1]), wp.float32(lower[2]))
         upper_out[f] = wp.vec3f(wp.float32(upper[0]), wp.float32(upper[1]), wp.float32(upper[2]))
-        face_count_out[f] = 0
 
     return face_bounds
 
@@ -60,6 +58,8 @@ def bounds_kernel(each: bool) -> Any:
 @cache
 def candidates_kernel(each: bool, sides: int) -> Any:
     """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
+
+    Counts of the slaves are 0 before.
 
     With `each`, faces are grouped by scene, and a slave looks only among the faces of its scene. Where a master has
     several sides, a slave has one list for each side, and the faces list the number of that list in place of the slave.

@@ -159,25 +159,28 @@ class ElementStage:
         for part in self.parts(level, chain):
             launch(part)
 
-    def energies(self, work: Workspace, state: State, split: Split = whole) -> None:
+    def energies(self, work: Workspace, state: State, split: Split = whole, u: wp.array | None = None) -> None:
         """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].
 
-        To be called after `launch` of the same step.
+        To be called after `launch` of the same step; u are the displacements of that [m], if not those of the state.
         """
         own = state.elements[self.index]
+        seen = work.displacements(state) if u is None or work.frame is not None else u
 
         def launch(part: slice) -> None:
             inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
-            inputs += [own.extreme[:, part], work.displacements(state), self.block.first + part.start, *self.more(part)]
+            inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.more(part)]
             count = part.stop - part.start
             wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
 
         split(self.count, launch, ELEMENTS)
 
-    def stresses(self, work: Workspace, state: State, element: wp.array, first: int, stress: wp.array) -> None:
-        """Stress [Pa] and plastic strain [-] at the corners of some elements, from slot `first` on."""
+    def stresses(
+        self, work: Workspace, state: State, u: wp.array, element: wp.array, first: int, stress: wp.array
+    ) -> None:
+        """Stress [Pa] and plastic strain [-] at the corners of some elements with displacements u, from `first` on."""
         own = state.elements[self.index]
-        inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, state.u, element, first]
+        inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, u, element, first]
         inputs += self.more(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,8 +31,31 @@ SHARE = 0.2  # of a body's strain energy from which on a word is said: bending f
 # too, and all of 80,000 take 0.2 s.
 WHOLE, SAMPLE = {"hex8": 1024, "tet4": 16_384}, {"hex8": 1024, "tet4": 256}
 LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
+PAIRS = ((0, 1), (1, 2), (2, 0))  # of axes, in whose product a mode of bending is linear
+LINEAR, MODES = CORNERS.T / 8.0, [CORNERS[:, j] * CORNERS[:, k] / 8.0 for j, k in PAIRS]
 TURNS = 8  # of the iteration at most: rotations are exact to rounding for stretches from 0.1 to 10
 LOOKS = 8  # in a run, besides that at its end
+
+
+@dataclass(frozen=True)
+class Bricks:
+    """Hexahedra as they were, each a parallelepiped but for its modes of bending.
+
+    Attributes:
+        X: positions of their nodes [m], shape (cell_count, 8, 3), float64.
+        inverse: of the halves of their edges in columns [1/m], shape (cell_count, 3, 3), float64.
+        half: lengths of these [m], shape (cell_count, 3), float64.
+        edge: unit vectors along the edges, in columns [-], shape (cell_count, 3, 3), float64.
+        mode: what bending about each edge has of X [m], shape (3, cell_count, 3), float64.
+        volume: [m^3], shape (cell_count,), float64.
+    """
+
+    X: Array
+    inverse: NDArray[np.floating]
+    half: Array
+    edge: Array
+    mode: Array
+    volume: Array
 
 
 @dataclass(frozen=True)
@@ -40,20 +64,27 @@ class Sample:
 
     Attributes:
         body: number of the body, in the order of `Model.element_start`.
-        energies: that finds what they spend, of positions, displacements and this.
+        energies: that finds what they spend, of displacements and this.
         conn: their nodes, shape (cell_count, corner_count), int32; of tetrahedra, those next to them follow.
         looked_at: how many of `conn` are looked at.
         K, G: bulk and shear modulus [Pa].
         share: cells of the body and material over those looked at [-].
+        X: positions of all nodes [m], shape (node_count, 3), float64.
     """
 
     body: int
-    energies: Callable[[Array, Array, Sample], tuple[float, float]]
+    energies: Callable[[Array, Sample], tuple[float, float]]
     conn: NDArray[np.int32]
     looked_at: int
     K: float
     G: float
     share: float
+    X: Array
+
+    @cached_property
+    def bricks(self) -> Bricks:
+        """The cells, which are hexahedra; found at the first look, while a GPU computes steps."""
+        return bricks_of(self.X[self.conn])
 
 
 def samples_of(model: Model) -> list[Sample]:
@@ -70,7 +101,7 @@ def samples_of(model: Model) -> list[Sample]:
             body, material = divmod(int(k), len(model.law))
             K, G = model.law[material, :2]
             conn, energies = block.conn[:, cells].T, _ENERGIES[block.element]
-            found.append(Sample(body, energies, conn, len(chosen), K, G, len(own) / len(chosen)))
+            found.append(Sample(body, energies, conn, len(chosen), K, G, len(own) / len(chosen), model.X))
     return found
 
 
@@ -131,7 +162,7 @@ def _energies(model: Model, samples: list[Sample], u: Array) -> Array:
     if not np.isfinite(u).all():
         return found
     for item in samples:
-        wasted, energy = item.energies(model.X, u, item)
+        wasted, energy = item.energies(u, item)
         found[item.body] += item.share * wasted, item.share * energy
     return found
 
@@ -158,33 +189,35 @@ def _cofactors(A: Array) -> Array:
     return found
 
 
-def _hexahedra(X: Array, u: Array, sample: Sample) -> tuple[float, float]:
+def _hexahedra(u: Array, sample: Sample) -> tuple[float, float]:
     """Energy in parasitic shear and all strain energy [J] of the cells that are looked at."""
-    conn, K, G = sample.conn, sample.K, sample.G
-    before, after = X[conn], X[conn] + u[conn]
-    linear = CORNERS.T / 8.0
-    T = (linear @ before).transpose(0, 2, 1)  # columns: halves of the edges
-    R, strain = _turned_back((linear @ after).transpose(0, 2, 1) @ np.linalg.inv(T))
-    half = np.linalg.norm(T, axis=1)
-    edge = T / half[:, None]
+    conn, K, G, bricks = sample.conn, sample.K, sample.G, sample.bricks
+    half, edge, after = bricks.half, bricks.edge, bricks.X + u[conn]
+    R, strain = _turned_back((LINEAR @ after).transpose(0, 2, 1) @ bricks.inverse)
     theta = np.trace(strain, axis1=1, axis2=2)
     energy = 0.5 * K * theta**2 + G * ((strain**2).sum(axis=(1, 2)) - theta**2 / 3.0)
     wasted = np.zeros(len(conn))
     E = 9.0 * K * G / (3.0 * K + G)
-    for j, k in ((0, 1), (1, 2), (2, 0)):
-        mode = CORNERS[:, j] * CORNERS[:, k] / 8.0
-        q = np.einsum("eij,ei->ej", R, mode @ after) - mode @ before
+    for (j, k), mode, before in zip(PAIRS, MODES, bricks.mode, strict=True):
+        q = np.einsum("eij,ei->ej", R, mode @ after) - before
         for a, b in ((j, k), (k, j)):
             along = (q * edge[:, :, a]).sum(axis=1)
             energy += E * (along / half[:, a]) ** 2 / 6.0  # 1 / 2 of the mean over the cell of (strain xi)^2
             wasted += G * (along / half[:, b]) ** 2 / 6.0
-    volume = 8.0 * np.abs(np.linalg.det(T))
-    return float((volume * wasted).sum()), float((volume * (energy + wasted)).sum())
+    return float((bricks.volume * wasted).sum()), float((bricks.volume * (energy + wasted)).sum())
 
 
-def _tetrahedra(X: Array, u: Array, sample: Sample) -> tuple[float, float]:
+def bricks_of(X: Array) -> Bricks:
+    """What displacements do not change of hexahedra with these nodes [m], shape (cell_count, 8, 3)."""
+    T = (LINEAR @ X).transpose(0, 2, 1)  # columns: halves of the edges
+    half = np.linalg.norm(T, axis=1)
+    mode = np.stack([mode @ X for mode in MODES])
+    return Bricks(X, np.linalg.inv(T), half, T / half[:, None], mode, 8.0 * np.abs(np.linalg.det(T)))
+
+
+def _tetrahedra(u: Array, sample: Sample) -> tuple[float, float]:
     """Energy in jumps of strain between cells and all strain energy [J] of the cells that are looked at."""
-    conn, own = sample.conn, slice(sample.looked_at)
+    X, conn, own = sample.X, sample.conn, slice(sample.looked_at)
     volume = np.abs(volumes(X[conn]))
     _, strain = _turned_back(np.eye(3) + np.einsum("eai,eaj->eij", u[conn], gradients(X[conn])))
     node, corner = np.unique(conn, return_inverse=True)

@@ -51,7 +51,8 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float, substeps
     substeps = substeps or (rates.substeps if rates else 1)
     per_search = math.ceil(interval / searches / (stable * substeps))
     dt = interval / (searches * per_search)
-    return Steps(dt=dt, per_search=per_search, searches=searches, intervals=intervals, intervals_per_search=apart)
+    spare = wanted_searches * (apart / searches + dt / interval) <= 1.0
+    return Steps(dt, per_search, searches, intervals, intervals_per_search=apart, spare=spare)
 
 
 def coarser(steps: Steps, model: Model, rows: int, intervals: int, speed: float) -> Steps:

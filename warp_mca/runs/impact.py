@@ -24,6 +24,7 @@ from warp_mca.solve.output import Output
 from warp_mca.solve.records import SceneRecords
 from warp_mca.solve.sensor_stage import SensorStage
 from warp_mca.solve.solver import Solver
+from warp_mca.solve.stage import Search
 from warp_mca.solve.state import State
 from warp_mca.solve.steps import Part, Steps
 from warp_mca.solve.transfer import Transfer
@@ -215,8 +216,7 @@ class _Loop:
         if until is None or self.state.steps >= self.steps.count:
             if self.written == ROWS:
                 self._send()
-            self.solver.search(self.state)
-            self._record(1, self.state.steps // self.steps.per_interval)
+            self._record(1, self.state.steps // self.steps.per_interval, True)
         self._receive_all()
         if self.written:
             self.transfer.send(self.written)
@@ -247,18 +247,19 @@ class _Loop:
             return
         if part.begins_check and self.written == ROWS:
             self._send()
+        if part.begins_check:
+            self._record(end - first, row, part.begins_search)
+            return
         if part.begins_search:
             self.solver.search(self.state)
-        if part.begins_check:
-            self._record(end - first, row)
-        else:
-            self.solver.step(self.state, end - first)
+        self.solver.step(self.state, end - first)
 
-    def _record(self, count: int, row: int | None) -> None:
+    def _record(self, count: int, row: int | None, searches: bool = False) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
         recording = self.impact.recording
         needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
-        self.solver.record_and_step(self.state, count, needs, row is not None)
+        search: Search = ("after" if self.steps.spare else "before") if searches else ""
+        self.solver.record_and_step(self.state, count, needs, row is not None, search)
         self.written += 1
         if recording and row is not None:
             recording.take(row, needs)

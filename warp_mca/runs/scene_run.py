@@ -86,7 +86,7 @@ class SceneRun:
         try:
             self.ledger.read(written, self.solver.layout.records(records, self.index))
         finally:
-            if self.ready.scene.stress_paths:
+            if len(self.ready.probes.corner):
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
             if self.ready.sensors.channels:
                 kept.sensors.extend(records["sensors"][rows[: kept.count - first], self.channels])

@@ -208,17 +208,29 @@ class ContactStage:
             held = state.contacts[self.index].spring.held
             wp.launch(self.clear, len(self.slave), inputs=[*inputs, self.longest], outputs=[held])
 
-    def search(self, work: Workspace, state: State) -> None:
-        """Broad phase: list what each slave may touch until the next search."""
+    def search(self, work: Workspace, state: State, u: wp.array | None = None) -> None:
+        """Broad phase: list what each slave may touch until the next search; by the state's displacements, or u [m]."""
+        u = state.u if u is None else u
+        self.find_boxes(work, u)
+        self.list_faces(work, state, u)
+
+    def find_boxes(self, work: Workspace, u: wp.array) -> None:
+        """First part of a search: boxes around the master's faces, and the tree of these."""
         if self.on_plane:
             return
-        own, slaves = state.contacts[self.index], [work.X, state.u, self.slave]
-        inputs = [work.X, state.u, self.face, self.face_scene, self.origin, self.margin]
-        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper, own.face_count])
+        inputs = [work.X, u, self.face, self.face_scene, self.origin, self.margin]
+        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper])
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
         else:
             self.bvh.refit()
+
+    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
+        """Second part of a search: the lists, which contact reads."""
+        if self.on_plane:
+            return
+        own, slaves = state.contacts[self.index], [work.X, u, self.slave]
+        own.face_count.zero_()
         wp.launch(
             self.find,
             len(self.slave),
@@ -226,7 +238,7 @@ class ContactStage:
             outputs=[own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag],
         )
         wp.launch(search.sort_lists, len(self.face), inputs=[own.face_count], outputs=[own.face_slave])
-        wp.launch(search.mark_masters, len(self.master), inputs=[state.u, self.master], outputs=[own.u_search])
+        wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[own.u_search])
 
     def launch(self, work: Workspace, state: State, dt: float, split: Split = whole) -> None:
         """Contact forces of this pass, added to those on nodes; its normal forces, added to the sums of the step."""

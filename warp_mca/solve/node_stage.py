@@ -86,9 +86,6 @@ class NodeStage:
         """`first_slots` and `more_slots` of elements up to a level, or of all."""
         return self.work.first_slots, self.work.more_slots
 
-    def begin_record(self, state: State) -> None:
-        """Called at a record, before nodes move."""
-
     def end_record(self, state: State) -> None:
         """Called at a record, when nodes have moved."""
 

@@ -55,8 +55,16 @@ class NodalStress:
 
     def launch(self, state: State) -> None:
         """Compute it for the state's displacements."""
+        self.find_corners(state, state.u)
+        self.gather()
+
+    def find_corners(self, state: State, u: wp.array) -> None:
+        """Stress at the corners of elements with displacements u [m]."""
         for stage, element, first in self.parts:
-            stage.stresses(self.solver.work, state, element, first, self.points)
+            stage.stresses(self.solver.work, state, u, element, first, self.points)
+
+    def gather(self) -> None:
+        """Their means at nodes."""
         outputs = [self.tensor, self.von_mises, self.plastic]
         wp.launch(output.nodal_stress, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
 
@@ -117,28 +125,40 @@ class Output:
 
     def before_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
-        work = self.solver.work
+        work, u = self.solver.work, self.solver.work.at_record(state)
+        for stress in self._stresses(needs):
+            stress.find_corners(state, u)
+        if SURFACE in needs:
+            points = self.arrays[SURFACE]["points"]
+            wp.launch(output.positions, len(points), inputs=[work.X, u, self.skin_node], outputs=[points])
+        if VOLUME in needs:
+            to = self.arrays[VOLUME]["displacement"]
+            wp.launch(output.displacements, len(to), inputs=[u], outputs=[to])
+
+    def nodal_stress(self, needs: frozenset[str]) -> None:
+        """Launch what follows from stresses at corners, whatever the state is by then."""
+        for stress in self._stresses(needs):
+            stress.gather()
         if self.has_probes:
-            self.probe_stress.launch(state)
-            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, work.row]
+            inputs = [self.probe_corner, self.probe_weight, self.probe_stress.tensor, self.solver.work.row]
             outputs = [self.path_stress, self.arrays[PATHS]["von_mises"]]
             wp.launch(output.sample_probes, len(self.probe_corner), inputs=inputs, outputs=outputs)
-        if SURFACE in needs:
-            self.skin_stress.launch(state)
-            points = self.arrays[SURFACE]["points"]
-            wp.launch(output.positions, len(points), inputs=[work.X, state.u, self.skin_node], outputs=[points])
-        if CONTACT in needs:
-            first = 0
-            for stage in self.solver.contacts:
-                inputs = [work.X, state.u, stage.slave, stage.mu, stage.sides, first]
-                inputs.append(state.contacts[stage.index].spring)
-                outputs = list(self.arrays[CONTACT].values())
-                wp.launch(output.contact_points, len(stage.slave), inputs=inputs, outputs=outputs)
-                first += len(stage.slave)
-        if VOLUME in needs:
-            self.volume_stress.launch(state)
-            to = self.arrays[VOLUME]["displacement"]
-            wp.launch(output.displacements, len(to), inputs=[state.u], outputs=[to])
+
+    def _stresses(self, needs: frozenset[str]) -> list[NodalStress]:
+        """Of probes, and those that a frame needs."""
+        found = [self.probe_stress] if self.has_probes else []
+        found += [self.skin_stress] if SURFACE in needs else []
+        return found + ([self.volume_stress] if VOLUME in needs else [])
+
+    def contact_points(self, state: State, needs: frozenset[str]) -> None:
+        """Launch what is read off springs, once contact is computed and before nodes move."""
+        first = 0
+        for stage in self.solver.contacts if CONTACT in needs else []:
+            inputs = [self.solver.work.X, state.u, stage.slave, stage.mu, stage.sides, first]
+            inputs.append(state.contacts[stage.index].spring)
+            outputs = list(self.arrays[CONTACT].values())
+            wp.launch(output.contact_points, len(stage.slave), inputs=inputs, outputs=outputs)
+            first += len(stage.slave)
 
     def after_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what needs the velocities on both sides of t(n)."""

@@ -38,8 +38,7 @@ class RatedNodeStage(NodeStage):
     """Advances the nodes up to a level by substeps of central differences.
 
     Attributes:
-        u_record, v_record: displacements at the latest record [m] and velocities half a step after it [m/s], shape
-            (node_count,), vec3d.
+        v_record: velocities half a step after the latest record [m/s], shape (node_count,), vec3d.
     """
 
     rated = True
@@ -65,7 +64,6 @@ class RatedNodeStage(NodeStage):
         self.base = dt / (1 << self.rates.common)
         self.active = self._lists(elements)
         self.chains = [self._items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
-        self.u_record = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
 
     def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
@@ -141,11 +139,7 @@ class RatedNodeStage(NodeStage):
 
     def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
         """As `NodeStage.at_record`: what was kept of the record itself."""
-        return self.u_record, self.v_record, 0.0
-
-    def begin_record(self, state: State) -> None:
-        """As `NodeStage.begin_record`: keep the displacements."""
-        wp.copy(self.u_record, state.u)
+        return self.work.at_record(state), self.v_record, 0.0
 
     def end_record(self, state: State) -> None:
         """As `NodeStage.end_record`: keep the velocities, before the next substep changes them."""

@@ -64,7 +64,6 @@ class RecordStage:
     def sum_motion(self, step: Step, constraints: ConstraintStage, nodes: NodeStage) -> None:
         """Kinetic energy, works, and velocities of recorded points."""
         work, state = self.work, step.state
-        nodes.end_record(state)
         u, v, dt = nodes.at_record(state)
         inputs = [work.mass, work.heavy_mass, work.gravity, u, work.v_before, v, dt, self.node_first]
         inputs += [state.constraints.work, constraints.driven_first, work.point_node]

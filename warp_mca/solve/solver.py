@@ -8,22 +8,16 @@ while the one before them ends.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import warp as wp
 
 from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS
-from warp_mca.elements.stage import BLOCK_DIM as ELEMENT_BLOCK
 from warp_mca.elements.stage import gather_lists
-from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.search import FLAGS
-from warp_mca.kernels.hardware import subnormals
-from warp_mca.kernels.nodes import slide
-from warp_mca.kernels.records import output
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
-from warp_mca.solve import coupling_stage
 from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
 from warp_mca.solve.contact_stage import ContactStage
@@ -31,6 +25,7 @@ from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
 from warp_mca.solve.floating_stage import FloatingStage
+from warp_mca.solve.kernel_list import kernels_of
 from warp_mca.solve.load_stage import LoadStage
 from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
@@ -40,7 +35,7 @@ from warp_mca.solve.replay import Replay
 from warp_mca.solve.resident import resident
 from warp_mca.solve.rigid_stage import RigidStage
 from warp_mca.solve.sensor_stage import SensorStage
-from warp_mca.solve.stage import Step, Streams
+from warp_mca.solve.stage import Search, Step, Streams
 from warp_mca.solve.state import State
 from warp_mca.solve.step_groups import step_groups
 from warp_mca.solve.threads import ELEMENTS as RANGE
@@ -159,33 +154,17 @@ class Solver:
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            for kernels, size in self._kernels():
+            for kernels, size in kernels_of(self):
                 if modules := list(dict.fromkeys(kernel.module for kernel in kernels)):
                     wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
 
-    def _kernels(self) -> list[tuple[list[Any], int | None]]:
-        """One of each module with the threads of its blocks, None for Warp's own number: it is compiled for one."""
-        stress = bool(self.output and self.output.arrays)
-        sums = self.records.kernels() + self.loads.kernels() + self.absorbing.record_kernels()
-        sums += self.rigid.kernels() + self.sensors.kernels()
-        sums += [slide.slide] if len(self.constraints.rails) else []
-        sums += [output.nodal_stress] if stress else []
-        sums += [] if wp.get_device().is_cuda else [subnormals.begin_flush]
-        movers = (self.nodes, self.absorbing, self.ties, self.floating)
-        nodes = [kernel for stage in movers for kernel in stage.kernels()]
-        elements = [kernel for stage in (*self.elements, *self.sensors.layers) for kernel in stage.kernels()]
-        elements += [stage.stress_kernel for stage in self.elements if stress]
-        return [
-            (sums + [kernel for stage in self.contacts for kernel in stage.search_kernels()], None),
-            (nodes + elements, ELEMENT_BLOCK),
-            *([self.resident.kernels()] if self.resident else []),
-            (self.couplings.kernels(), coupling_stage.BLOCK),
-            ([kernel for stage in self.contacts for kernel in stage.kernels()], contact.BLOCK_DIM),
-        ]
+    @property
+    def _replays_search(self) -> bool:
+        return any(stage.is_replayable for stage in self.contacts)
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
-        if any(stage.is_replayable for stage in self.contacts):
+        if self._replays_search:
             self._replay.graph(state, "search", lambda: self._search(state))
         else:
             with wp.ScopedDevice(self.device):
@@ -236,23 +215,34 @@ class Solver:
             self._step(Step(state))
 
     def _schedule(self) -> None:
+        if self.chains:  # few launches are of all elements then
+            return
         for stage in self.elements:
             stage.schedule()
 
     def record_and_step(
-        self, state: State, count: int, needs: frozenset[str] = frozenset(), is_row: bool = True
+        self,
+        state: State,
+        count: int,
+        needs: frozenset[str] = frozenset(),
+        is_row: bool = True,
+        search: Search = "",
     ) -> None:
         """Record the state, as a row of the history or as a check between two, then advance `count` steps.
 
-        A row may come with a frame of `needs`.
+        A row may come with a frame of `needs`. With a `search` for contact a GPU computes other stages beside it:
+        elements before contact has been computed, or nodes "after" that, where earlier lists serve one step more.
 
         Raises:
             Exception: what a thread raised.
         """
-        name = f"{'record' if is_row else 'check'} {sorted(needs)}"
+        if search and not self._replays_search:
+            self.search(state)
+            search = ""
+        name = f"{'record' if is_row else 'check'} {sorted(needs)} {search}"
 
         def record(split: Split = whole) -> None:
-            self._step(Step(state, split, True, is_row, needs))
+            self._step(Step(state, split, True, is_row, needs, search))
 
         if self._replay.pool:
             self._replay.stages(state, name, record)
@@ -264,6 +254,7 @@ class Solver:
             self._schedule()
             record()
             self._steps(state, count - 1)
+            self._streams.finish()
 
         self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count

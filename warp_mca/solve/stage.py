@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import warp as wp
 
@@ -13,7 +13,14 @@ from warp_mca.solve.threads import Split, whole
 if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
-MAIN, BESIDE, ASIDE, SUMS = "main", "beside", "aside", "sums"  # streams of a GPU; a CPU runs stages one by one
+# Streams of a GPU; a CPU runs stages one by one. The main one waits for BESIDE and ASIDE at the end of their group, for
+# BEYOND at the end of the next, for SUMS, SHOWN, SPRINGS and LISTS at the end of the step, for LAST at the end of the
+# steps that are launched together.
+MAIN, BESIDE, ASIDE, BEYOND = "main", "beside", "aside", "beyond"
+SUMS, SHOWN, SPRINGS, LISTS, LAST = "sums", "shown", "springs", "lists", "last"
+_WITHIN, _ENDS = {BESIDE, ASIDE}, {SUMS, SHOWN, SPRINGS, LISTS}
+
+Search = Literal["", "before", "after"]
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,7 @@ class Step:
         records: whether the step also records the state at its start.
         is_row: whether the record is a row of the history, and not a check between two.
         needs: of recorders, that a frame of this step must hold.
+        search: of contact as one of its stages: "" for none, else before the contact of this step or after it.
     """
 
     state: State
@@ -33,6 +41,7 @@ class Step:
     records: bool = False
     is_row: bool = False
     needs: frozenset[str] = frozenset()
+    search: Search = ""
 
 
 @dataclass(frozen=True)
@@ -42,14 +51,16 @@ class Stage:
     Attributes:
         name: as docs/architecture.md lists it.
         launch: launches its kernels for a step.
-        stream: MAIN; BESIDE or ASIDE others of its group; SUMS, which nothing waits for before the end of the step.
+        stream: MAIN, or what else stands at the head of this module.
         only_records: whether it is launched only in steps that record.
+        after: streams of which it waits for what is in them so far.
     """
 
     name: str
     launch: Callable[[Step], None]
     stream: str = MAIN
     only_records: bool = False
+    after: tuple[str, ...] = ()
 
 
 Group = Sequence[Stage]
@@ -59,24 +70,28 @@ class Streams:
     """Launches groups of stages: those of a group may overlap on a GPU, one group follows the other."""
 
     def __init__(self, cuda: bool) -> None:
-        """On the current device. Streams beside the main one have few threads and wait long for memory: they take what
-        room there is first."""
-        self.streams: dict[str, Any] = {BESIDE: None, ASIDE: None, SUMS: None}
+        """On the current device."""
+        self.streams: dict[str, Any] = dict.fromkeys((*sorted(_WITHIN), BEYOND, *sorted(_ENDS), LAST))
+        self._open: set[str] = set()
         if cuda:
-            self.streams = {name: wp.Stream(priority=-1) for name in self.streams}
+            self.streams = {name: wp.Stream() for name in self.streams}
 
     def run(self, groups: Sequence[Group], step: Step) -> None:
-        """Launch the stages of a step in their order."""
-        summing = False
+        """Launch the stages of a step in their order; `finish` follows steps that record."""
+        before: set[str] = set()  # streams of the group before
         for group in groups:
             stages = [stage for stage in group if step.records or not stage.only_records]
-            if stages:
-                summing = summing or any(stage.stream == SUMS for stage in stages)
-                self._run_group(stages, step)
-        if summing and self.streams[SUMS]:
-            wp.wait_stream(self.streams[SUMS])
+            used = self._run_group(stages, step) if stages else set()
+            self._join(used & _WITHIN | before & {BEYOND})
+            before = used
+        self._join(self._open - {LAST})
 
-    def _run_group(self, stages: Group, step: Step) -> None:
+    def finish(self) -> None:
+        """Wait for all that is under way."""
+        self._join(self._open)
+
+    def _run_group(self, stages: Group, step: Step) -> set[str]:
+        """The streams beside the main one in which there is something."""
         used = {stage.stream for stage in stages if stage.stream != MAIN and self.streams[stage.stream]}
         before = wp.record_event() if used else None
         entered: set[str] = set()
@@ -85,10 +100,16 @@ class Streams:
                 stage.launch(step)
                 continue
             with wp.ScopedStream(self.streams[stage.stream], sync_enter=False):
-                if before and stage.stream not in entered:
+                if before is not None and stage.stream not in entered:
                     wp.wait_event(before)
                     entered.add(stage.stream)
+                for name in (name for name in stage.after if name in self._open):
+                    wp.wait_stream(self.streams[name])
                 stage.launch(step)
-        for name in (BESIDE, ASIDE):
-            if name in used:
-                wp.wait_stream(self.streams[name])
+                self._open.add(stage.stream)
+        return used
+
+    def _join(self, names: set[str]) -> None:
+        for name in sorted(names & self._open):
+            wp.wait_stream(self.streams[name])
+        self._open -= names

@@ -40,6 +40,7 @@ class Steps:
         searches: searches in an output interval.
         intervals: output intervals in the run.
         intervals_per_search: output intervals between two searches, where there is one in an interval at most.
+        spare: whether what a search lists holds for one step more than until the next search.
     """
 
     dt: float
@@ -47,6 +48,7 @@ class Steps:
     searches: int
     intervals: int
     intervals_per_search: int = 1
+    spare: bool = False
 
     @property
     def per_interval(self) -> int:

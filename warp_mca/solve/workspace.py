@@ -37,6 +37,8 @@ class Workspace:
         u_seen: displacement of each node in its frame [m], shape (node_count,), vec3d; empty without frames.
         force: of each element on its nodes in their frames, by slot [N], vec3 in the scalars of the precision.
         contact_force: other forces on nodes [N], shape (node_count,), vec3d, zero between steps; empty without contact.
+        u_record: displacements at the latest record [m], shape (node_count,), vec3d, for energies and stresses that are
+            taken while nodes move; empty on a CPU with one rate.
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
         energy: of each element at a record, see `ElementStage.energies`, shape (5, element_count).
         row: of the latest record in the rings, shape (1,), int32.
@@ -62,6 +64,8 @@ class Workspace:
         # one slot more, without force, for nodes without elements
         self.force = wp.zeros(slots + bool(model.rigid_bodies), dtype=t.vec3)
         self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
+        kept = wp.get_device().is_cuda or model.rates is not None
+        self.u_record = wp.zeros(model.node_count if kept else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
@@ -75,6 +79,15 @@ class Workspace:
     def displacements(self, state: State) -> wp.array:
         """What elements compute with: displacements in the world frame or, with floating frames, in these [m]."""
         return state.u if self.frame is None else self.u_seen
+
+    def at_record(self, state: State) -> wp.array:
+        """Displacements of the step that records [m], in the world frame."""
+        return self.u_record if len(self.u_record) else state.u
+
+    def keep(self, state: State) -> None:
+        """Keep the displacements of the record."""
+        if len(self.u_record):
+            wp.copy(self.u_record, state.u)
 
     def frames(self, state: State, part: slice = ALL) -> Any:
         """Frames of a range of nodes, as kernels that gather forces take them."""
