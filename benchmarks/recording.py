@@ -27,9 +27,11 @@ KINDS = {
 }
 
 
-def run(scene: mca.Scene, meshes: dict[str, mca.Mesh], device: str, recorders: list) -> tuple[float, mca.Result]:
+def run(
+    scene: mca.Scene, meshes: dict[str, mca.Mesh], device: str, recorders: list, duration: float | None = None
+) -> tuple[float, mca.Result]:
     """Wall time of the impact phase and of closing the recorders [s], and the result."""
-    result = mca.run(scene, device=device, meshes=meshes, recorders=recorders)
+    result = mca.run(scene, device=device, meshes=meshes, recorders=recorders, duration=duration)
     wall = result.summary["wall"]
     return wall["fe"] + wall["output"], result
 
@@ -42,15 +44,15 @@ def measure(args: argparse.Namespace) -> dict[str, object]:
     else:
         scene = mca.make_scene("two_link", preset=args.preset)
         meshes = mca.mesh(scene)
-    run(scene, meshes, args.device, [])  # warms the kernel cache
+    run(scene, meshes, args.device, [], args.duration)  # warms the kernel cache
     table: dict[str, object] = {}
     for name in args.kinds:
         ratios, plain, sizes = [], [], {}
         for _ in range(args.pairs):
             with tempfile.TemporaryDirectory() as folder:
-                before, one = run(scene, meshes, args.device, [])
+                before, one = run(scene, meshes, args.device, [], args.duration)
                 recorders = KINDS[name](Path(folder), Cadence(frames=args.frames))
-                after, other = run(scene, meshes, args.device, recorders)
+                after, other = run(scene, meshes, args.device, recorders, args.duration)
                 assert all((one[c] == other[c])[1:].all() for c in ("F_n_N", "F_t_N", "E_kinetic"))
                 assert not [w for w in other.warnings if "recording" in w], other.warnings
                 ratios.append(after / before)
@@ -74,6 +76,7 @@ def main() -> None:
     parser.add_argument("--models", type=Path, help="folder of PRESET.mca, where there is no gmsh")
     parser.add_argument("--pairs", type=int, default=5)
     parser.add_argument("--frames", type=int, default=100)
+    parser.add_argument("--duration", type=float, help="of the impact phase [s]")
     parser.add_argument("--kinds", nargs="+", default=["rerun+usd"], choices=list(KINDS))
     args = parser.parse_args()
     begun = time.perf_counter()
