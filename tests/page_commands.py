@@ -32,6 +32,7 @@ PAGES = {
     if not path.name.endswith(".template.md")
 }
 LIMIT = 120  # for a block [s]
+NO_GPU = {"CUDA_VISIBLE_DEVICES": ""}  # a fork could not use one
 # Blocks that are not run as a whole, by how they begin.
 LISTED = {
     "$(command -v sudo) apt-get update": ".ci/run runs it, in a copy of the repository",
@@ -135,7 +136,7 @@ def run_blocks(texts: Sequence[str], folder: Path, programs: Path) -> Done:
     log, said = folder.with_suffix(".log"), folder.with_suffix(".txt")
     log.touch()
     variables = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}  # no windows
-    variables |= {"PATH": f"{programs}:/usr/bin:/bin", "PYTHONPATH": str(ROOT), "PAGE_LOG": str(log)}
+    variables |= {"PATH": f"{programs}:/usr/bin:/bin", "PYTHONPATH": str(ROOT), "PAGE_LOG": str(log), **NO_GPU}
     failed = ""
     for text in texts:
         with said.open("w", encoding="utf-8") as to:
@@ -187,7 +188,7 @@ def server(address: str) -> Iterator[None]:
     path = os.pathsep.join([str(ROOT), str(Path(__file__).parent), *sys.path])
     with subprocess.Popen(
         [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, **NO_GPU},
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,

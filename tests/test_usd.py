@@ -185,6 +185,7 @@ def test_a_frame_of_20000_vertices_takes_at_most_280_kB(bars: FlyingBars, tmp_pa
     bars.info = dataclasses.replace(bars.info, surfaces={"grid": SurfaceMesh(nodes, quads)})
     rng = np.random.default_rng(3)
     x, y = np.divmod(np.arange(n * n), n)
+    monkeypatch.setattr(usd_file, "SAVE_AFTER", 0.0)
     recorder = UsdFile(tmp_path / "grid.usdc")
     recorder.start(bars.info)
     first = usd_file.SAVE_EVERY  # the first frames hold the normals of all
@@ -205,9 +206,10 @@ def test_a_frame_of_20000_vertices_takes_at_most_280_kB(bars: FlyingBars, tmp_pa
     assert per_frame * 20_000 / (n * n) < 280e3
 
 
-def test_a_killed_run_leaves_every_saved_frame(bars: FlyingBars, tmp_path: Path):
+def test_a_killed_run_leaves_every_saved_frame(bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     import multiprocessing
 
+    monkeypatch.setattr(usd_file, "SAVE_AFTER", 0.0)
     file = tmp_path / "killed.usdc"
 
     def run() -> None:
@@ -348,6 +350,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path,
 
 
 def test_a_full_disk_leaves_the_frames_saved_before(bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(usd_file, "SAVE_AFTER", 0.0)
     recorder = UsdFile(tmp_path / "a.usdc")
     recorder.start(bars.info)
     for index in range(usd_file.SAVE_EVERY):

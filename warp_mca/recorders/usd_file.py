@@ -9,6 +9,7 @@ import re
 import shutil
 import signal
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
 FRAMES = Cadence(frames=100)
-SAVE_EVERY = 5  # frames between saves: as many may be lost when a run is killed; a save costs more than a frame
+# What a kill may cost: as many frames, or those of as long; a save takes longer than a frame.
+SAVE_EVERY = 5  # frames between saves, at least
+SAVE_AFTER = 1.0  # time between saves, at least [s]
 PLAYBACK = 24.0  # frames shown in a second
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
 POINT_SIZE = 0.004  # of contact points, as a share of the scene
@@ -71,6 +74,7 @@ class UsdFile:
         self.setting: Any = None
         self.contact: Any = None
         self.saved_count = self.unsaved_count = 0  # frames that the file holds, and lacks
+        self._saved = 0.0  # time of the last save [s]
 
     def check(self, info: RunInfo) -> None:
         """Load USD, and check the disk.
@@ -142,7 +146,7 @@ class UsdFile:
             self.times.append(frame.time)
             self.limits.append(limit)
             self.unsaved_count += 1
-            if self.unsaved_count == SAVE_EVERY:
+            if self.unsaved_count >= SAVE_EVERY and time.monotonic() > self._saved + SAVE_AFTER:
                 self._save()
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
@@ -169,6 +173,7 @@ class UsdFile:
         from pxr import Tf, Vt
 
         self.unsaved_count = 0  # frames that cannot be saved now are not tried again
+        self._saved = time.monotonic()
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
             raise OSError(FULL)
         self.stage.SetStartTimeCode(0.0)
