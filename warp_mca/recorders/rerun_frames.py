@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.recorders.colours import SLIP, STICK
+from warp_mca.recorders.colours import SLIP, STICK, packed
 from warp_mca.recorders.rerun_setting import PathBars
 
 if TYPE_CHECKING:
@@ -31,15 +31,17 @@ class FrameQueue:
         self.bodies, self.paths, self.bars = bodies, paths, bars
         self._times: list[float] = []
         self._steps: list[int] = []
+        self._limits: list[float] = []
         self._parts: dict[str, list[NDArray]] = {}
 
-    def add(self, frame: Frame, colours: Mapping[str, NDArray[np.uint32]]) -> None:
-        """Copy what is shown of a frame; `colours` of each body's vertices, by its name."""
+    def add(self, frame: Frame, limit: float) -> None:
+        """Copy what is shown of a frame; `limit` is the stress at the upper end of its colours [Pa]."""
+        self._limits.append(limit)
         self._times.append(float(frame.time))
         self._steps.append(int(frame.step))
         for body, points in frame.points.items():
             self._keep(f"points {body}", points)
-            self._keep(f"colours {body}", colours[body])
+            self._keep(f"stress {body}", frame.von_mises[body])
         self._keep("contact points", frame.contact_points)
         self._keep("contact stick", frame.contact_stick)
         for path, stress in frame.path_stress.items():
@@ -54,14 +56,15 @@ class FrameQueue:
 
         if not self._times:
             return
+        nanoseconds = np.round(1e9 * np.array(self._times)).astype("timedelta64[ns]")  # rerun would truncate
         indexes = [
-            rr.TimeColumn("sim_time", duration=np.array(self._times)),
+            rr.TimeColumn("sim_time", duration=nanoseconds),
             rr.TimeColumn("step", sequence=np.array(self._steps)),
         ]
         for entity, columns in self._columns():
             for stream in streams:
                 stream.send_columns(entity, indexes=indexes, columns=columns)
-        self._times, self._steps, self._parts = [], [], {}
+        self._times, self._steps, self._limits, self._parts = [], [], [], {}
 
     def _columns(self) -> Iterator[tuple[str, list[Any]]]:
         """Each entity with its columns, a row for each frame."""
@@ -70,7 +73,8 @@ class FrameQueue:
         count = len(self._times)
         for body, entity in self.bodies.items():
             points, lengths = self._joined(f"points {body}")
-            colours, _ = self._joined(f"colours {body}")
+            stress = zip(self._parts[f"stress {body}"], self._limits, strict=True)
+            colours = np.concatenate([packed(value, limit) for value, limit in stress])
             yield entity, list(rr.Mesh3D.columns(vertex_positions=points, vertex_colors=colours).partition(lengths))
         points, lengths = self._joined("contact points")
         stick, _ = self._joined("contact stick")

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import kinds, members
-from warp_mca.recorders.colours import ColourScale, check_limit, packed
+from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
 from warp_mca.recorders.rerun_frames import FrameQueue
 from warp_mca.recorders.rerun_setting import PLANES, PathBars, Planes, sights, topology
@@ -148,10 +148,9 @@ class RerunStream:
             return
         greatest = max((float(value.max(initial=0.0)) for value in frame.von_mises.values()), default=0.0)
         rescaled = self.scale.include(greatest) or self.frame_count == 0
-        colours = {body: packed(value, self.scale.limit) for body, value in frame.von_mises.items()}
         for stream in self.streams:
             self._log_beside(stream, frame, rescaled)
-        self.queue.add(frame, colours)
+        self.queue.add(frame, self.scale.limit)
         self.frame_count += 1
         if self.frame_count % FLUSH_EVERY == 0 or time.monotonic() > self._sent + HOLD:
             self._send()
