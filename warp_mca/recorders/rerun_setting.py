@@ -53,10 +53,9 @@ class PathBars:
         self.once = rr.BarChart(widths, abscissa=place, widths=widths, color=PATH_COLOURS[index % len(PATH_COLOURS)])
         object.__setattr__(self.once, "values", None)  # rerun's own setter would convert it
 
-    def column(self, stress: NDArray[np.float32], count: int) -> rr.ComponentColumn:
-        """The bars of `count` frames, `stress` [MPa] of these one after the other, shape (count probe_count,).
-
-        rerun's own conversion takes several times as long.
+    def column(self, stress: NDArray[np.floating], count: int) -> rr.ComponentColumn:
+        """The bars of `count` frames, `stress` [MPa] of these one after the other, shape (count probe_count,),
+        float32. rerun's own conversion takes several times as long.
         """
         import pyarrow as pa
         import rerun as rr
