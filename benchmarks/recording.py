@@ -1,6 +1,7 @@
 """What recording costs: `python -m benchmarks.recording [--device cuda:0] [--preset paper] [--models DIR] [--pairs N]`.
 
-Runs the two-link impact in pairs, with and without 100 frames to rerun and USD, and prints the ratio of wall times.
+Runs the two-link impact in pairs, with and without 100 frames to rerun and USD, and prints the ratios of wall times and
+of processor times; the latter depend less on what else the machine does.
 """
 
 from __future__ import annotations
@@ -27,11 +28,14 @@ KINDS = {
 }
 
 
-def run(scene: mca.Scene, meshes: dict[str, mca.Mesh], device: str, recorders: list) -> tuple[float, mca.Result]:
-    """Wall time of the impact phase and of closing the recorders [s], and the result."""
-    result = mca.run(scene, device=device, meshes=meshes, recorders=recorders)
+def run(
+    scene: mca.Scene, meshes: dict[str, mca.Mesh], device: str, recorders: list, duration: float | None = None
+) -> tuple[float, float, mca.Result]:
+    """Wall time of the impact phase and of closing the recorders, processor time of the run [s], and the result."""
+    begun = time.process_time()
+    result = mca.run(scene, device=device, meshes=meshes, recorders=recorders, duration=duration)
     wall = result.summary["wall"]
-    return wall["fe"] + wall["output"], result
+    return wall["fe"] + wall["output"], time.process_time() - begun, result
 
 
 def measure(args: argparse.Namespace) -> dict[str, object]:
@@ -42,23 +46,27 @@ def measure(args: argparse.Namespace) -> dict[str, object]:
     else:
         scene = mca.make_scene("two_link", preset=args.preset)
         meshes = mca.mesh(scene)
-    run(scene, meshes, args.device, [])  # warms the kernel cache
     table: dict[str, object] = {}
     for name in args.kinds:
-        ratios, plain, sizes = [], [], {}
+        with tempfile.TemporaryDirectory() as folder:  # fills the kernel cache and imports what recorders need
+            run(scene, meshes, args.device, KINDS[name](Path(folder), Cadence(frames=2)), args.duration)
+        ratios, shares, plain, sizes = [], [], [], {}
         for _ in range(args.pairs):
             with tempfile.TemporaryDirectory() as folder:
-                before, one = run(scene, meshes, args.device, [])
+                before, cpu_before, one = run(scene, meshes, args.device, [], args.duration)
                 recorders = KINDS[name](Path(folder), Cadence(frames=args.frames))
-                after, other = run(scene, meshes, args.device, recorders)
+                after, cpu_after, other = run(scene, meshes, args.device, recorders, args.duration)
                 assert all((one[c] == other[c])[1:].all() for c in ("F_n_N", "F_t_N", "E_kinetic"))
                 assert not [w for w in other.warnings if "recording" in w], other.warnings
                 ratios.append(after / before)
+                shares.append(cpu_after / cpu_before)
                 plain.append(before)
                 sizes = {file.suffix: file.stat().st_size / args.frames for file in Path(folder).iterdir()}
         table[name] = {
             "ratio": statistics.median(ratios),
             "ratios": ratios,
+            "processor_ratio": statistics.median(shares),
+            "processor_ratios": shares,
             "wall_without_s": statistics.median(plain),
             "bytes_per_frame": sizes,
         }
@@ -74,6 +82,7 @@ def main() -> None:
     parser.add_argument("--models", type=Path, help="folder of PRESET.mca, where there is no gmsh")
     parser.add_argument("--pairs", type=int, default=5)
     parser.add_argument("--frames", type=int, default=100)
+    parser.add_argument("--duration", type=float, help="of the impact phase [s]")
     parser.add_argument("--kinds", nargs="+", default=["rerun+usd"], choices=list(KINDS))
     args = parser.parse_args()
     begun = time.perf_counter()

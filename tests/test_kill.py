@@ -16,7 +16,9 @@ import os, signal, sys
 sys.path.insert(0, sys.argv[1])
 import warp_mca as mca
 from test_recording import Memory, bar
-from warp_mca.recorders import Cadence, RerunStream, UsdFile, VtkHdfFile
+from warp_mca.recorders import Cadence, RerunStream, UsdFile, VtkHdfFile, usd_file
+
+usd_file.SAVE_AFTER = 0.0  # the run takes less
 
 class Killer(Memory):
     def frame(self, frame):

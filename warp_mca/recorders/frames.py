@@ -113,6 +113,16 @@ def _wanted(recorder: Recorder, intervals: int, info: RunInfo) -> NDArray[np.boo
     return recorder.cadence.rows(intervals, info.output_interval)
 
 
+NOTHING: dict[str, Any] = {  # what a frame holds that needs nothing
+    "points": {},
+    "von_mises": {},
+    "plastic_strain": {},
+    "contact_points": np.zeros((0, 3), np.float32),
+    "contact_stick": np.zeros(0, bool),
+    "path_stress": {},
+}
+
+
 class Recording:
     """The recorders of one run.
 
@@ -136,6 +146,10 @@ class Recording:
         self.info, self.steps, self.output = info, steps, output
         self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = []
         self.taken: dict[int, int] = {}
+        self.cuts = {
+            SURFACE: _cuts({body: len(skin.nodes) for body, skin in info.surfaces.items()}),
+            PATHS: _cuts({path: len(position) for path, position in info.paths.items()}),
+        }
         self.transfer: Transfer[tuple[str, str]] | None = None
         missing = {folder for file in _files(recorders) for folder in file.parents if not folder.exists()}
         try:
@@ -185,10 +199,11 @@ class Recording:
 
     def _deliver(self, transfer: Transfer[tuple[str, str]]) -> None:
         row, arrays = transfer.receive()
+        parts = self._parts(arrays)
         for recorder, rows in list(self.rows):
             if rows[row]:
                 index = self.taken.get(id(recorder), 0)
-                frame = self._frame(row, arrays, recorder.needs, index)
+                frame = self._frame(row, parts, recorder.needs, index)
                 self._call(recorder, lambda recorder=recorder, frame=frame: recorder.frame(frame))
                 self.taken[id(recorder)] = index + 1
 
@@ -205,32 +220,30 @@ class Recording:
             with suppress(Exception, SystemExit):
                 recorder.finish(False)
 
-    def _frame(self, row: int, sent: Mapping[tuple[str, str], NDArray], needs: frozenset[str], index: int) -> Frame:
-        arrays: dict[str, dict[str, Any]] = {need: {} for need, _ in sent if need in needs}
+    def _parts(self, sent: Mapping[tuple[str, str], NDArray]) -> dict[str, dict[str, Any]]:
+        """What frames hold of the arrays that were sent, by need and the name in `Frame`."""
+        parts: dict[str, dict[str, Any]] = {}
         for (need, name), array in sent.items():
-            if need in needs:
-                arrays[need][name] = array
-        skin: dict[str, Any] = {name: self._by_body(array) for name, array in arrays.get(SURFACE, {}).items()}
-        nothing = {"points": np.zeros((0, 3), np.float32), "state": np.zeros(0, np.int32)}
-        contact: dict[str, Any] = arrays.get(CONTACT, nothing)
-        closed = contact["state"] != OPEN
-        return Frame(
-            index=index,
-            step=row * self.steps,
-            time=row * self.info.output_interval,
-            points=skin.get("points", {}),
-            von_mises=skin.get("von_mises", {}),
-            plastic_strain=skin.get("plastic_strain", {}),
-            contact_points=contact["points"][closed],
-            contact_stick=contact["state"][closed] == STICK,
-            path_stress=self._by_path(arrays[PATHS]["von_mises"]) if PATHS in arrays else {},
-            volume=Volume(**arrays[VOLUME]) if VOLUME in arrays else None,
-        )
+            cut = self.cuts.get(need)
+            parts.setdefault(need, {})[name] = array if cut is None else {key: array[at] for key, at in cut.items()}
+        if CONTACT in parts:
+            points, state = (parts[CONTACT][name] for name in ("points", "state"))
+            closed = state != OPEN
+            parts[CONTACT] = {"contact_points": points[closed], "contact_stick": state[closed] == STICK}
+        if PATHS in parts:
+            parts[PATHS] = {"path_stress": parts[PATHS]["von_mises"]}
+        if VOLUME in parts:
+            parts[VOLUME] = {"volume": Volume(**parts[VOLUME])}
+        return parts
 
-    def _by_body(self, array: NDArray) -> dict[str, NDArray]:
-        ends = np.cumsum([len(skin.nodes) for skin in self.info.surfaces.values()])
-        return dict(zip(self.info.surfaces, np.split(array, ends[:-1]), strict=True))
+    def _frame(self, row: int, parts: Mapping[str, Mapping[str, Any]], needs: frozenset[str], index: int) -> Frame:
+        found = dict(NOTHING)
+        for need in needs:
+            found |= parts.get(need, {})
+        return Frame(index=index, step=row * self.steps, time=row * self.info.output_interval, **found)
 
-    def _by_path(self, array: NDArray) -> dict[str, NDArray]:
-        ends = np.cumsum([len(position) for position in self.info.paths.values()])
-        return dict(zip(self.info.paths, np.split(array, ends[:-1]), strict=True))
+
+def _cuts(lengths: Mapping[str, int]) -> dict[str, slice]:
+    """Where each of several arrays stands that follow each other."""
+    ends = np.cumsum(list(lengths.values()), dtype=int).tolist()
+    return {name: slice(end - length, end) for (name, length), end in zip(lengths.items(), ends, strict=True)}

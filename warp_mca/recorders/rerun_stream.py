@@ -10,6 +10,7 @@ import atexit
 import os
 import shutil
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -21,8 +22,9 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import kinds, members
-from warp_mca.recorders.colours import SLIP, STICK, ColourScale, check_limit, packed
+from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
+from warp_mca.recorders.rerun_frames import FrameQueue
 from warp_mca.recorders.rerun_setting import PLANES, PathBars, Planes, sights, topology
 from warp_mca.report.setting import up_of
 
@@ -33,10 +35,10 @@ if TYPE_CHECKING:
     from warp_mca.recorders.rerun_viewer import Viewer
 
 FLUSH_EVERY = 4  # frames between flushes: as many may be lost when a run is killed
+HOLD = 0.2  # a frame that comes later after the last ones were sent is sent at once, so that a viewer shows it [s]
 CLOSE_TIMEOUT = 10.0  # of the file at the end [s]
 END = b"RRF2FOOT"  # 12 bytes before the end of a whole file
 FRAMES = Cadence(frames=100)
-TO_MPA = 1e-6
 
 
 class RerunStream:
@@ -87,6 +89,7 @@ class RerunStream:
         self.failed = False
         self._file_stream: rr.RecordingStream | None = None
         self._viewer_stream: rr.RecordingStream | None = None
+        self._sent = 0.0  # time when frames were sent last [s]
 
     def start(self, info: RunInfo) -> None:
         """Open the streams and log what never changes.
@@ -125,7 +128,8 @@ class RerunStream:
             self.viewer = Viewer(stream, layout, self.viewer_options)
         self.streams = [stream for stream in (self._file_stream, self._viewer_stream) if stream]
         self.planes = Planes(info)
-        self.bars = {path: PathBars(position, k) for k, (path, position) in enumerate(info.paths.items())}
+        bars = {path: PathBars(position, k) for k, (path, position) in enumerate(info.paths.items())}
+        self.queue = FrameQueue(self.bodies, self.paths, bars)
         for stream in self.streams:
             log_up(stream, up_of(info.scene))
             log_legend(stream)
@@ -133,8 +137,8 @@ class RerunStream:
             self.planes.log(stream)
             for body, surface in info.surfaces.items():
                 stream.log(self.bodies[body], topology(info, surface.nodes, surface.triangles), static=True)
-            for path, bars in self.bars.items():
-                stream.log(self.paths[path], bars.once, static=True)
+            for path, item in bars.items():
+                stream.log(self.paths[path], item.once, static=True)
         self._warm_up()
 
     def frame(self, frame: Frame) -> None:
@@ -144,10 +148,12 @@ class RerunStream:
             return
         greatest = max((float(value.max(initial=0.0)) for value in frame.von_mises.values()), default=0.0)
         rescaled = self.scale.include(greatest) or self.frame_count == 0
-        colours = {body: packed(value, self.scale.limit) for body, value in frame.von_mises.items()}
         for stream in self.streams:
-            self._log_frame(stream, frame, colours, rescaled)
+            self._log_beside(stream, frame, rescaled)
+        self.queue.add(frame, self.scale.limit)
         self.frame_count += 1
+        if self.frame_count % FLUSH_EVERY == 0 or time.monotonic() > self._sent + HOLD:
+            self._send()
         if self.viewer:
             self.viewer.sent(sum(points.nbytes for points in frame.points.values()) * 4 // 3)
         if self._file_stream and self.frame_count % FLUSH_EVERY == 0:
@@ -173,6 +179,8 @@ class RerunStream:
     def finish(self, ok: bool) -> None:
         """Write and send what is left; a recording that lacks something is a warning."""
         self._drop_failed()
+        if self.streams:
+            self._send()
         if self._file_stream:
             self._close_file()
             if not ok and not self.frame_count and self.path:
@@ -182,26 +190,21 @@ class RerunStream:
         self._drop_failed()
         self.streams = []
 
-    def _log_frame(
-        self, stream: rr.RecordingStream, frame: Frame, colours: Mapping[str, NDArray[np.uint32]], rescaled: bool
-    ) -> None:
-        import rerun as rr
+    def _send(self) -> None:
+        """Send the frames that wait."""
+        self.queue.send(self.streams)
+        self._sent = time.monotonic()
 
+    def _log_beside(self, stream: rr.RecordingStream, frame: Frame, rescaled: bool) -> None:
+        """Log what few frames change: the legend, and planes that move."""
         from warp_mca.recorders.rerun_blueprint import log_ticks
 
-        stream.set_time("sim_time", duration=float(frame.time))
-        stream.set_time("step", sequence=int(frame.step))
-        for body, points in frame.points.items():
-            mesh = rr.Mesh3D.from_fields(vertex_positions=points, vertex_colors=colours[body])
-            stream.log(self.bodies[body], mesh)
-        sticks = np.where(frame.contact_stick, np.uint32(STICK), np.uint32(SLIP))
-        dots = rr.Points3D.from_fields(positions=frame.contact_points, colors=sticks, radii=[-3.0])
-        stream.log("world/contact_points", dots)
-        for name, stress in frame.path_stress.items():
-            stream.log(self.paths[name], self.bars[name].heights(TO_MPA * stress))
-        self.planes.move(stream, float(frame.time))
-        if rescaled:
-            log_ticks(stream, self.scale)
+        if rescaled or self.planes.move_at_all:
+            stream.set_time("sim_time", duration=float(frame.time))
+            stream.set_time("step", sequence=int(frame.step))
+            self.planes.move(stream, float(frame.time))
+            if rescaled:
+                log_ticks(stream, self.scale)
 
     def _warm_up(self) -> None:
         """Encode one mesh before the clock runs: rerun's first one takes 0.6 s."""
@@ -209,10 +212,8 @@ class RerunStream:
 
         idle = rr.RecordingStream("warp_mca_warm_up")
         sink = idle.memory_recording()
-        mesh = rr.Mesh3D.from_fields(
-            vertex_positions=np.zeros((3, 3), np.float32), vertex_colors=np.zeros(3, np.uint32)
-        )
-        idle.log("mesh", mesh)
+        mesh = rr.Mesh3D.columns(vertex_positions=np.zeros((3, 3), np.float32), vertex_colors=np.zeros(3, np.uint32))
+        idle.send_columns("mesh", indexes=[rr.TimeColumn("step", sequence=[0])], columns=mesh.partition([3]))
         sink.drain_as_bytes()
 
     def _flush_file(self) -> None:
