@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from warp_mca.accuracy.prediction import Expected, expected_errors
+from warp_mca.accuracy.prediction import Expected, expected_errors, is_close
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
@@ -44,8 +44,10 @@ def choices(
     """Variants of a family that keep what the user typed, from the cheapest on; `step` is the cost of one.
 
     Bodies that must stay as they are take the same meshes without mass scaling, whose errors are smaller, and no other
-    elements.
+    elements. Of a scene unlike all that were measured there are none.
     """
+    if not is_close(family, parameters):
+        return []
     variants = [replace(item, mass_scaling=None) if asked.full else item for item in family.variants]
     found = [
         Choice(

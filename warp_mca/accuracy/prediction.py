@@ -77,6 +77,23 @@ def expected_errors(
     return {name: _expected(family, parameters, variant, name) for name in figures}
 
 
+def is_close(family: Family, parameters: Mapping[str, object]) -> bool:
+    """Whether some measured scene is nearer to a scene than scenes lie from the mean of all; else nothing is known of it.
+
+    That is the root of the number of features, in standard deviations of these.
+    """
+    points = np.array([family.coordinates(scene.parameters) for scene in family.scenes])
+    if len(points) < FEWEST:
+        return False
+    apart = (points - np.array(family.coordinates(parameters))) / _scale(points)
+    return bool(((apart**2).sum(axis=1) <= points.shape[1]).any())
+
+
+def _scale(points: Array) -> Array:
+    """Standard deviations of features."""
+    return np.maximum(points.std(axis=0), 1e-12 + 1e-3 * np.abs(points).max(axis=0))
+
+
 def _expected(family: Family, parameters: Mapping[str, object], variant: int, figure: str) -> Expected | None:
     rows = [(scene, (scene.errors.get(variant) or {}).get(figure)) for scene in family.scenes]
     known = [(scene, error) for scene, error in rows if error is not None]
@@ -84,7 +101,7 @@ def _expected(family: Family, parameters: Mapping[str, object], variant: int, fi
         return None
     points = np.array([family.coordinates(scene.parameters) for scene, _ in known])
     here = np.array(family.coordinates(parameters))
-    scale = np.maximum(points.std(axis=0), 1e-12 + 1e-3 * np.abs(points).max(axis=0))
+    scale = _scale(points)
     noise = INTERVAL if figure == "contact_duration" else NOISE
     return gaussian_process(points / scale, np.array([error for _, error in known]), here / scale, noise)
 
