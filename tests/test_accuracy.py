@@ -94,6 +94,11 @@ def test_the_cheapest_variant_within_the_bound_is_chosen(known: store.Family, v:
     assert error.size == pytest.approx(0.04 * v / refine**2, rel=0.2)
 
 
+@pytest.mark.parametrize(("v", "count"), [(1.5, len(REFINES)), (1e-3, 0), (1e3, 0)])
+def test_a_scene_unlike_all_measured_ones_has_no_choices(known: store.Family, v: float, count: int):
+    assert len(choices(known, {"v": v}, Accuracy(share=0.5), BOUND[:2], COSTS["cpu"], True)) == count
+
+
 def offer(chance: float, cost: float) -> Choice:
     """A choice whose only error is within 1 % with this probability."""
     spread = 0.01 / NormalDist().inv_cdf(0.5 + 0.5 * chance)
@@ -101,10 +106,10 @@ def offer(chance: float, cost: float) -> Choice:
 
 
 def test_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
-    cheap, dear = offer(0.85, 1.0), offer(0.85 + 0.9 * WORTH, 2.0)
-    assert cheap.chance(0.01) == pytest.approx(0.85, rel=1e-12)
+    cheap, dear = offer(0.75, 1.0), offer(0.75 + 0.9 * WORTH, 2.0)
+    assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
     assert best([cheap, dear], 0.01) is cheap
-    assert best([cheap, offer(0.85 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
+    assert best([cheap, offer(0.75 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
     assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
     assert replace(dear, errors={**dear.errors, "F_n_first_peak": None}).chance(0.01) == 0.0

@@ -13,8 +13,8 @@ from warp_mca.accuracy.variant import Variant
 from warp_mca.runs.rate_groups import StepCost
 
 # Probabilities that all errors of a choice are within what was asked, from measured scenes that are left out in turn:
-LEAST = 0.8  # below this none is made [-]
-WORTH = 0.1  # what twice the cost must add [-]
+LEAST = 0.7  # below this none is made [-]
+WORTH = 0.15  # what twice the cost must add [-]
 
 
 @dataclass(frozen=True)

@@ -78,9 +78,9 @@ def expected_errors(
 
 
 def is_close(family: Family, parameters: Mapping[str, object]) -> bool:
-    """Whether some measured scene is nearer to a scene than scenes lie from the mean of all; else nothing is known of it.
+    """Whether some measured scene is nearer to this one than scenes lie from their mean; else nothing is known of it.
 
-    That is the root of the number of features, in standard deviations of these.
+    Scenes lie from it the root of the number of features, in standard deviations of these.
     """
     points = np.array([family.coordinates(scene.parameters) for scene in family.scenes])
     if len(points) < FEWEST:
