@@ -7,8 +7,8 @@ python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 
 python -m benchmarks.accuracy render
 
 `learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store,
-with `--add` beside the scenes that it has; with `--lacking` it runs these scenes with variants that they lack.
-`validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
+with `--add` beside the scenes that it has, which are not run again; with `--lacking` it runs these with variants that
+they lack. `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
 docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into docs/accuracy.md.
 """
 
@@ -117,6 +117,9 @@ def _sampled(
     seed = LEARN if args.add is None else args.add
     assert seed != HELD_OUT, "these scenes are those that choices are tried on"
     scenes = {family.scene: _scenes(args, family, seed, GALLERY) for family in families}
+    if args.add is not None:
+        kept = {name: [entry["parameters"] for entry in item["scenes"]] for name, item in before.items()}
+        scenes = {name: [item for item in new if item not in kept.get(name, [])] for name, new in scenes.items()}
     for tables in _tables(jobs_of(families, scenes, args.device, args.reference), args.workers, until):
         found = {f.scene: stored(f, scenes[f.scene], tables.get(f.scene, {})) for f in families}
         found = {name: item for name, item in found.items() if item["scenes"]}
