@@ -54,9 +54,9 @@ CASES = (
 )
 
 NOTES = {
-    "h200": "The hinges are two pairs of nodes, which yield as under point loads: the finer the mesh, the slower impulse "
-    "and duration settle, and their limits are as uncertain as is written above. `--accuracy` binds neither behind such "
-    "hinges; with `joint_nodes=pin` both have a limit.",
+    "h200": "The hinges are two pairs of nodes, which yield as under point loads: the finer the mesh, the slower "
+    "impulse and duration settle, and their limits are as uncertain as is written above. `--accuracy` binds "
+    "neither behind such hinges; with `joint_nodes=pin` both have a limit.",
     "coarse": "Cells of this size resolve neither tip nor hinges: what is left of the first peak says so (on 977,616 "
     "elements it is 3572 N). Stiffer springs and finer cells at the contact are worth most; coarse tied rods and a "
     "rigid far link spoil the impulse. The plastic strain is that of the contact: the point loads of the hinges, which "
