@@ -86,6 +86,14 @@ def test_solids_parts_and_sets(tmp_path: Path, layout: str):
     assert places == {name: {POINTS[n] for n in members} for name, members in wanted.items()}
 
 
+def test_elements_other_than_solids_are_left_out_with_a_word(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    shell = f"*ELEMENT_SHELL_THICKNESS\n{columns([9, 3, 1, 2, 3, 4], False)}*ELEMENT_BEAM\n"
+    (tmp_path / "it.k").write_text(deck("columns").replace("*ELEMENT_SOLID", f"{shell}*ELEMENT_SOLID"))
+    assert len(mca.MeshFile(tmp_path / "it.k").build().hexahedra) == 3
+    (record,) = caplog.records
+    assert "elements of *ELEMENT_SHELL_THICKNESS are left out" in record.getMessage()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -200,12 +200,17 @@ def test_run_of_a_part_prints_a_scene_that_runs(
     assert mca.run(short, device="cpu").F_n.max() > 0.0
 
 
+FACET = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet"
 REFUSED = [
     (lambda folder: mca.Cad(folder / "none.step", size=1.0).build(), "No such file"),
     (lambda folder: mca.Cad(folder / "part.msh", size=1.0), "CAD files end in .step.*MeshFile reads finished meshes"),
     (lambda folder: mca.Cad(folder / "part.step", size=1e-6).build(), "elements would result in a part of 0.06 m"),
     (lambda folder: mca.Cad(_written(folder, "bad.step", "nonsense"), size=1.0).build(), "gmsh cannot read or mesh it"),
     (lambda folder: mca.Cad(_written(folder, "bad.stl", "solid a\nendsolid a\n"), size=1.0).build(), "gmsh|no solid"),
+    (
+        lambda folder: mca.Cad(_written(folder, "open.stl", f"solid a\n{FACET}\nendsolid a\n"), size=0.5).build(),
+        "3 edges of its triangles lack",
+    ),
     (lambda folder: part(folder / "part.brep", select=(mca.Select("a", faces=9),)).build(), "face_9"),
     (lambda folder: part(folder / "part.msh", select=(mca.Select("a", (), (1, 1, 1), (2, 2, 2)),)).build(), "no node"),
     (lambda folder: mca.Select("a", faces=(1,), point=(0, 0, 0), normal=(0, 0, 1)), "give faces, or low and high"),

@@ -28,6 +28,7 @@ from warp_mca.geometry.selection import Select, check_selections, with_selection
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
 _UNIT = "Geometry.OCCTargetUnit"  # gmsh's option: unit of what it reads from STEP and IGES
 _HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest slivers
+_TRIANGLE = 2  # number of the linear triangle in gmsh
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
 _GENERIC = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
 _KEPT = 4  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
@@ -139,6 +140,7 @@ def _draw(gmsh: ModuleType, path: str) -> None:
     finally:
         gmsh.option.setString(_UNIT, unit)
     if Path(path).suffix.lower() == ".stl":
+        _check_closed(gmsh, path)
         try:
             _part_faces(gmsh, False)
         except Exception:  # closed faces, as a whole sphere, cannot be flattened
@@ -156,6 +158,20 @@ def _draw(gmsh: ModuleType, path: str) -> None:
         gmsh.model.occ.synchronize()
     if not gmsh.model.getEntities(3):
         raise bad_value("Cad.path", path, "it holds no solid; save the part as a closed solid")
+
+
+def _check_closed(gmsh: ModuleType, path: str) -> None:
+    """Refuse triangles that leave an edge open: gmsh may never return from dividing them into faces.
+
+    Raises:
+        RequestError: an edge has an odd number of triangles.
+    """
+    triangles = gmsh.model.mesh.getElementsByType(_TRIANGLE)[1].reshape(-1, 3)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+    if open_count := int((count % 2).sum()):
+        remedy = f"{open_count} edges of its triangles lack a neighbour; close the surface and save it again"
+        raise bad_value("Cad.path", path, remedy)
 
 
 def _part_faces(gmsh: ModuleType, cut: bool) -> None:

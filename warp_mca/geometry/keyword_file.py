@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -34,14 +35,15 @@ class _Deck:
 def read_keywords(path: Path) -> meshio.Mesh:
     """The solids of a keyword file, with sets of nodes and segments as point sets and parts as cell sets.
 
-    Fields may stand in columns of the usual widths or between commas. Elements that are not solids are passed over.
+    Fields may stand in columns of the usual widths or between commas. Elements that are not solids, as shells and
+    beams, are passed over, which is logged as a warning.
 
     Raises:
         ValueError: a card cannot be read, or the file is put together by keywords that are not read.
     """
     import meshio
 
-    deck = _Deck()
+    deck, left = _Deck(), set[str]()
     for keyword, lines in _blocks(path):
         if keyword.startswith(_UNREAD):
             raise ValueError(f"*{keyword} is not read: write the mesh as one file of *NODE and *ELEMENT_SOLID")
@@ -50,6 +52,12 @@ def read_keywords(path: Path) -> meshio.Mesh:
             _read_set(deck, name, lines, titled=name != keyword)
         elif name in _READERS:
             _READERS[name](deck, lines)
+        elif name.startswith("ELEMENT_") and any(map(_fields, lines)):
+            left.add(keyword)
+    if left:
+        blocks = ", ".join(f"*{keyword}" for keyword in sorted(left))
+        what = f"{path}: elements of {blocks} are left out, with their stiffness and mass: only *ELEMENT_SOLID is read"
+        logging.getLogger("warp_mca").warning("%s", what)
     index = {number: k for k, number in enumerate(deck.nodes)}
     try:
         cells: list[Any] = [

@@ -19,6 +19,7 @@ from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
+from warp_mca.runs.inertia_warnings import inertia_warnings
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
 from warp_mca.runs.rate_groups import rate_figures
@@ -227,6 +228,8 @@ class SceneRun:
         depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
         found += soft_springs(shares, scene.contacts)
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths)
+        if scene.rigid_names:
+            found += inertia_warnings(self.ready, self.solver.model.rigid_bodies, self.state, self.index)
         found += self.ready.warnings
         if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
             found.append(

@@ -38,7 +38,8 @@ class Body:
         velocity: initial velocity of the body frame's origin [m/s].
         angular_velocity: initial angular velocity about the body frame's origin [rad/s].
         rigid: whether it moves as a rigid body in the impact phase: its elements are not computed, and `material` gives
-            its mass and the stiffness of contact springs alone.
+            its mass and the stiffness of contact springs alone. Its inertia is that of its nodes: for a brick of n
+            cells along each edge 2 / n^2 above that of its volume.
     """
 
     name: str
