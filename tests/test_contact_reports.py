@@ -211,6 +211,28 @@ def test_normals_further_than_ten_degrees_off_warn():
     assert "(0.5, 0.866, 0), 30 degrees off the axis (0, 1, 0) of F_n_N" in along(30.0)[0]
 
 
+@pytest.mark.parametrize(
+    ("pressure", "says"),
+    [
+        ((0.0, 100.0, 3.0, 20.0, 0.0), "3.0% of its greatest force"),
+        ((0.0, 100.0, 3.0, 30.0, 1.0, 20.0, 0.0), "1.0% of its greatest force"),
+        ((0.0, 20.0, 4.0, 100.0), "4.0% of its greatest force"),
+        ((0.0, 100.0, 6.0, 20.0, 0.0), ""),  # presses firmly all the time
+        ((0.0, 100.0, 0.0, 20.0, 0.0), ""),  # opens
+        ((0.0, 100.0, 3.0, 8.0, 2.0, 0.0), ""),  # fades away
+        ((0.0, 0.0, 0.0), ""),
+    ],
+)
+def test_a_contact_that_nearly_opens_between_compressions_says_so(pressure: tuple[float, ...], says: str):
+    none = np.zeros((len(pressure), 3))
+    contact = ContactHistory(
+        name="c", force=none, pressure=np.array(pressure), normal_force=none, closing_speed=np.array(pressure)
+    )
+    found = [text for text in contact_warnings([contact], np.zeros((1, 2, 3))) if "nearly opened" in text]
+    assert len(found) == bool(says)
+    assert says in "".join(found)
+
+
 def test_of_a_closed_master_the_tangent_must_lie_across_the_normal():
     closed = (0.0, 0.0, 0.0)
     assert not along(9.9, axis=closed)

@@ -25,6 +25,10 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
     "normal_force_N": "normal_force",
     "closing_speed": "closing_speed",
 }
+LIGHT, FIRM = (
+    0.05,
+    0.1,
+)  # of its greatest force: a contact nearly opens below the first, between forces above the second
 OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
 
 
@@ -114,7 +118,7 @@ def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
 
 
 def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[str]:
-    """Warnings about contacts: none touched, some did not end, normals deviate from the axes of F_n and F_t.
+    """Warnings about contacts: none touched, some did not end or nearly opened, normals are off the axes.
 
     Args:
         contacts: of the scene.
@@ -130,9 +134,24 @@ def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[st
             "longer duration if it should end"
         )
     for contact, (normal, tangent) in zip(contacts, axes, strict=True):
+        found += _nearly_opens(contact)
         if contact.normal is not None:
             found += _off_axis(contact.name, contact.normal, normal, tangent)
     return found
+
+
+def _nearly_opens(contact: ContactHistory) -> list[str]:
+    """A warning where a contact hardly presses between two compressions: another mesh may open it there."""
+    share = contact.pressure / max(float(contact.pressure.max(initial=0.0)), 1e-300)
+    firm, light = np.flatnonzero(share > FIRM), np.flatnonzero(share <= LIGHT)
+    before = np.searchsorted(firm, light)  # firm rows before each light one: 0 and all are no dips
+    dips = [float(share[light[before == k]].min()) for k in np.unique(before) if 0 < k < len(firm)]
+    if not any(least := [dip for dip in dips if dip > 0.0]):
+        return []
+    return [
+        f"contact {contact.name} nearly opened between two compressions, with {min(least):.1%} of its greatest force: "
+        "whether it opens there may depend on the mesh, and with it duration and impulse; compare with a finer one"
+    ]
 
 
 def _off_axis(name: str, true: Array, normal: Array, tangent: Array) -> list[str]:
