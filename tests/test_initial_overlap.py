@@ -96,3 +96,26 @@ def test_a_body_at_rest_above_a_plane_has_nothing_said_of_overlap():
 def test_unknown_choice_is_refused():
     with pytest.raises(mca.RequestError, match=r"Contact\.initial_overlap = 'ignore': choose refuse or stress_free"):
         falling(0.0, initial_overlap="ignore")
+
+
+@pytest.mark.parametrize("divisions", [1, 3])
+@pytest.mark.parametrize("move", [0.0, 0.01])
+def test_equal_bodies_at_one_place_are_refused(divisions: int, move: float):
+    """No node is inside, all lie on faces: the middles of the cells tell."""
+    box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(divisions,) * 3)  # pyright: ignore[reportArgumentType]
+    there = mca.Body(name="there", geometry=box, material=STEEL)
+    here = replace(there, name="here", position=(move, 0.0, 0.0), velocity=(-1.0, 0.0, 0.0))
+    sides = [mca.Surface(body=name, nodes="boundary") for name in ("here", "there")]
+    scene = mca.Scene(
+        name="coincident",
+        bodies=(there, here),
+        contacts=(mca.Contact(slave=sides[0], master=sides[1]),),
+        impact=mca.ImpactPhase(duration=1e-6, output_interval=1e-7),
+    )
+    if move:  # side by side
+        assert mca.run(scene).summary["touched"]
+    else:
+        with pytest.raises(
+            mca.RequestError, match=r"cells of one body lie inside .*\(\d+ of them, .*: move the bodies"
+        ):
+            mca.run(scene)

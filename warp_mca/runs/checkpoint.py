@@ -238,6 +238,6 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
         if not isinstance(head["request"], dict):
             raise ValueError(head["request"])
     except DAMAGE as error:
-        remedy = f"{FILE} there is damaged or of another version; use --force (force=True) to begin anew"
+        remedy = f"{FILE} there is damaged or of another version; run again with --force (force=True)"
         raise bad_value("out", str(path.parent), remedy) from error
     return head, more

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from warp_mca.results.contact_history import contact_names
 from warp_mca.scene import OVERLAP_CHOICES, RigidPlane
 
 if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
     from warp_mca.runs.prepare import Prepared
     from warp_mca.scene import Contact
     from warp_mca.solve.contact_stage import ContactStage
@@ -27,23 +28,28 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-6  # of a face's edge: depths up to this are rounding, no overlap
 DEEP = 0.5  # of a face's edge: nodes deeper than this are looked for in the whole body, since faces reach one edge deep
+WITHIN = (
+    0.25  # of a cell's radius: cells whose middle is deeper than this lie in the other body, wherever their nodes are
+)
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """Slave nodes of one contact pass that lie inside the master.
+    """Slave nodes of one contact pass that lie inside the master, or cells behind slave faces whose middle does.
 
     Attributes:
         count: number of them.
-        node: the deepest one.
-        depth: of that node [m].
+        node: the deepest one, or a corner of the deepest cell.
+        depth: of that node, or of that middle [m].
         energy: that springs of this pass would hold at the start [J].
+        kind: nodes or cells.
     """
 
     count: int
     node: int
     depth: float
     energy: float
+    kind: str = "nodes"
 
 
 def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: State) -> None:
@@ -108,17 +114,50 @@ def _deep_overlap(ready: Prepared, stage: ContactStage, scene: int, solver: Solv
     item, model = stage.items[scene], ready.model
     contact = ready.scene.contacts[item.contact]
     assert not isinstance(contact.master, RigidPlane)
-    name = contact.master.body if item.sign > 0.0 else contact.slave.body
-    mesh, start = ready.meshes[name], model.node_start[name]
+    master, slave = (contact.master, contact.slave) if item.sign > 0.0 else (contact.slave, contact.master)
+    mesh, start = ready.meshes[master.body], model.node_start[master.body]
     first = int(solver.layout.nodes[scene])
     X = solver.model.X[first:]
     body = X[start : start + len(mesh.points)]
     own = item.slave - first if len(stage.items) > 1 else item.slave
-    near = own[((X[own] > body.min(axis=0)) & (X[own] < body.max(axis=0))).all(axis=1)]
+    near = own[_in_box(X[own], body)]
+    found = None
+    if len(near):
+        depth = _depths_inside(X[near], body, mesh.boundary[0])
+        found = _found(near + first, depth, np.zeros(len(near)), DEEP * _edge(stage, scene))
+    if found:
+        return found
+    node, middle, radius = _cells_behind(ready.meshes[slave.body], slave.nodes, X[model.node_start[slave.body] :])
+    near = np.flatnonzero(_in_box(middle, body))
     if not len(near):
         return None
-    depth = _depths_inside(X[near], body, mesh.boundary[0])
-    return _found(near + first, depth, np.zeros(len(near)), DEEP * _edge(stage, scene))
+    depth = _depths_inside(middle[near], body, mesh.boundary[0])
+    depth[depth <= WITHIN * radius[near]] = 0.0
+    nodes = node[near] + model.node_start[slave.body] + first
+    within = _found(nodes, depth, np.zeros(len(near)), 0.0)
+    return replace(within, count=int((depth > 0.0).sum()), kind="cells") if within else None
+
+
+def _cells_behind(mesh: Mesh, name: str, X: Array) -> tuple[NDArray[np.int32], Array, Array]:
+    """A corner, the middle [m] and the distance from it to the nearest corner [m] of the cells behind a surface.
+
+    Where two equal bodies coincide no node is inside, but these middles are.
+    """
+    behind, first, found = np.unique(mesh.surface(name)[1]), 0, []
+    for conn in mesh.cells.values():
+        part = conn[behind[(behind >= first) & (behind < first + len(conn))] - first]
+        first += len(conn)
+        middle = X[part].mean(axis=1)
+        found.append(
+            (part[:, 0], middle, np.linalg.norm(X[part] - middle[:, None], axis=2).min(axis=1, initial=np.inf))
+        )
+    corner, middle, radius = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
+    return corner, middle, radius
+
+
+def _in_box(points: Array, body: Array) -> NDArray[np.bool_]:
+    """Whether points lie in the box around a body, shape (point_count,), bool."""
+    return ((points > body.min(axis=0)) & (points < body.max(axis=0))).all(axis=1)
 
 
 def _depths_inside(points: Array, body: Array, quads: NDArray[np.int32]) -> Array:
@@ -142,9 +181,13 @@ def _refusal(ready: Sequence[Prepared], scene: int, contact: int, found: Overlap
     field = f"Contact {contact_names(ready[scene].scene.contacts)[contact]}: initial_overlap"
     others = ", ".join(repr(choice) for choice in OVERLAP_CHOICES[1:])
     remedy = (
-        f"nodes of one body lie inside the other before the first step ({found.count} of them, up to {found.depth:.3g} "
-        f"m deep at ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) m), and contact springs would hold {found.energy:.3g} J: "
-        f"move the bodies apart, or choose one of {others}"
+        f"{found.kind} of one body lie inside the other before the first step ({found.count} of them, up to "
+        f"{found.depth:.3g} m deep at ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) m)"
     )
+    if found.kind == "nodes":  # which springs press; the bodies of cells that only their middle shows are out of place
+        springs = f"contact springs would hold {found.energy:.3g} J"
+        remedy = f"{remedy}, and {springs}: move the bodies apart, or choose one of {others}"
+    else:
+        remedy += ": move the bodies apart"
     error = bad_value(field, item.initial_overlap, remedy)
     return RequestError(f"scenes[{scene}]: {error}") if len(ready) > 1 else error

@@ -154,7 +154,9 @@ class State:
             mine = {name: _fitting(name, to, stored.pop(name)) for name, to in self.arrays().items()} if alike else {}
             scenes = [SceneRecords.of(_part(stored, f"scenes/{k}/")) for k in range(head["scenes"])]
         except DAMAGE as error:
-            raise bad_value("state", str(path), "it is damaged or of another version; run again") from error
+            raise bad_value(
+                "state", str(path), "it is damaged or of another version; remove it and run again"
+            ) from error
         if not alike:
             raise bad_value("state", str(path), "it is of another model, precision or time step; use the run's own")
         for name, to in self.arrays().items():
