@@ -28,9 +28,7 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-6  # of a face's edge: depths up to this are rounding, no overlap
 DEEP = 0.5  # of a face's edge: nodes deeper than this are looked for in the whole body, since faces reach one edge deep
-WITHIN = (
-    0.25  # of a cell's radius: cells whose middle is deeper than this lie in the other body, wherever their nodes are
-)
+WITHIN = 0.25  # of a cell's radius: a cell whose middle is deeper lies in the other body, wherever its nodes are
 
 
 @dataclass(frozen=True)
@@ -148,9 +146,8 @@ def _cells_behind(mesh: Mesh, name: str, X: Array) -> tuple[NDArray[np.int32], A
         part = conn[behind[(behind >= first) & (behind < first + len(conn))] - first]
         first += len(conn)
         middle = X[part].mean(axis=1)
-        found.append(
-            (part[:, 0], middle, np.linalg.norm(X[part] - middle[:, None], axis=2).min(axis=1, initial=np.inf))
-        )
+        radius = np.linalg.norm(X[part] - middle[:, None], axis=2).min(axis=1, initial=np.inf)
+        found.append((part[:, 0], middle, radius))
     corner, middle, radius = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
     return corner, middle, radius
 
