@@ -208,11 +208,10 @@ class ContactStage:
             held = state.contacts[self.index].spring.held
             wp.launch(self.clear, len(self.slave), inputs=[*inputs, self.longest], outputs=[held])
 
-    def search(self, work: Workspace, state: State, u: wp.array | None = None) -> None:
-        """Broad phase: list what each slave may touch until the next search; by the state's displacements, or u [m]."""
-        u = state.u if u is None else u
-        self.find_boxes(work, u)
-        self.list_faces(work, state, u)
+    def search(self, work: Workspace, state: State) -> None:
+        """Broad phase: list what each slave may touch until the next search."""
+        self.find_boxes(work, state.u)
+        self.list_faces(work, state, state.u)
 
     def find_boxes(self, work: Workspace, u: wp.array) -> None:
         """First part of a search: boxes around the master's faces, and the tree of these."""
