@@ -15,9 +15,7 @@ Array = NDArray[np.float64]
 
 MEAN = 5  # rows whose mean is what the surface does besides
 SPAN = 20  # rows, all in contact, that vibrate
-# Amplitude over the greatest speed of the tip along or towards the target from which on a word is said. Runs of two_link
-# without flutter show 0.05 at most, also with rows 20 times coarser than its own; docs/decisions.md.
-SHARE = 0.07
+SHARE = 0.07  # amplitude over the speed at which tip and target met, from which on a word is said; docs/decisions.md
 
 
 def flutter_warnings(history: Mapping[str, Array], model: Model) -> list[str]:
@@ -30,16 +28,16 @@ def flutter_warnings(history: Mapping[str, Array], model: Model) -> list[str]:
     if not axes or len(history["time_s"]) < MEAN + SPAN:
         return []
     tip, target = (np.column_stack([history[f"{point}_v{axis}"] for axis in "xyz"]) for point in ("tip", "plate"))
-    speed = float(np.linalg.norm(_mean(tip - target), axis=1).max())
+    speed = float(np.linalg.norm(tip[0] - target[0]))
     along = target @ np.concatenate(axes).T  # normal and tangent of each contact
-    amplitude = float(vibration(along, history["F_n_N"] > 0.0))
-    if not amplitude > SHARE * speed:  # nor where there are no such points
+    amplitude = vibration(along, history["F_n_N"] > 0.0)
+    if not amplitude > SHARE * speed > 0.0:  # nor where there are no such points
         return []
     return [
-        f"the surface at the target point flutters with up to {amplitude:.2g} m/s, {amplitude / speed:.0%} of the "
-        "speed at which the tip slides or approaches: friction on contact springs excites vibrations that depend on "
-        "mesh and penalty, so plate_vx, plate_vy and plate_vz are not the motion of the body there, and sticks may list "
-        "times in which only single nodes stick; forces and energy change little; a lower penalty lessens it"
+        f"the surface under the tip vibrates with up to {amplitude:.2g} m/s, {amplitude / speed:.0%} of the speed at "
+        "which they met, faster than rows show: friction and stiff contact springs excite its cells (flutter), which "
+        "depends on mesh and penalty; take plate_vx, plate_vy, plate_vz, stick_fraction and sticks with care; a lower "
+        "penalty lessens it"
     ]
 
 
