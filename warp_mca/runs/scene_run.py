@@ -18,6 +18,7 @@ from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
 from warp_mca.runs.contact_warnings import resolution_warnings
 from warp_mca.runs.element_warnings import element_warnings
+from warp_mca.runs.flutter_warnings import flutter_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.inertia_warnings import inertia_warnings
 from warp_mca.runs.ledger import Ledger
@@ -127,7 +128,9 @@ class SceneRun:
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
-        warnings = (*self._warnings(shares, stopped), *contact_warnings(contacts, self.ready.model.contact_axes), *said)
+        model = self.ready.model
+        told = [*contact_warnings(contacts, model.contact_axes), *flutter_warnings(history, model)]
+        warnings = (*self._warnings(shares, stopped), *told, *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
         return Result(summary, history, None, warnings, paths, stopped, **own)
 
