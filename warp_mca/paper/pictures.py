@@ -32,9 +32,8 @@ VELOCITIES: tuple[Panel, ...] = (
 )
 
 FLUTTER = (
-    "Where v_x of the plate swings from row to row (v_plate = 0.4 m/s, μ = 0.7), friction makes its outermost cells "
-    "vibrate: flutter, at several MHz, which depends on mesh and penalty and not on the time step. The forces hardly "
-    "show it."
+    "Where v_x of the plate swings from row to row, friction makes its outermost cells vibrate: flutter, which depends "
+    "on mesh and penalty and not on the time step. The forces hardly show it."
 )
 
 
