@@ -1,15 +1,16 @@
 """Owns the measurements behind `--accuracy`: the store that choices are made from, and how good the choices are.
 
 python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --workers 10 --deadline 300
-python -m benchmarks.accuracy learn --device cuda:0 --scenes 30 --families two_link --add 3 --workers 10 --deadline 300
+python -m benchmarks.accuracy learn --device cuda:0 --families two_link --add 1 3 --workers 10 --deadline 300
 python -m benchmarks.accuracy learn --device cuda:0 --families two_link --lacking --workers 10 --deadline 300
 python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 --deadline 350
 python -m benchmarks.accuracy render
 
 `learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store,
-with `--add` beside the scenes that it has, which are not run again; with `--lacking` it runs these with variants that
-they lack. `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with references, and writes
-docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into docs/accuracy.md.
+with `--add` beside the scenes that it has, which are not run again (seeds of other scenes); with `--lacking` it runs
+these with variants that they lack. `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with
+references, and writes docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into
+docs/accuracy.md.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ ROOT = Path(__file__).resolve().parents[1]
 JSON = ROOT / "docs" / "accuracy.json"
 PAGE = ROOT / "docs" / "accuracy.md"
 ASKED = (0.02, 0.05)
-LEARN, HELD_OUT = 1, 5  # seeds: choices are never tried on scenes that they were learnt from
+LEARN, HELD_OUT = 1, 8  # seeds: choices are never tried on scenes that they were learnt from
 LEARNING = 0.45  # share of the time of `both` that is spent on the store
 GALLERY = 6  # scenes of each other family to learn from; one of each is tried
 
@@ -61,7 +62,9 @@ def main() -> None:
     parser.add_argument("--deadline", type=float, default=1e9, metavar="SECONDS", help="stop measuring after this")
     parser.add_argument("--reference", type=float, default=1.0, metavar="SCALE", help="refine of references times this")
     parser.add_argument("--families", help="names with commas between them (default: all)")
-    parser.add_argument("--add", type=int, metavar="SEED", help="learn other scenes, beside those of the store")
+    parser.add_argument(
+        "--add", type=int, nargs="+", metavar="SEED", help="learn other scenes, beside those of the store"
+    )
     parser.add_argument("--lacking", action="store_true", help="learn variants that scenes of the store lack")
     parser.add_argument("-o", "--output", type=Path)
     args = parser.parse_args()
@@ -114,9 +117,9 @@ def _sampled(
     args: argparse.Namespace, families: list[Family], before: Mapping[str, Any], until: float
 ) -> Iterable[dict[str, Any]]:
     """Families with random scenes, as far as these are measured."""
-    seed = LEARN if args.add is None else args.add
-    assert seed != HELD_OUT, "these scenes are those that choices are tried on"
-    scenes = {family.scene: _scenes(args, family, seed, GALLERY) for family in families}
+    seeds = args.add or [LEARN]
+    assert HELD_OUT not in seeds, "these scenes are those that choices are tried on"
+    scenes = {f.scene: [item for seed in seeds for item in _scenes(args, f, seed, GALLERY)] for f in families}
     if args.add is not None:
         kept = {name: [entry["parameters"] for entry in item["scenes"]] for name, item in before.items()}
         scenes = {name: [item for item in new if item not in kept.get(name, [])] for name, new in scenes.items()}

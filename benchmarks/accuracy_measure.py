@@ -19,7 +19,7 @@ from benchmarks.accuracy_families import FAMILIES, Family, Values
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.variant import Variant
 
-BATCH = 5  # scenes side by side at most
+BATCH = 8  # scenes side by side at most
 WORK = {"hex8r": 0.65}  # processor time of an element over that of hex8 with plasticity (docs/performance.md) [-]
 COMPUTED = 0.4  # share of the elements that a step computes on a CPU with several rates, where it was not measured
 FINE = -1  # number of the reference among the variants
@@ -123,6 +123,8 @@ def jobs_of(
 ) -> list[Job]:
     """Jobs of some scenes of each family in turn, then of the next ones: those that a deadline leaves out are the last.
 
+    Scenes that last longest come first, so that no process has one of them to itself in the end.
+
     On a GPU scenes of `two_link` of equal duration share a batch; references are alone. `wanted` tells whether a
     variant of a scene is measured; the reference and its partner always are, and come first.
     """
@@ -142,21 +144,26 @@ def jobs_of(
 
 
 def _parts(family: Family, scenes: Sequence[Values], device: str) -> list[list[int]]:
-    """Numbers of scenes that share batches, those of one duration cut into equal parts."""
+    """Numbers of scenes that share batches, those of one duration cut into equal parts; most steps come first."""
     together = BATCH if device != "cpu" and family.scene == "two_link" else 1
     order = sorted(range(len(scenes)), key=lambda k: (scenes[k].get("duration", 0.0), _stiffness(scenes[k])))
-    parts: list[tuple[int, list[int]]] = []
+    parts: list[list[int]] = []
     for _, group in groupby(order, key=lambda k: scenes[k].get("duration")):
         members = list(group)
         count = math.ceil(len(members) / together)
         size = math.ceil(len(members) / count)
-        parts += [(i, members[i : i + size]) for i in range(0, len(members), size)]
-    return [part for _, part in sorted(parts)]
+        parts += [members[i : i + size] for i in range(0, len(members), size)]
+    return sorted(parts, key=lambda part: max(_steps(scenes[k]) for k in part), reverse=True)
 
 
 def _stiffness(values: Values) -> float:
     """Greatest modulus of a scene [Pa]: scenes of a batch take the shortest step of all."""
     return max((values[name] for name in ("E_tip", "E_body") if name in values), default=70e9)
+
+
+def _steps(values: Values) -> float:
+    """Steps of a scene on a mesh over those of another one on the same [-]."""
+    return values.get("duration", 1.0) * math.sqrt(max(_stiffness(values), 70e9))
 
 
 def attempted(job: Job) -> list[tuple[str, int, int, Row]]:
