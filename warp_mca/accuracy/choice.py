@@ -14,7 +14,7 @@ from warp_mca.runs.rate_groups import StepCost
 
 # Probabilities that all errors of a choice are within what was asked, from measured scenes that are left out in turn:
 LEAST = 0.7  # below this none is made [-]
-WORTH = 0.15  # what twice the cost must add [-]
+WORTH = 0.2  # what twice the cost must add [-]
 
 
 @dataclass(frozen=True)
