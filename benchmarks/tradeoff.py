@@ -32,8 +32,8 @@ CASES = (
     ),
     (
         "standard",
-        "`two_link`, `standard`, on 12 CPU cores",
-        "warp-mca tradeoff two_link --preset standard --threads 12 --budget 500 --out DIR",
+        "`two_link`, `standard`, on two CPU cores",
+        "warp-mca tradeoff two_link --preset standard --threads 2 --budget 2400 --out DIR",
     ),
     (
         "coarse",
@@ -61,6 +61,9 @@ NOTES = {
     "elements it is 3572 N). Stiffer springs and finer cells at the contact are worth most; coarse tied rods and a "
     "rigid far link spoil the impulse. The plastic strain is that of the contact: the point loads of the hinges, which "
     "have no limit, take over on finer meshes.",
+    "standard": "Springs of the scene's own penalty, 0.1, take 9 % off the first peak and hold the contact 11 % longer, far "
+    "more than cells of this size do: the variants of the frontier with penalty 1 and 3 are 3 to 23 times faster than the "
+    "scene as written, and seven to thirty times closer. With `joint_nodes=pin` the impulse has a limit, too.",
     "rolling_sphere": "The ball begins pressed into the plane, to a depth computed for its mesh: its first peak is the "
     "transient of that start, and little can be said about it; the impulse is what the scene is about.",
 }
