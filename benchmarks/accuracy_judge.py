@@ -20,7 +20,7 @@ MARGIN = 1.5  # costs by the store, means over its scenes, over those of the run
 def judged(
     family: Family, values: Values, table: Table, truth: Sequence[float | None], runs: Sequence[Row], device: str
 ) -> dict[str, Any]:
-    """What came of the runs of one scene."""
+    """What came of the runs of one scene, and errors and cost of each variant that was measured in it."""
 
     def bound(figures: Sequence[float | None]) -> list[float | None]:
         return list(bound_errors(errors_of(figures, truth), family.no_limit).values())
@@ -44,7 +44,8 @@ def judged(
                 "cheapest": min(within, default=(None, None)),
             }
         )
-    return {"scene": family.scene, "parameters": values, "truth": list(truth), "runs": rows}
+    tried = {number: [*bound(row["figures"]), cost(row, device)] for number, row in table.items() if number != FINE}
+    return {"scene": family.scene, "parameters": values, "truth": list(truth), "runs": rows, "tried": tried}
 
 
 def cost(row: Row, device: str) -> float:

@@ -19,7 +19,7 @@ from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
 from warp_mca.accuracy.plan import planned
-from warp_mca.accuracy.prediction import HIGH, LOW, NOISE, Expected, gaussian_process
+from warp_mca.accuracy.prediction import CORE, HIGH, LOW, NOISE, Expected, gaussian_process
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.cli.main import main
@@ -121,9 +121,9 @@ def test_nothing_is_chosen_where_no_variant_is_accurate_enough(known: store.Fami
 
 
 def test_estimates_are_those_most_probably_right():
-    """About no mean, d/de [Phi(e / LOW s) - Phi(e / HIGH s)] = 0 has a closed form."""
+    """About no mean, d/de [Phi(e / LOW s) - Phi(e / HIGH s)] = 0 has a closed form; s is CORE of the spread."""
     c = math.sqrt(2.0 * math.log(HIGH / LOW) / (LOW**-2 - HIGH**-2))
-    assert Expected(0.0, 0.01).estimate(0.0) == pytest.approx(0.01 * c, rel=0.02)
+    assert Expected(0.0, 0.01).estimate(0.0) == pytest.approx(0.01 * CORE * c, rel=0.02)
     mean = Expected(0.04, 0.001).estimate(0.0)
     assert LOW * 0.043 < mean < HIGH * 0.037  # sure to be right
     assert mean == pytest.approx(0.04, rel=0.02)
@@ -157,6 +157,12 @@ def test_variants_may_have_other_elements_unless_the_model_is_to_stay_full(known
     assert accuracy["estimate"]["impulse"] is None
     assert "lengthen duration" in accuracy["reasons"]["impulse"]
     assert accuracy["estimate"]["F_n_first_peak"] is not None
+    force = np.array([0.0, *[100.0] * 9, 0.0, 0.0, 1.0, 0.0])
+    grazing = replace(fake(plan.scene), history={"time_s": 1e-6 * np.arange(len(force)), "F_n_N": force})
+    accuracy = replace(plan, reasons={}).judged(grazing).summary["accuracy"]
+    assert accuracy["estimate"]["contact_duration"] is None
+    assert "touches with hardly any force" in accuracy["reasons"]["contact_duration"]
+    assert accuracy["estimate"]["impulse"] is not None
     full = planned(scene, Accuracy(share=0.09, full=True), {}, "cpu", None, fake)
     assert full is not None
     assert full.variant.element is None

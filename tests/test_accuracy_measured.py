@@ -65,6 +65,8 @@ def test_choices_are_judged_by_true_errors_estimates_and_cost():
     scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
     other = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [poor, run(2.8, 0.1, 0.9)], "cuda:0")
     assert scene["runs"][0]["worst"] == pytest.approx(0.1 / 2.8)
+    assert set(scene["tried"]) == set(range(len(ROD.variants)))
+    assert scene["tried"][10][:3] == pytest.approx([None, 0.1 / 1.7, 0.0])
     assert scene["runs"][0]["cheapest"][1] == 10  # refine 1.7: 0.1 / 1.7 is within 6 %, 0.1 / 1.4 is not
     found = list(counts({"scenes": [scene, other]}).values())
     assert found == [(2, 3), (3, 3), (2, 3), (1, 3), (2, 3)]

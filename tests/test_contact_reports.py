@@ -13,6 +13,7 @@ from impacts import finished, momentum, prepared, result_of
 import warp_mca as mca
 from warp_mca.model.build import build_model
 from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
+from warp_mca.results.force_history import grazing_share
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 SOFT = mca.Elastic(E=1e7, nu=0.3, rho=1000.0)
@@ -231,6 +232,30 @@ def test_a_contact_that_nearly_opens_between_compressions_says_so(pressure: tupl
     found = [text for text in contact_warnings([contact], np.zeros((1, 2, 3))) if "nearly opened" in text]
     assert len(found) == bool(says)
     assert says in "".join(found)
+
+
+@pytest.mark.parametrize(
+    ("pressure", "share"),
+    [
+        ((0.0, *[100.0] * 50, 0.0, 0.0, 0.0, 3.0, 4.0, 0.0), 2 / 52),
+        ((0.0, 4.9, 0.0, 0.0, *[100.0] * 9, 0.0), 0.1),
+        ((0.0, *[100.0] * 50, 0.0, 0.0, 0.0, 6.0, 4.0, 0.0), 0.0),  # presses
+        ((0.0, *[100.0] * 50, 0.0, 0.0, 0.0, 3.0, 4.0), 0.0),  # may press yet
+        ((0.0, *[100.0] * 50, 0.0, 3.0, 4.0, 0.0), 0.0),  # the same contact still
+        ((0.0, *[100.0] * 200, *[0.0] * 9, 3.0, 4.0, 0.0), 0.0),  # too short to matter
+        ((0.0, *[100.0] * 200, *[0.0] * 9, 0.05, 0.05, 0.05, 0.0), 0.0),  # no contact
+        ((0.0, 0.0), 0.0),
+    ],
+)
+def test_touches_in_which_bodies_only_graze_say_so(pressure: tuple[float, ...], share: float):
+    assert grazing_share(np.array(pressure)) == pytest.approx(share)
+    none = np.zeros((len(pressure), 3))
+    contact = ContactHistory(
+        name="c", force=none, pressure=np.array(pressure), normal_force=none, closing_speed=np.array(pressure)
+    )
+    found = [text for text in contact_warnings([contact], np.zeros((1, 2, 3))) if "touches of their own" in text]
+    says = [f"for {share:.0%} of its time, contact c has less than 5% of its greatest force"] if share else []
+    assert [text.partition(" in ")[0] for text in found] == says
 
 
 def test_of_a_closed_master_the_tangent_must_lie_across_the_normal():

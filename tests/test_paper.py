@@ -135,6 +135,15 @@ def test_another_level_needs_another_folder(folder: Path):
         report_of(replace(SMALL, points={"mu": (0.1, 1.0)}), folder)
 
 
+def test_an_empty_name_is_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(["paper", "--out", ""]) == 2
+    assert "--out: '': name a folder" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_pages_show_the_same_and_need_nothing_else(folder: Path):
     page, text = ((folder / name).read_text(encoding="utf-8") for name in ("paper.html", "paper.md"))
     assert "<img" in page and not re.search(r'(src|href)="(?!data:)', page)

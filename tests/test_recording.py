@@ -14,7 +14,8 @@ import warp_mca as mca
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.model.build import build_model
 from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
-from warp_mca.recorders.frames import Recording, check_files, skins
+from warp_mca.recorders.checks import check_files
+from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
 from warp_mca.results.paths import locate
 from warp_mca.solve.output import Output

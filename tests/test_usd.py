@@ -190,7 +190,7 @@ def test_a_frame_of_20000_vertices_takes_at_most_280_kB(
     monkeypatch.setattr(usd_file, "SAVE_AFTER", 0.0)
     recorder = UsdFile(tmp_path / "grid.usdc")
     recorder.start(bars.info)
-    first = usd_file.SAVE_EVERY  # the first frames hold the normals of all
+    first = usd_file.WRITE_EVERY  # the first frames hold the normals of all
     for code in range(3 * first):
         if code == first:
             begun = (tmp_path / "grid.usdc").stat().st_size
@@ -252,7 +252,7 @@ def test_frames_are_whole_when_their_writing_is_interrupted(
 
     recorder, levels = UsdFile(tmp_path / "a.usdc"), usd_prims.levels
     recorder.start(bars.info)
-    last = usd_file.SAVE_EVERY - 1  # with which all are written
+    last = usd_file.WRITE_EVERY - 1  # with which all are written
     for index in range(last):
         recorder.frame(bars.frame(index))
     monkeypatch.setattr(usd_prims, "levels", interrupted)
@@ -360,11 +360,11 @@ def test_a_full_disk_leaves_the_frames_saved_before(bars: FlyingBars, tmp_path: 
     monkeypatch.setattr(usd_file, "SAVE_AFTER", 0.0)
     recorder = UsdFile(tmp_path / "a.usdc")
     recorder.start(bars.info)
-    for index in range(usd_file.SAVE_EVERY):
+    for index in range(usd_file.WRITE_EVERY):
         recorder.frame(bars.frame(index))
     monkeypatch.setattr(usd_file.shutil, "disk_usage", lambda path: SimpleNamespace(free=1 << 20))
     with pytest.raises(OSError, match="are free on its disk"):
-        for index in range(usd_file.SAVE_EVERY, 3 * usd_file.SAVE_EVERY):
+        for index in range(usd_file.WRITE_EVERY, 3 * usd_file.WRITE_EVERY):
             recorder.frame(bars.frame(index))
     recorder.finish(False)
-    assert opened(tmp_path / "a.usdc").GetEndTimeCode() == usd_file.SAVE_EVERY - 1.0
+    assert opened(tmp_path / "a.usdc").GetEndTimeCode() == usd_file.WRITE_EVERY - 1.0

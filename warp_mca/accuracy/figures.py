@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from warp_mca.results.force_history import grazing_share
+
 if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
@@ -17,15 +19,15 @@ NAMES = (*BOUND, "max_plastic_strain", "path_stress")  # [-], [Pa]
 def figures_of(result: Result) -> Figures:
     """Headline figures of a run, each None where it has none: a contact without a peak, elastic bodies, no path.
 
-    A contact that is still open when the run ends has no duration.
+    A contact that is still open when the run ends has no duration, nor have bodies that graze each other after it.
     """
     summary = result.summary
-    lasts = summary.get("contact_open_at_end")
+    unsure = summary.get("contact_open_at_end") or grazing_share(result.F_n) > 0.0
     peaks = summary["F_n_peaks"]
     return {
         "F_n_first_peak": float(peaks[0][1]) if peaks else None,
         "impulse": normal_impulse(result) or None,
-        "contact_duration": None if lasts else summary["contact_duration"] or None,
+        "contact_duration": None if unsure else summary["contact_duration"] or None,
         "max_plastic_strain": summary["max_plastic_strain"] or None,
         "path_stress": max((float(path.von_mises.max()) for path in result.paths if path.stress.size), default=None),
     }

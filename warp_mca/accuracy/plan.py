@@ -19,6 +19,7 @@ from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.store import Family, family_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import bad_value
+from warp_mca.results.force_history import grazing_share
 from warp_mca.runs.advice import LOGGER
 from warp_mca.runs.rate_groups import cost_of
 from warp_mca.scene import Scene
@@ -35,6 +36,7 @@ NAMES = {
     "max_plastic_strain": "greatest plastic strain",
 }
 OPEN = "still in contact at the end of the run; lengthen duration"
+GRAZE = "it counts touches with hardly any force, whose length is the mesh's; contacts has the first one's"
 STRAIN = "it grows without bound at the edge of the contact as cells shrink"
 
 AT_END = ("contact_duration", "impulse")  # figures that depend on when a run ends in contact
@@ -89,7 +91,9 @@ class Plan:
             if name in reasons:
                 continue
             if found[name] is None:
-                reasons[name] = "the run has no such figure"
+                reasons[name] = (
+                    GRAZE if name == AT_END[0] and grazing_share(result.F_n) else "the run has no such figure"
+                )
             elif isinstance(value, str):
                 reasons[name] = value
             else:

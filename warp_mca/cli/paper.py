@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import GuardError
+from warp_mca.cli.folder import folder
 from warp_mca.cli.warp_start import start_warp
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "state is stored on the way, and the same command goes on from it",
     )
     parser.add_argument("--force", action="store_true", help="start again, in place of going on with what DIR holds")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the report (default: paper-LEVEL)")
+    parser.add_argument("--out", type=folder, metavar="DIR", help="folder for the report (default: paper-LEVEL)")
     parser.set_defaults(command=_carry_out)
 
 

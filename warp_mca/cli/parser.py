@@ -10,6 +10,7 @@ from typing import NoReturn
 import warp_mca as mca
 from warp_mca.cli import commands, paper, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
+from warp_mca.cli.folder import folder
 from warp_mca.elements import ELEMENTS
 from warp_mca.runs.checkpoint import METHODS
 
@@ -112,14 +113,14 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         help="store the state each 100 steps, 2e-5s simulated or 30w (seconds of wall time); after an interruption the "
         "same command goes on from it (default with pure-fem: 30w)",
     )
-    group.add_argument("--out", type=_folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
+    group.add_argument("--out", type=folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     group.add_argument("--force", action="store_true", help="replace results that the folder holds already")
     _add_recorders(parser)
     parser.set_defaults(command=run.run)
 
 
 def _resume(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", metavar="DIR", type=_folder, help="folder of a run with --checkpoint or pure-fem")
+    parser.add_argument("folder", metavar="DIR", type=folder, help="folder of a run with --checkpoint or pure-fem")
     parser.set_defaults(command=run.resume, parse=lambda words: make_parser().parse_args(words))
 
 
@@ -128,7 +129,7 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
     _add_options(parser)
     sweep.add_options(parser)
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="folder for the table (default: SCENE-PRESET-sweep)")
+    parser.add_argument("--out", type=folder, metavar="DIR", help="folder for the table (default: SCENE-PRESET-sweep)")
 
 
 def _tradeoff(parser: argparse.ArgumentParser) -> None:
@@ -139,7 +140,7 @@ def _tradeoff(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
     )
-    parser.add_argument("--out", type=_folder, metavar="DIR", required=True, help="folder for the results")
+    parser.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder for the results")
     parser.add_argument("--force", action="store_true", help="replace a trade-off that the folder holds already")
     parser.set_defaults(command=tradeoff.tradeoff)
 
@@ -170,19 +171,13 @@ def _verify(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
     _add_element(parser)
     parser.add_argument("--level", default="quick", choices=("quick", "full"), help="meshes (default: %(default)s)")
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="write verification.md and its figure there")
+    parser.add_argument("--out", type=folder, metavar="DIR", help="write verification.md and its figure there")
     parser.set_defaults(command=commands.verify)
 
 
 def _mass_scaling(text: str) -> float | str:
     """A factor, or a step as text."""
     return text if text.endswith("s") else float(text)
-
-
-def _folder(text: str) -> Path:
-    if not text:
-        raise argparse.ArgumentTypeError("'': name a folder, or . for this one")
-    return Path(text)
 
 
 def _groups(text: str) -> int | str:

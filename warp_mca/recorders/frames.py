@@ -2,39 +2,43 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.records.output import OPEN, STICK
+from warp_mca.recorders.checks import files_of
 from warp_mca.recorders.recorder import (
     CONTACT,
-    NEEDS,
     PATHS,
     SURFACE,
     VOLUME,
-    Cadence,
     Frame,
     Recorder,
     RunInfo,
     SurfaceMesh,
     Volume,
-    file_path,
 )
-from warp_mca.results.storage import ALL_FILES
-from warp_mca.solve.transfer import Transfer
+from warp_mca.solve.transfer import SLOTS, Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model.model import Model
     from warp_mca.solve.output import Output
+
+
+# Frames on their way from a GPU, which goes on meanwhile: while recorders start, or save their files.
+AHEAD, AHEAD_BYTES = 16, 64 << 20  # at most, and their size together
+START = 0.02  # time for which a GPU is given work before recorders start beside it [s]
 
 
 def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
@@ -46,49 +50,6 @@ def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
         local = np.searchsorted(nodes, quads).astype(np.int32)
         found[body] = SurfaceMesh((nodes + model.node_start[body]).astype(np.int32), local)
     return found
-
-
-def _files(recorders: Sequence[Recorder]) -> list[Path]:
-    return [Path(file) for recorder in recorders for file in getattr(recorder, "files", ())]
-
-
-def check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None = None) -> None:
-    """Check the attributes of recorders, and that no two outputs write the same file.
-
-    Args:
-        recorders: of the run.
-        out: folder of the results, or None.
-
-    Raises:
-        RequestError: an attribute has another type than `Recorder` says; or two files, of recorders or in `out`, are
-            the same, or one is a folder above the other.
-    """
-    for k, recorder in enumerate(recorders):
-        _check_attributes(f"recorders[{k}]", recorder)
-    known = [Path(out, name).resolve() for name in ALL_FILES] if out is not None else []
-    for file in _files(recorders):
-        path = file.resolve()
-        for other in known:
-            if path == other:
-                raise bad_value("recorders", str(file), "two outputs write this file; give each a file of its own")
-            if path in other.parents or other in path.parents:
-                raise bad_value("recorders", str(file), f"it cannot be there beside {other}; name another file")
-        known.append(path)
-
-
-def _check_attributes(field: str, recorder: Recorder) -> None:
-    """Raise RequestError for attributes of a recorder that have other types than `Recorder` says."""
-    validate.texts(field, name=recorder.name)
-    validate.kinds(field, Cadence, "give a Cadence, as Cadence(frames=100)", cadence=recorder.cadence)
-    remedy = f"give a frozenset of what frames must hold, out of {', '.join(NEEDS)}"
-    validate.kinds(field, (set, frozenset, tuple, list), remedy, needs=recorder.needs)
-    for need in recorder.needs:
-        if not (isinstance(need, str) and need in NEEDS):
-            raise bad_value(f"{field}.needs", validate.brief(need), remedy)
-    files = getattr(recorder, "files", ())
-    validate.kinds(field, (tuple, list), "give a tuple of the paths that it writes", files=files)
-    for k, file in enumerate(files):
-        file_path(f"{field}.files[{k}]", file)
 
 
 def _begin(index: int, recorder: Recorder, method: str, info: RunInfo) -> None:
@@ -106,10 +67,10 @@ def _wanted(recorder: Recorder, intervals: int, info: RunInfo) -> NDArray[np.boo
     Raises:
         RequestError: the run does not reach one of its times.
     """
-    for time in recorder.cadence.times or ():
-        if time > info.duration + 0.5 * info.output_interval:
+    for at in recorder.cadence.times or ():
+        if at > info.duration + 0.5 * info.output_interval:
             remedy = f"the run ends at {info.duration:g} s; give times until then"
-            raise bad_value(f"time of {recorder.name}", time, remedy)
+            raise bad_value(f"time of {recorder.name}", at, remedy)
     return recorder.cadence.rows(intervals, info.output_interval)
 
 
@@ -124,7 +85,7 @@ NOTHING: dict[str, Any] = {  # what a frame holds that needs nothing
 
 
 class Recording:
-    """The recorders of one run.
+    """The recorders of one run. Beside a GPU they start once it has work.
 
     Attributes:
         failed: names of the recorders that failed; what they write, mostly a file, is missing or ends too early.
@@ -133,7 +94,7 @@ class Recording:
     def __init__(
         self, recorders: Sequence[Recorder], info: RunInfo, intervals: int, steps: int, output: Output | None
     ) -> None:
-        """Start the recorders of a run of `intervals` output intervals of `steps` steps each.
+        """Check the recorders of a run of `intervals` output intervals of `steps` steps each, and start them.
 
         Raises:
             RequestError: an output cannot be made, or a time is not reached; what others had made by then is removed.
@@ -144,60 +105,99 @@ class Recording:
                 _begin(k, recorder, "check", info)
         self.failed: list[str] = []
         self.info, self.steps, self.output = info, steps, output
-        self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = []
+        self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = list(zip(recorders, wanted, strict=True))
         self.taken: dict[int, int] = {}
         self.cuts = {
             SURFACE: _cuts({body: len(skin.nodes) for body, skin in info.surfaces.items()}),
             PATHS: _cuts({path: len(position) for path, position in info.paths.items()}),
         }
         self.transfer: Transfer[tuple[str, str]] | None = None
-        missing = {folder for file in _files(recorders) for folder in file.parents if not folder.exists()}
+        self.started, self.due = False, math.inf  # when they start, once rows have been launched [s]
+        if output and self.rows:
+            arrays = {(need, name): a for need, group in output.arrays.items() for name, a in group.items()}
+            self.transfer = Transfer(arrays, output.solver.device, _sets(output, arrays.values()))
+        if output is None or not _computes_beside(output):
+            self._start()
+
+    def _start(self) -> None:
+        """Start the recorders, unless they are.
+
+        Raises:
+            RequestError: as when made.
+        """
+        if self.started:
+            return
+        self.started = True
+        waiting, self.rows = self.rows, []
+        missing = {folder for recorder, _ in waiting for folder in _missing_folders(recorder)}
         try:
-            for k, recorder in enumerate(recorders):
-                self.rows.append((recorder, wanted[k]))
-                _begin(k, recorder, "start", info)
+            for k, (recorder, wanted) in enumerate(waiting):
+                self.rows.append((recorder, wanted))
+                _begin(k, recorder, "start", self.info)
         except BaseException:
-            self.finish(False)
+            self._close(False)
             for folder in sorted(missing, reverse=True):  # the inner ones first
                 with suppress(OSError):
                     folder.rmdir()
             raise
-        if output and self.rows:
-            arrays = {(need, name): a for need, group in output.arrays.items() for name, a in group.items()}
-            self.transfer = Transfer(arrays, output.solver.device)
 
     def needs(self, row: int) -> frozenset[str]:
         """What a frame at the end of interval `row` must hold; empty when none is due."""
         return frozenset().union(*(recorder.needs for recorder, rows in self.rows if rows[row]))
 
     def take(self, row: int, needs: frozenset[str]) -> None:
-        """Copy the frame that the step launched last has reduced, and pass on those that have arrived."""
+        """Copy the frame that the step launched last has reduced, and pass on those that have arrived.
+
+        Raises:
+            RequestError: as when made.
+        """
         if self.transfer is None:
             return
         if needs:
             if self.transfer.full:
                 self._deliver(self.transfer)
             self.transfer.send(row, [key for key in self.transfer.source if key[0] in needs])
+        self.due = min(self.due, time.monotonic() + START)
+        if not self.started and time.monotonic() < self.due:
+            return
+        self._start()
         while self.transfer.arrived:
+            self._deliver(self.transfer)
+
+    def catch_up(self) -> None:
+        """Pass on the frames that are still being copied, one after the other as they arrive.
+
+        Raises:
+            RequestError: as when made.
+        """
+        while self.transfer and self.transfer.pending:
             self._deliver(self.transfer)
 
     def history(self, make: Callable[[], Mapping[str, NDArray[np.float64]]]) -> None:
         """Pass on further rows of the history, which are made only if someone takes them."""
+        self._start()
         rows = make() if self.rows else {}
         for recorder, _ in list(self.rows):
             self._call(recorder, lambda recorder=recorder: recorder.history(rows))
 
     def finish(self, ok: bool) -> None:
-        """Pass on the frames that are still being copied, and close the recorders."""
-        while ok and self.transfer and self.transfer.pending:
+        """Pass on the frames that are still being copied, of a run that failed those that have come, and close."""
+        if ok:
+            self._start()
+            self.catch_up()
+        while self.started and self.transfer and self.transfer.arrived:
             self._deliver(self.transfer)
-        for recorder, _ in list(self.rows):
+        self._close(ok)
+
+    def _close(self, ok: bool) -> None:
+        for recorder, _ in list(self.rows if self.started else ()):
             self._call(recorder, lambda recorder=recorder: recorder.finish(ok))
             if getattr(recorder, "failed", False):
                 self.failed.append(recorder.name)
         self.rows = []
 
     def _deliver(self, transfer: Transfer[tuple[str, str]]) -> None:
+        self._start()
         row, arrays = transfer.receive()
         parts = self._parts(arrays)
         for recorder, rows in list(self.rows):
@@ -241,6 +241,23 @@ class Recording:
         for need in needs:
             found |= parts.get(need, {})
         return Frame(index=index, step=row * self.steps, time=row * self.info.output_interval, **found)
+
+
+def _missing_folders(recorder: Recorder) -> set[Path]:
+    return {folder for file in files_of([recorder]) for folder in file.parents if not folder.exists()}
+
+
+def _computes_beside(output: Output) -> bool:
+    """Whether the device computes while the host does something else."""
+    return wp.get_device(output.solver.device).is_cuda
+
+
+def _sets(output: Output, arrays: Iterable[wp.array]) -> int:
+    """Frames of such arrays that may be under way."""
+    if not _computes_beside(output):
+        return SLOTS  # they arrive at once
+    size = sum(array.capacity for array in arrays)
+    return max(SLOTS, min(AHEAD, AHEAD_BYTES // max(1, size)))
 
 
 def _cuts(lengths: Mapping[str, int]) -> dict[str, slice]:

@@ -31,9 +31,10 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
 FRAMES = Cadence(frames=100)
-# What a kill may cost: as many frames, or those of as long; a save takes longer than a frame.
-SAVE_EVERY = 5  # frames between saves, at least
-SAVE_AFTER = 1.0  # time between saves, at least [s]
+WRITE_EVERY = 5  # frames that are written together
+# What a kill may cost: frames of as long, or of as much. The more a save has to write, the longer it takes.
+SAVE_AFTER = 1.0  # time between saves [s]
+SAVE_BYTES = 2 << 20  # or what waits for one
 KEPT = ("points", "von_mises", "plastic_strain", "contact_points", "contact_stick")  # of a frame
 PLAYBACK = 24.0  # frames shown in a second
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
@@ -77,7 +78,7 @@ class UsdFile:
         self.contact: Any = None
         self.held: list[Frame] = []  # copies of frames to write
         self.saved_count = self.tried_count = 0  # frames that the file holds, or should hold
-        self._saved = 0.0  # time of the last save [s]
+        self._saved, self._waiting = 0.0, 0  # time of the last save [s], bytes of frames since
 
     def check(self, info: RunInfo) -> None:
         """Load USD, and check the disk.
@@ -131,15 +132,17 @@ class UsdFile:
             raise bad_value("usd", str(self.path), f"it cannot be written ({error}); name another file") from error
 
     def frame(self, frame: Frame) -> None:
-        """Take one frame. Frames are written `SAVE_EVERY` at a time, which takes two thirds of the time of each alone.
+        """Take one frame. Frames are written `WRITE_EVERY` at a time, which takes two thirds of the time of each alone.
 
         Raises:
             OSError: the disk is full or fails.
         """
-        self.held.append(replace(frame, **{name: _copied(getattr(frame, name)) for name in KEPT}))
-        if len(self.held) == SAVE_EVERY:
+        kept = {name: _copied(getattr(frame, name)) for name in KEPT}
+        self.held.append(replace(frame, **kept))
+        self._waiting += sum(map(_bytes, kept.values()))
+        if len(self.held) == WRITE_EVERY:
             self._write()
-            if time.monotonic() > self._saved + SAVE_AFTER:
+            if self._waiting > SAVE_BYTES or time.monotonic() > self._saved + SAVE_AFTER:
                 self._save()
 
     def _write(self) -> None:
@@ -184,7 +187,7 @@ class UsdFile:
         from pxr import Tf, Vt
 
         self.tried_count = len(self.times)  # frames that cannot be saved now are not tried again
-        self._saved = time.monotonic()
+        self._saved, self._waiting = time.monotonic(), 0
         if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
             raise OSError(FULL)
         self.stage.SetStartTimeCode(0.0)
@@ -211,6 +214,11 @@ class UsdFile:
 def _copied(value: NDArray | Mapping[str, NDArray]) -> Any:
     """A copy of an array, or of several."""
     return value.copy() if isinstance(value, np.ndarray) else {name: array.copy() for name, array in value.items()}
+
+
+def _bytes(value: NDArray | Mapping[str, NDArray]) -> int:
+    """Size of an array, or of several together."""
+    return value.nbytes if isinstance(value, np.ndarray) else sum(array.nbytes for array in value.values())
 
 
 def _new_stage(path: str) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.results.force_history import contact_intervals, unfinished
+from warp_mca.results.force_history import GRAZING, contact_intervals, grazing_share, unfinished
 from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Contact, RigidPlane
 
@@ -25,10 +25,8 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
     "normal_force_N": "normal_force",
     "closing_speed": "closing_speed",
 }
-LIGHT, FIRM = (
-    0.05,
-    0.1,
-)  # of its greatest force: a contact nearly opens below the first, between forces above the second
+# Of its greatest force: a contact nearly opens below the first, between forces above the second.
+LIGHT, FIRM = 0.05, 0.1
 OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
 
 
@@ -118,7 +116,7 @@ def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
 
 
 def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[str]:
-    """Warnings about contacts: none touched, some did not end or nearly opened, normals are off the axes.
+    """Warnings about contacts: none touched, some did not end, nearly opened or grazed, normals are off the axes.
 
     Args:
         contacts: of the scene.
@@ -135,6 +133,7 @@ def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[st
         )
     for contact, (normal, tangent) in zip(contacts, axes, strict=True):
         found += _nearly_opens(contact)
+        found += _grazes(contact)
         if contact.normal is not None:
             found += _off_axis(contact.name, contact.normal, normal, tangent)
     return found
@@ -151,6 +150,17 @@ def _nearly_opens(contact: ContactHistory) -> list[str]:
     return [
         f"contact {contact.name} nearly opened between two compressions, with {min(least):.1%} of its greatest force: "
         "whether it opens there may depend on the mesh, and with it duration and impulse; compare with a finer one"
+    ]
+
+
+def _grazes(contact: ContactHistory) -> list[str]:
+    """A warning where surfaces touch again and hardly press: whether they do, and how long, is the mesh's."""
+    if not (share := grazing_share(contact.pressure)):
+        return []
+    return [
+        f"for {share:.0%} of its time, contact {contact.name} has less than {GRAZING:.0%} of its greatest force in "
+        "touches of their own: whether these occur, and how long they last, depends on the mesh, and contact_duration "
+        "counts them; contacts in summary.json has each"
     ]
 
 

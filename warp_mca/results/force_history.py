@@ -21,6 +21,8 @@ Rows = tuple[int, int]  # the first row and the one after the last
 CONTACT_THRESHOLD = 1e-3  # share of the greatest F_n above which the bodies count as touching
 REVERSAL_THRESHOLD = 1e-2  # share of the greatest |F_t| that both signs must reach
 MERGED_GAP = 0.02  # share of a contact below which a separation is a change of nodes and does not end the contact
+GRAZING = 0.05  # share of the greatest F_n that a contact stays below in which the bodies only graze each other
+GRAZING_TIME = 0.01  # share of the time in contact from which on such contacts matter
 STICK_THRESHOLD = 0.5  # share of the contact that must stick
 SMOOTHING = 0.02  # share of a contact: standard deviation of the Gaussian that takes the jitter out of its force
 PROMINENCE = 0.05  # share of the greatest F_n by which a peak must stand out of its valleys
@@ -81,6 +83,21 @@ def unfinished(F_n: Array) -> bool:
     """Whether a contact is still in progress in the last row; F_n as of `contact_rows`."""
     rows = contact_rows(F_n)
     return bool(rows) and rows[-1][1] == len(F_n)
+
+
+def grazing_share(F_n: Array) -> float:
+    """Share of the time in contact that goes by in finished contacts in which the bodies only graze each other [-].
+
+    Whether they touch then, and how long, depends on the mesh. 0 where it is too small to matter.
+
+    Args:
+        F_n: as of `contact_rows`.
+    """
+    rows = contact_rows(F_n)
+    peak = max((float(F_n[first:end].max()) for first, end in rows), default=0.0)
+    light = [end - first for first, end in rows if end < len(F_n) and F_n[first:end].max() < GRAZING * peak]
+    share = sum(light) / max(1, sum(end - first for first, end in rows))
+    return share if share > GRAZING_TIME else 0.0
 
 
 def intervals(time: Array, rows: list[Rows]) -> list[Interval]:

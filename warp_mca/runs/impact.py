@@ -217,6 +217,8 @@ class _Loop:
             if self.written == ROWS:
                 self._send()
             self._record(1, self.state.steps // self.steps.per_interval, True)
+        if self.impact.recording:
+            self.impact.recording.catch_up()
         self._receive_all()
         if self.written:
             self.transfer.send(self.written)

@@ -163,7 +163,7 @@ def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | No
     Raises:
         RequestError: so it is.
     """
-    from warp_mca.recorders.frames import check_files
+    from warp_mca.recorders.checks import check_files
 
     check_recorders(recorders)
     check_files(recorders, None if out is None else check_output(out, force=force))

@@ -236,6 +236,10 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
+        if self.output and self.output.needs and count > 1:  # rows with and without frames share all steps but one
+            self.record_and_step(state, 1, needs, is_row, search)
+            self.step(state, count - 1)
+            return
         if search and not self._replays_search:
             self.search(state)
             search = ""

@@ -15,7 +15,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 Key = TypeVar("Key")
-SLOTS = 2  # sets under way: one that is copied, one that the host reads
+SLOTS = 2  # sets under way at least: one that is copied, one that the host reads
 
 
 @dataclass
@@ -31,8 +31,8 @@ class _Slot(Generic[Key]):
 class Transfer(Generic[Key]):
     """Sets of device arrays on their way to the host, received in the order in which they were sent."""
 
-    def __init__(self, arrays: Mapping[Key, wp.array], device: str) -> None:
-        """Allocate the host's copies of `arrays`, pinned where `device` is a GPU."""
+    def __init__(self, arrays: Mapping[Key, wp.array], device: str, most: int = SLOTS) -> None:
+        """Allocate the host's copies of `arrays`, pinned where `device` is a GPU, for as many sets as `most`."""
         where = wp.get_device(device)
         self.source = dict(arrays)
         self.pending: deque[_Slot[Key]] = deque()
@@ -41,7 +41,7 @@ class Transfer(Generic[Key]):
                 {key: wp.empty_like(a, device="cpu", pinned=where.is_cuda) for key, a in arrays.items()},
                 wp.Event(where) if where.is_cuda else None,
             )
-            for _ in range(SLOTS)
+            for _ in range(most)
         ]
 
     @property
