@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.runs.flutter_warnings import MEAN, SPAN, vibration
+from warp_mca.model.model import Model
+from warp_mca.runs.flutter_warnings import MEAN, SPAN, flutter_warnings, vibration
 from warp_mca.scenes import two_link
 
 ROWS = 400
@@ -46,3 +50,18 @@ def flutters(*, mu: float, penalty: float) -> bool:
 def test_a_run_tells_of_flutter_which_soft_springs_avoid() -> None:
     assert flutters(mu=1.5, penalty=1.0)
     assert not flutters(mu=1.5, penalty=0.1)
+
+
+@pytest.mark.parametrize(("amplitude", "mu", "says"), [(0.9, 0.0, 1), (0.9, 0.4, 1), (0.6, 0.0, 0)])
+def test_a_run_tells_of_vibration_across_normal_and_tangent(amplitude: float, mu: float, says: int) -> None:
+    """From 0.2 of the 4 m/s on at which tip and target met; less the mean of rows, which may add to it."""
+    none = np.zeros(ROWS)
+    history = {f"{point}_v{axis}": none for point in ("tip", "plate") for axis in "xyz"}
+    history |= {"time_s": 1e-6 * np.arange(ROWS), "F_n_N": np.ones(ROWS), "tip_vy": np.full(ROWS, -4.0)}
+    history["plate_vz"] = sampled(amplitude, 0.233)[:, 0]
+    axes = np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]])
+    model = SimpleNamespace(passes=[SimpleNamespace(contact=0, mu=mu)], contact_axes=axes)
+    found = flutter_warnings(history, cast(Model, model))
+    assert [text.partition(" with up to")[0] for text in found] == says * [
+        "the surface under the tip vibrates across normal and tangent"
+    ]

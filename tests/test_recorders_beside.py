@@ -60,8 +60,8 @@ def test_recorders_that_start_late_get_every_frame(monkeypatch: pytest.MonkeyPat
     for one, other in zip(late.frames, usual.frames, strict=True):
         np.testing.assert_array_equal(one.points["bar"], other.points["bar"])
         np.testing.assert_array_equal(one.path_stress["axis"], other.path_stress["axis"])
-    columns = [np.concatenate([rows["F_n_N"] for rows in own.rows]) for own in (late, usual)]
-    np.testing.assert_array_equal(*columns)
+    one, other = (np.concatenate([rows["F_n_N"] for rows in own.rows]) for own in (late, usual))
+    np.testing.assert_array_equal(one, other)
 
 
 def test_a_recorder_that_fails_when_it_starts_late_stops_the_run(tmp_path: Path, beside: None):

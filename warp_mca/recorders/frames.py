@@ -117,9 +117,9 @@ class Recording:
             arrays = {(need, name): a for need, group in output.arrays.items() for name, a in group.items()}
             self.transfer = Transfer(arrays, output.solver.device, _sets(output, arrays.values()))
         if output is None or not _computes_beside(output):
-            self._start()
+            self.start()
 
-    def _start(self) -> None:
+    def start(self) -> None:
         """Start the recorders, unless they are.
 
         Raises:
@@ -160,7 +160,7 @@ class Recording:
         self.due = min(self.due, time.monotonic() + START)
         if not self.started and time.monotonic() < self.due:
             return
-        self._start()
+        self.start()
         while self.transfer.arrived:
             self._deliver(self.transfer)
 
@@ -175,7 +175,7 @@ class Recording:
 
     def history(self, make: Callable[[], Mapping[str, NDArray[np.float64]]]) -> None:
         """Pass on further rows of the history, which are made only if someone takes them."""
-        self._start()
+        self.start()
         rows = make() if self.rows else {}
         for recorder, _ in list(self.rows):
             self._call(recorder, lambda recorder=recorder: recorder.history(rows))
@@ -183,7 +183,7 @@ class Recording:
     def finish(self, ok: bool) -> None:
         """Pass on the frames that are still being copied, of a run that failed those that have come, and close."""
         if ok:
-            self._start()
+            self.start()
             self.catch_up()
         while self.started and self.transfer and self.transfer.arrived:
             self._deliver(self.transfer)
@@ -197,7 +197,7 @@ class Recording:
         self.rows = []
 
     def _deliver(self, transfer: Transfer[tuple[str, str]]) -> None:
-        self._start()
+        self.start()
         row, arrays = transfer.receive()
         parts = self._parts(arrays)
         for recorder, rows in list(self.rows):

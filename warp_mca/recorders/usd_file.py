@@ -34,7 +34,7 @@ FRAMES = Cadence(frames=100)
 WRITE_EVERY = 5  # frames that are written together
 # What a kill may cost: frames of as long, or of as much. The more a save has to write, the longer it takes.
 SAVE_AFTER = 1.0  # time between saves [s]
-SAVE_BYTES = 2 << 20  # or what waits for one
+SAVE_BYTES = 1 << 20  # or what waits for one
 KEPT = ("points", "von_mises", "plastic_strain", "contact_points", "contact_stick")  # of a frame
 PLAYBACK = 24.0  # frames shown in a second
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,29 +16,45 @@ Array = NDArray[np.float64]
 MEAN = 5  # rows whose mean is what the surface does besides
 SPAN = 20  # rows, all in contact, that vibrate
 SHARE = 0.07  # amplitude over the speed at which tip and target met, from which on a word is said; docs/decisions.md
+SIDE_SHARE = 0.2  # the same across normal and tangent, where no column of forces looks
 
 
 def flutter_warnings(history: Mapping[str, Array], model: Model) -> list[str]:
-    """A sentence if the scene's target point vibrates while a contact with friction presses.
+    """A sentence if the scene's target point vibrates in contact: by friction, or across the normal and the tangent.
 
     Args:
         history: columns of history.csv. model: of the scene alone.
     """
-    axes = [model.contact_axes[item.contact] for item in model.passes if item.mu > 0.0]
-    if not axes or len(history["time_s"]) < MEAN + SPAN:
+    if not model.passes or len(history["time_s"]) < MEAN + SPAN:
         return []
     tip, target = (np.column_stack([history[f"{point}_v{axis}"] for axis in "xyz"]) for point in ("tip", "plate"))
     speed = float(np.linalg.norm(tip[0] - target[0]))
-    along = target @ np.concatenate(axes).T  # normal and tangent of each contact
-    amplitude = vibration(along, history["F_n_N"] > 0.0)
-    if not amplitude > SHARE * speed > 0.0:  # nor where there are no such points
-        return []
-    return [
-        f"the surface under the tip vibrates with up to {amplitude:.2g} m/s, {amplitude / speed:.0%} of the speed at "
-        "which they met, faster than rows show: friction and stiff contact springs excite its cells (flutter), which "
-        "depends on mesh and penalty; take plate_vx, plate_vy, plate_vz, stick_fraction and sticks with care; a lower "
-        "penalty lessens it"
-    ]
+    axes = [model.contact_axes[item.contact] for item in model.passes]
+    rough = [own for own, item in zip(axes, model.passes, strict=True) if item.mu > 0.0]
+    along = _amplitude(history, target, rough)
+    if along > SHARE * speed > 0.0:  # nor where there are no such points
+        return [
+            f"the surface under the tip vibrates with up to {along:.2g} m/s, {along / speed:.0%} of the speed at which "
+            "they met, faster than rows show: friction and stiff contact springs excite its cells (flutter), which "
+            "depends on mesh and penalty; take plate_vx, plate_vy, plate_vz, stick_fraction and sticks with care; a "
+            "lower penalty lessens it"
+        ]
+    across = _amplitude(history, target, [np.cross(own[:1], own[1:]) for own in axes])
+    if across > SIDE_SHARE * speed > 0.0:
+        return [
+            f"the surface under the tip vibrates across normal and tangent with up to {across:.2g} m/s, "
+            f"{across / speed:.0%} of the speed at which they met: contact presses nodes from one face of it to the "
+            "next and back; take plate_vx, plate_vy and plate_vz in that direction with care; a lower penalty lessens "
+            "it"
+        ]
+    return []
+
+
+def _amplitude(history: Mapping[str, Array], velocity: Array, axes: Sequence[Array]) -> float:
+    """Greatest vibration in contact of a velocity [m/s] along axes, each shape (axis_count, 3)."""
+    if not axes:
+        return 0.0
+    return vibration(velocity @ np.concatenate(axes).T, history["F_n_N"] > 0.0)
 
 
 def vibration(velocity: Array, touching: NDArray[np.bool_]) -> float:

@@ -268,6 +268,8 @@ class _Loop:
 
     def _send(self) -> None:
         if self.transfer.full:
+            if self.impact.recording:
+                self.impact.recording.start()  # while the device works on what it has
             self._receive()
         self.transfer.send(self.written)
         self.written = 0
