@@ -25,6 +25,38 @@ def test_patch_of_few_cells_is_named():
     assert not said(fast, "cells across")
 
 
+def test_a_master_too_coarse_to_dent_is_named():
+    """A ball on a softer block: Hertz's greatest force is 210.4 N, on a place 3 mm wide."""
+
+    def ball(cell: float | None, rigid: bool = False) -> mca.Result:
+        coarse = mca.Box(size=(0.12, 0.06, 0.12), divisions=(6, 3, 6), origin=(-0.06, -0.06, -0.06))
+        core = {"core": (8, 8), "core_size": cell or 1e-3, "core_depth": 4, "layers": 8, "extension": 2}
+        fine = mca.Plate(length=0.12, width=0.12, height=0.06, **core)
+        own, other = (mca.Elastic(E=E, nu=0.3, rho=1000.0) for E in (3e9, 5e8))
+        start = {"position": (0.0, 0.010001, 0.0), "rotation": (0.0, 0.0, -1.570796), "velocity": (0.0, -3.0, 0.0)}
+        sphere = mca.Sphere(radius=0.01, section=8, ring=4)
+        block = mca.Body(name="block", geometry=fine if cell else coarse, material=other, rigid=rigid)
+        top, bottom = ("top", "bottom") if cell else ("ymax", "ymin")
+        contact = mca.Contact(slave=mca.Surface(body="ball", nodes="pole"), master=mca.Surface(body="block", nodes=top))
+        return mca.run(
+            mca.Scene(
+                name="dent",
+                bodies=(mca.Body(name="ball", geometry=sphere, material=own, **start), block),
+                fixed=() if rigid else (mca.Fixed(body="block", nodes=bottom),),
+                contacts=(contact,),
+                impact=mca.ImpactPhase(duration=1.2e-4, output_interval=1e-6),
+            )
+        )
+
+    words = "cells so large do not dent"
+    coarse, fine = ball(None), ball(2.5e-3)
+    assert coarse.F_n.max() == pytest.approx(317.0, rel=0.02)
+    assert said(coarse, words)
+    assert fine.F_n.max() == pytest.approx(210.4, rel=0.05)
+    assert not said(fine, words)
+    assert not said(ball(None, rigid=True), words)
+
+
 def test_corner_is_named_and_a_face_is_not():
     def drop(turn: tuple[float, float, float], lift: float) -> mca.Result:
         box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(-0.005, -0.005, -0.005))

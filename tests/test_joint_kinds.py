@@ -301,3 +301,27 @@ def test_a_swing_hangs_on_hinges_only():
     joints = (*scene.joints, mca.Spherical(name="S", body="AB", at=(0.0, 0.0, 0.0)))
     with pytest.raises(mca.RequestError, match=r"Scene.joints = 'Spherical S': the links of a rigid phase hang on Rev"):
         mca.run(mca.Scene(**{**vars(scene), "joints": joints}))
+
+
+def _welded(own: int, other: int) -> list[str]:
+    """Warnings about two blocks, one on the other, with so many cells along the edges of their common face."""
+    lower, upper = (
+        mca.Body(
+            name=name,
+            geometry=mca.Box(size=(0.02, 0.02, 0.02), divisions=(count, count, 2)),
+            material=mca.Elastic(E=1e9, nu=0.3, rho=1e3),
+            position=(0.0, 0.0, place),
+        )
+        for name, count, place in (("lower", other, 0.0), ("upper", own, 0.02))
+    )
+    joint = mca.Weld(name="w", body="upper", other="lower", nodes="zmin", other_nodes="zmax")
+    scene = mca.Scene(name="welded", bodies=(lower, upper), joints=(joint,), impact=mca.ImpactPhase(duration=1e-6))
+    return [text for text in mca.run(scene, device="cpu", threads=1).warnings if text.startswith("joint w")]
+
+
+def test_a_weld_of_unequal_meshes_says_how_many_nodes_it_binds():
+    assert _welded(4, 4) == []
+    (text,) = _welded(3, 4)
+    assert text.startswith(
+        "joint w binds 4 of the 16 nodes zmin of upper to the 25 nodes zmax of lower; the others are"
+    )

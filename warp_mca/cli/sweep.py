@@ -138,7 +138,8 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
         cells = ["", "", "", "", row["reason"] or ""]
         if row["status"] == DONE:
             folder = plan.run_folder(row["index"])
-            cells = [f"{row['F_n_first_peak'] or 0.0:.5g}", f"{row['F_t_min']:.5g} to {row['F_t_max']:.5g}"]
+            peak = row["F_n_first_peak"]
+            cells = ["none" if peak is None else f"{peak:.5g}", f"{row['F_t_min']:.5g} to {row['F_t_max']:.5g}"]
             cells += [f"{1e3 * row['contact_duration']:.4g}", f"{100.0 * row['energy_error']:.2g} %"]
             cells += [f"wrote {folder}" if folder else ""]
         values = (f"{value:.10g}" if isinstance(value, float) else str(value) for value in chosen.values())

@@ -18,6 +18,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC, STORED_TYPES
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
+from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
 from warp_mca.geometry.gmsh_file import GMSH_SUFFIXES, read_by_gmsh
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
@@ -90,6 +91,7 @@ class MeshFile:
             raise self._bad(f"{error.strerror or error}; check the path") from error
         if not found:
             raise self._bad("there is no such file; check the path")
+        self._check_end()
         suffix, said = Path(self.path).suffix.lower(), io.StringIO()
         try:
             import meshio
@@ -144,6 +146,15 @@ class MeshFile:
                     if line.strip() in (b"$EndPhysicalNames", b"$Nodes"):
                         break
         return names
+
+    def _check_end(self) -> None:
+        """Refuses a file that was cut off, where its format says so; warns where it may have been."""
+        if not (mark := missing_end(Path(self.path))):
+            return
+        if Path(self.path).suffix.lower() in END_REQUIRED:
+            raise self._bad(f"it lacks {mark}, as if it had been cut off; write it again, or add that if it is whole")
+        what = f"{self.path} lacks {mark}: if it was cut off, cells are missing"
+        logging.getLogger("warp_mca").warning("%s", what)
 
     def _check_abaqus(self) -> None:
         """Refuses what meshio passes over: it keeps the last block of nodes only, and places no instance."""

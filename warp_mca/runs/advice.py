@@ -1,4 +1,4 @@
-"""Owns what is said of a scene's meshes before it runs: slivers, parts that only touch, slaves that are too coarse."""
+"""Owns what is said of a scene's meshes before it runs: slivers, parts that hardly hang together, coarse slaves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from warp_mca.geometry.quality import doubled_nodes
 from warp_mca.model.surfaces import face_geometry
 from warp_mca.model.tied_nodes import tie_warnings
 from warp_mca.runs.unit_warnings import unit_warnings
-from warp_mca.scene import RigidPlane
+from warp_mca.scene import Prismatic, RigidPlane, Weld
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -68,7 +68,29 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
                 f"faces of the slave {contact.slave.body} are {ratio:.2g} times as wide as those of its master, "
                 "whose nodes pass between its own: make the finer side the slave, or set two_way"
             )
-    return found + tie_warnings(model.ties) + unit_warnings(scene, meshes, model)
+    return found + _loose_nodes(scene, meshes, model) + tie_warnings(model.ties) + unit_warnings(scene, meshes, model)
+
+
+def _loose_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> list[str]:
+    """Joints of node sets that bind only some of the nodes where two bodies meet, as meshes that differ there leave."""
+    found = []
+    for joint, pairs in zip(scene.joints, model.joints, strict=True):
+        if joint.other is None or not isinstance(joint, (Prismatic, Weld)):
+            continue
+        assert joint.other_nodes is not None
+        own, other = (len(meshes[b].nodes(s)) for b, s in ((joint.body, joint.nodes), (joint.other, joint.other_nodes)))
+        bound, wanted, remedy = pairs.end - pairs.start, min(own, other), "mesh both alike there, or use a Tie"
+        if isinstance(joint, Prismatic):
+            slides = model.joint_slides[
+                (model.joint_slides[:, 0] >= pairs.start) & (model.joint_slides[:, 0] < pairs.end)
+            ]
+            bound, wanted, remedy = int((slides[:, 1] - slides[:, 0]).sum()), own, "give rails to all that should slide"
+        if bound < wanted:
+            found.append(
+                f"joint {joint.name} binds {bound} of the {own} nodes {joint.nodes} of {joint.body} to the {other} "
+                f"nodes {joint.other_nodes} of {joint.other}; the others are free: {remedy}"
+            )
+    return found
 
 
 def _coarser(contact: Contact, meshes: Mapping[str, Mesh]) -> float:

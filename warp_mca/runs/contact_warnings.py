@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.model.surfaces import is_curved_contact
+from warp_mca.model.surfaces import face_geometry, is_curved_contact
 from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
@@ -21,19 +21,21 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
+FACES = 0.3  # of a master, that a curved contact covers; on fewer the force is 5 % too great or more, docs/decisions.md
 POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
 THIN = 0.25  # of a body's thickness from which on nodes of another are said to be deep in it
 BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
 
 
 def resolution_warnings(
-    contacts: tuple[Contact, ...], model: Model, ledger: Ledger, depths: Sequence[Array]
+    contacts: tuple[Contact, ...], model: Model, ledger: Ledger, depths: Sequence[Array], rigid: Container[str] = ()
 ) -> list[str]:
     """What a run's contact leaves in doubt, one sentence each.
 
     Args:
         contacts: of the scene. model: of the scene alone. ledger: of the run.
         depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,).
+        rigid: names of rigid bodies.
     """
     found: list[str] = []
     for k, item in enumerate(model.passes):
@@ -44,6 +46,8 @@ def resolution_warnings(
             found += _pushed_through(contact, model, item, depths[k])
         else:
             found += _sunk_through(contact, model, item, depths[k])
+            if item.sign > 0.0:
+                found += _coarse_master(contact, model, item, ledger.nodes_at_peak(k), depths[k], rigid)
     return found
 
 
@@ -58,6 +62,43 @@ def _small_patch(contact: Contact, model: Model, item: ContactPass, ledger: Ledg
             f"when the force on {contact.slave.body} was greatest, it acted on {count:.1f} nodes, {at_all}: force and "
             "duration depend on the mesh; refine both bodies where they touch"
         )
+
+
+def _coarse_master(
+    contact: Contact, model: Model, item: ContactPass, count: float, depth: Array, rigid: Container[str]
+) -> Iterator[str]:
+    """A master with faces much wider than a curved contact: it cannot dent there, and is too stiff.
+
+    Args:
+        contact, model, item: as in `resolution_warnings`, with one of its passes.
+        count: nodes of the slave that carried the greatest force.
+        depth: largest penetration of each spring [m], shape (spring_count,), those of slave 0 first.
+        rigid: names of rigid bodies, which need not dent.
+    """
+    from scipy.spatial import KDTree
+
+    assert not isinstance(contact.master, RigidPlane)
+    depth = depth.reshape(len(item.slave), -1).max(axis=1)
+    touched = np.flatnonzero(depth > 0.5 * depth.max(initial=0.0))
+    if contact.master.body in rigid or not (len(touched) and is_curved_contact(model.X, item)):
+        return
+    patch = count * float(np.mean([_area_around(model.X, item, node) for node in touched.tolist()]))
+    area, _ = face_geometry(model.X, item.face)
+    nearest = KDTree(model.X[item.face].mean(axis=1)).query(model.X[item.slave[touched]])[1]
+    width = math.sqrt(float(np.median(area[nearest])))
+    if patch < FACES * width**2:
+        yield (
+            f"when the force on {contact.slave.body} was greatest, it pressed a place some {math.sqrt(patch):.2g} m "
+            f"wide of {contact.master.body}, whose faces there are {width:.2g} m wide: cells so large do not dent as "
+            "the body would, so that the force is too great and its time too short; refine the master where they touch"
+        )
+
+
+def _area_around(X: Array, item: ContactPass, node: int) -> float:
+    """Area of the surface that belongs to a slave node [m^2]: an equal part of each face around it."""
+    faces = item.slave_face[item.face_of_slave[item.slave_offset[node] : item.slave_offset[node + 1]]]
+    corners = [len(np.unique(face)) for face in faces]
+    return float((face_geometry(X, faces)[0] / corners).sum())
 
 
 def _pushed_through(contact: Contact, model: Model, item: ContactPass, depth: Array) -> Iterator[str]:

@@ -230,7 +230,7 @@ class SceneRun:
             )
         depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
         found += soft_springs(shares, scene.contacts)
-        found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths)
+        found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths, scene.rigid_names)
         if scene.rigid_names:
             found += inertia_warnings(self.ready, self.solver.model.rigid_bodies, self.state, self.index)
         found += self.ready.warnings

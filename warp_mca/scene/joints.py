@@ -178,7 +178,7 @@ class Prismatic(Joint):
     """The nodes of a set slide along a direction that is fixed in space, or along lines of nodes of the other body.
 
     Each node slides by itself. On another body, its rail is the line of nodes, parallel to the axis at the start, that
-    the node is on; rails bend and turn with the body that they belong to.
+    the node is on; rails bend and turn with the body that they belong to, and go on straight beyond their ends.
 
     Attributes:
         nodes: node set of `body`; relative to another body, those that are on none of its lines stay free.
