@@ -16,7 +16,7 @@ import warp_mca as mca
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.cli import main as cli
 from warp_mca.geometry import Mesh
-from warp_mca.geometry.quality import doubled_nodes
+from warp_mca.geometry.quality import doubled_nodes, pieces
 from warp_mca.scene import model_file as scene_file
 
 ALUMINIUM = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
@@ -64,6 +64,17 @@ def test_parts_of_a_mesh_that_only_touch_are_pointed_out():
     (said,) = mca.run(alone(touching)).warnings
     assert said.startswith("9 nodes of body it lie where others of it do")
     assert not mca.run(alone(one)).warnings
+
+
+def test_pieces_of_a_mesh_that_share_no_node_are_pointed_out():
+    one = cube(2).build()
+    apart = Mesh(
+        np.concatenate([one.points, one.points + np.array([0.015, 0.005, 0.005])]),
+        np.concatenate([one.hexahedra, one.hexahedra + len(one.points)]),
+    )
+    assert (pieces(one), pieces(apart)) == (1, 2)
+    (said,) = mca.run(alone(apart)).warnings
+    assert said.startswith("body it is 2 pieces that share no node: they fall apart")
 
 
 def test_strain_of_one_kind_of_body_is_not_laid_to_the_other():

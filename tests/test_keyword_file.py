@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.geometry.keyword_file import read_keywords
 from warp_mca.geometry.quality import check, volumes
 
 # A unit cube, on it a wedge of volume 1/2, beside it a pyramid of volume 1/3, before it a tetrahedron of volume 1/6.
@@ -112,3 +113,20 @@ def test_what_is_not_read_is_refused(tmp_path: Path, old: str, new: str, words: 
     (tmp_path / "it.key").write_text(text.replace(old, new, 1))
     with pytest.raises(mca.RequestError, match=rf"the reader of keyword files cannot read it \(.*{words}"):
         mca.MeshFile(tmp_path / "it.key").build()
+
+
+def test_wedges_of_gmsh_are_those_of_ls_dyna(tmp_path: Path):
+    """gmsh 4.15 writes the corners of a wedge in another order; the first line of its files says who wrote them."""
+    corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1))  # one triangle, then the other
+    nodes = "".join(f"{k},{x},{y},{z}\n" for k, (x, y, z) in enumerate(corners, 1))
+    found = []
+    for title, solid in (
+        ("$ by hand", "1,1,1,2,5,4,3,3,6,6"),
+        ("$# LS-DYNA Keyword file created by Gmsh", "1,1,1,2,3,4,5,5,6,6"),
+    ):
+        file = tmp_path / "wedge.k"
+        file.write_text(f"{title}\n*KEYWORD\n*NODE\n{nodes}*ELEMENT_SOLID\n{solid}\n*END\n")
+        (block,) = read_keywords(file).cells
+        assert block.type == "wedge"
+        found.append(block.data.tolist())
+    assert found[0] == found[1] == [[0, 1, 2, 3, 4, 5]]

@@ -203,9 +203,10 @@ def _level(asked: Accuracy, errors: Mapping[str, float], springs: Springs, fixed
         return error * (coarse / level) ** ORDER + springs.left(level)
 
     if fixed:
-        if left(1.0) <= asked.share:
+        if left(1.0) <= MARGIN * asked.share:
             return 1.0
-        remedy = f"this mesh leaves about {left(1.0):.1%} by coarse runs of the scene; leave it out, or ask for that"
+        had = f"{left(1.0) / MARGIN:.1%}"
+        remedy = f"this mesh leaves about {had} by coarse runs of the scene; leave it out, or ask for that"
         raise bad_value("refine", asked.typed["refine"], remedy)
     count = math.floor(math.log(MOST / LEAST, STEP) + 1e-9)
     levels = [coarse, *(LEAST * STEP**k for k in range(count + 1))]

@@ -23,8 +23,13 @@ Card = list[str]
 
 @dataclass
 class _Deck:
-    """What the blocks of a file hold, by the file's own numbers."""
+    """What the blocks of a file hold, by the file's own numbers.
 
+    Attributes:
+        by_gmsh: gmsh wrote it, whose wedges have another order.
+    """
+
+    by_gmsh: bool = False
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     solids: dict[str, list[list[int]]] = field(default_factory=dict)
     parts_of: dict[str, list[int]] = field(default_factory=dict)
@@ -43,7 +48,8 @@ def read_keywords(path: Path) -> meshio.Mesh:
     """
     import meshio
 
-    deck, left = _Deck(), set[str]()
+    with path.open(errors="replace") as file:
+        deck, left = _Deck(by_gmsh="created by Gmsh" in file.readline()), set[str]()
     for keyword, lines in _blocks(path):
         if keyword.startswith(_UNREAD):
             raise ValueError(f"*{keyword} is not read: write the mesh as one file of *NODE and *ELEMENT_SOLID")
@@ -134,7 +140,7 @@ def _read_solids(deck: _Deck, lines: list[str]) -> None:
         rest += card
         open_end = line.rstrip().endswith(",") and len(rest) == 11  # gmsh writes ten nodes so
         if len(rest) > 2 and not open_end:
-            kind, nodes = _solid(rest[2:])
+            kind, nodes = _solid(rest[2:], deck.by_gmsh)
             deck.solids.setdefault(kind, []).append(nodes)
             deck.parts_of.setdefault(kind, []).append(rest[1])
             rest = []
@@ -142,11 +148,12 @@ def _read_solids(deck: _Deck, lines: list[str]) -> None:
         raise ValueError(f"the nodes of solid {rest[0]} are missing")
 
 
-def _solid(nodes: list[int]) -> tuple[str, list[int]]:
+def _solid(nodes: list[int], by_gmsh: bool = False) -> tuple[str, list[int]]:
     """Type and nodes of a solid: wedges, pyramids and tetrahedra repeat their last nodes.
 
     LS-DYNA numbers the eight corners of a wedge 1 2 3 4 5 5 6 6, of a pyramid 1 2 3 4 5 5 5 5 and of a tetrahedron
-    1 2 3 4 4 4 4 4 (LS-DYNA Keyword User's Manual, vol. I, *ELEMENT_SOLID).
+    1 2 3 4 4 4 4 4 (LS-DYNA Keyword User's Manual, vol. I, *ELEMENT_SOLID). gmsh writes a wedge with
+    the corners 1 2 3 on one triangle and 4 5 6 on the other as 1 2 3 4 5 5 6 6.
     """
     nodes = nodes[: 1 + max(k for k, node in enumerate(nodes) if node)] if any(nodes) else []
     if len(nodes) == 10 and len(set(nodes)) == 10:
@@ -156,7 +163,7 @@ def _solid(nodes: list[int]) -> tuple[str, list[int]]:
     if len(nodes) == 8 and len(different) == 8:
         return "hexahedron", nodes
     if len(nodes) == 8 and len(different) == 6 and nodes[4] == nodes[5] and nodes[6] == nodes[7]:
-        return "wedge", [nodes[k] for k in (0, 1, 4, 3, 2, 6)]
+        return "wedge", [nodes[k] for k in ((0, 1, 2, 3, 4, 6) if by_gmsh else (0, 1, 4, 3, 2, 6))]
     if len(different) == 5 and len(nodes) in (5, 8):
         return "pyramid", different
     if len(different) == 4 and len(nodes) in (4, 8):

@@ -78,6 +78,20 @@ def doubled_nodes(mesh: Mesh) -> int:
     return int((grid[1:] == grid[:-1]).all(axis=1).sum())
 
 
+def pieces(mesh: Mesh) -> int:
+    """Number of parts of a mesh that share no node."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    ends = [cells[:, [0, k]] for cells in mesh.cells.values() for k in range(1, cells.shape[1]) if len(cells)]
+    a, b = np.concatenate(ends).T
+    count = len(mesh.points)
+    _, label = connected_components(
+        coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(count, count)), directed=False
+    )
+    return len(np.unique(label[a]))
+
+
 def check(mesh: Mesh, name: str) -> None:
     """Raise RequestError for a mesh that is incomplete or has an inverted cell.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.geometry import Box, Mesh, NestedPlate, Parts, Plate, Rod, Sphere
-from warp_mca.geometry.quality import doubled_nodes
+from warp_mca.geometry.quality import doubled_nodes, pieces
 from warp_mca.model.surfaces import face_geometry
 from warp_mca.model.tied_nodes import tie_warnings
 from warp_mca.runs.unit_warnings import unit_warnings
@@ -55,6 +55,11 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
             found.append(
                 f"{count} nodes of body {body.name} lie where others of it do: unless cracks are meant, merge the "
                 "parts of its mesh, which hang together at shared nodes only"
+            )
+        elif own and (count := pieces(meshes[body.name])) > 1:
+            found.append(
+                f"body {body.name} is {count} pieces that share no node: they fall apart, and pass through each other "
+                "where they overlap, which counts their mass twice; make one solid of them, or bodies of their own"
             )
     unstressed = [path.name for path in scene.paths if path not in scene.stress_paths]
     if unstressed:
