@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry.boundary import boundary_faces
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import tetrahedral
+from warp_mca.geometry.quality import check
 from warp_mca.verify.small_meshes import mixed_cube
 
 
@@ -67,3 +69,21 @@ def test_a_set_of_the_mesh_may_go_by_the_name_of_the_whole_skin():
     assert len(box.surface("boundary")[0]) == 24
     named = mca.Mesh(box.points, box.hexahedra, {"boundary": box.nodes("xmin")})
     assert len(named.surface("boundary")[0]) == 4
+
+
+def test_cells_on_the_same_side_of_a_face_are_found():
+    """A wedge within a hexahedron; tetrahedra on the same side of a triangle; not those on both."""
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 1, 1)).build()
+    inner = box.hexahedra[1][[0, 1, 2, 0, 4, 5, 6, 4]]
+    cells = np.concatenate([box.hexahedra, inner[None]])
+    assert mca.Mesh(box.points, cells).overlapping.tolist() == [1, 2]
+    with pytest.raises(
+        RequestError, match=r"^body a: Mesh cells = \[1, 2\]: these two cells lie on the same side of a"
+    ):
+        check(mca.Mesh(box.points, cells), "a")
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 2], [0, 0, -1]], float)
+    none, both, same = np.zeros((0, 8), np.int32), [[0, 1, 2, 3], [0, 2, 1, 5]], [[0, 1, 2, 3], [0, 1, 2, 4]]
+    for pair, found in ((both, []), (same, [0, 1])):
+        assert mca.Mesh(corners, none, tetrahedra=np.array(pair, np.int32)).overlapping.tolist() == found
+    assert all(not len(mesh.overlapping) for name, mesh in meshes().items() if name != "twice")
+    assert meshes()["twice"].overlapping.tolist() == [3, 210]

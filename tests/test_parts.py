@@ -201,7 +201,21 @@ def test_run_of_a_part_prints_a_scene_that_runs(
 
 
 FACET = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet"
+
+
+def tetrahedron(x: float) -> str:
+    """Triangles of an STL file around a tetrahedron with its corner at x."""
+    corner = [f"vertex {x + a} {b} {c}" for a, b, c in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    faces = ("\n".join(corner[i] for i in face) for face in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)))
+    return "\n".join(f"facet normal 0 0 0\nouter loop\n{face}\nendloop\nendfacet" for face in faces)
+
+
+TWO = f"solid a\n{tetrahedron(0.0)}\n{tetrahedron(3.0)}\nendsolid a\n"
 REFUSED = [
+    (
+        lambda folder: mca.Cad(_written(folder, "two.stl", TWO), size=0.5).build(),
+        "its 2 closed surfaces do not lie in one",
+    ),
     (lambda folder: mca.Cad(folder / "none.step", size=1.0).build(), "No such file"),
     (lambda folder: mca.Cad(folder / "part.msh", size=1.0), "CAD files end in .step.*MeshFile reads finished meshes"),
     (lambda folder: mca.Cad(folder / "part.step", size=1e-6).build(), "elements would result in a part of 0.06 m"),

@@ -32,7 +32,7 @@ class Starting(Memory):
 
 
 def recorded(monkeypatch: pytest.MonkeyPatch, wait: float) -> Starting:
-    """A recorder after a run; recorders start once rows have been launched for `wait` [s]."""
+    """A recorder after a run; recorders are patient for `wait` [s]."""
     own = Starting(SURFACE, CONTACT, PATHS)
     take = frames.Recording.take
 
@@ -41,15 +41,15 @@ def recorded(monkeypatch: pytest.MonkeyPatch, wait: float) -> Starting:
         take(self, row, needs)
 
     with monkeypatch.context() as patch:
-        patch.setattr(frames, "START", wait)
+        patch.setattr(frames, "PATIENCE", wait)
         patch.setattr(frames.Recording, "take", counted)
         mca.run(bar(), recorders=[own])
     return own
 
 
-@pytest.mark.parametrize(("wait", "sets", "begun"), [(0.0, 16, 1), (1e9, 16, 32), (1e9, 2, 21)])
+@pytest.mark.parametrize(("wait", "sets", "begun"), [(1e-9, 16, 1), (1e9, 16, 32), (1e9, 2, 21)])
 def test_recorders_that_start_late_get_every_frame(monkeypatch: pytest.MonkeyPatch, wait: float, sets: int, begun: int):
-    """After `wait`, with the first rows of the history, or once no further frame can be under way."""
+    """When they have waited, with the first rows of the history, or once no further frame can be under way."""
     usual = recorded(monkeypatch, 0.0)
     assert usual.begun == 0
     monkeypatch.setattr(frames, "_computes_beside", lambda output: True)
@@ -78,7 +78,7 @@ def test_a_recorder_that_fails_when_it_starts_late_stops_the_run(tmp_path: Path,
 
 def test_a_run_that_a_guard_stops_shows_the_frames_before(monkeypatch: pytest.MonkeyPatch, beside: None):
     own = Memory(SURFACE)
-    monkeypatch.setattr(frames, "START", 0.0)
+    monkeypatch.setattr(frames, "PATIENCE", 1e-9)
     with pytest.raises(GuardError):
         mca.run(bar(velocity=(3000.0, 0.0, 0.0)), recorders=[own])
     assert own.ended is False
@@ -88,7 +88,7 @@ def test_a_run_that_a_guard_stops_shows_the_frames_before(monkeypatch: pytest.Mo
 def test_a_run_that_ends_before_they_start_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, beside: None
 ):
-    monkeypatch.setattr(frames, "START", 1e9)
+    monkeypatch.setattr(frames, "PATIENCE", 1e9)
     own = Memory(SURFACE)
 
     def stop(*args: object) -> None:

@@ -15,7 +15,7 @@ Index = NDArray[np.int32]
 BITS = 20  # of the numbers that nodes get: sums over 600 cells around a node are exact in float64
 
 
-def boundary_faces(cells: Mapping[str, Index], node_count: int) -> tuple[Index, Index]:
+def boundary_faces(cells: Mapping[str, Index], node_count: int) -> tuple[Index, Index, Index]:
     """Faces that belong to one cell only, oriented outwards: nodes (face_count, 4), cell (face_count,).
 
     Triangles have their last corner twice.
@@ -23,6 +23,9 @@ def boundary_faces(cells: Mapping[str, Index], node_count: int) -> tuple[Index, 
     Args:
         cells: nodes of the cells of each type, as `Mesh.cells`; cells are counted in this order.
         node_count: of the mesh.
+
+    Returns:
+        Nodes and cells, and the first two cells that lie on the same side of a face, shape (2,), or none, (0,).
     """
     near = _near_boundary(cells, node_count)
     faces, owners, first = [], [], 0
@@ -31,6 +34,7 @@ def boundary_faces(cells: Mapping[str, Index], node_count: int) -> tuple[Index, 
         index = np.flatnonzero(near[conn].any(axis=1))
         found = _triangles_last(conn[index][:, table].reshape(-1, 4))
         kept = near[found].any(axis=1)  # all cells around such a face are among these
+        kept &= found[:, 1] != found[:, 2]  # faces that collapsed to an edge or a point are left out
         faces.append(found[kept])
         owners.append((first + np.repeat(index, len(table)))[kept])
         first += len(conn)
@@ -38,10 +42,25 @@ def boundary_faces(cells: Mapping[str, Index], node_count: int) -> tuple[Index, 
     key = nodes.copy()
     key[is_triangle(nodes), 3] = -1
     key = np.sort(key, axis=1)
-    _, place, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    _, place, group, count = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)
     own = np.sort(place[count == 1])
-    own = own[nodes[own, 1] != nodes[own, 2]]  # faces that collapsed to an edge or a point are left out
-    return nodes[own].astype(np.int32), owner[own].astype(np.int32)
+    return nodes[own].astype(np.int32), owner[own].astype(np.int32), _overlapping(nodes, owner, group, count)
+
+
+def _overlapping(nodes: Index, owner: Index, group: NDArray, count: NDArray) -> Index:
+    """The first two cells on the same side of a face, of faces in groups with the same corners."""
+    shared = np.flatnonzero(count[group] > 1)
+    side = group[shared] * 2 + _turns_left(nodes[shared])
+    order = np.argsort(side, kind="stable")
+    same = np.flatnonzero(side[order[1:]] == side[order[:-1]])
+    return owner[shared[order[same[:1, None] + [0, 1]]]].ravel().astype(np.int32)
+
+
+def _turns_left(faces: Index) -> NDArray[np.bool_]:
+    """Which way faces go around, the same for whichever corner comes first; opposite as seen from the other side."""
+    rows, last = np.arange(len(faces)), np.where(is_triangle(faces), 2, 3)
+    least = np.argmin(faces, axis=1)
+    return faces[rows, (least + 1) % (last + 1)] < faces[rows, (least + last) % (last + 1)]
 
 
 def _near_boundary(cells: Mapping[str, Index], node_count: int) -> NDArray[np.bool_]:

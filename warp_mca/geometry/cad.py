@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
@@ -164,7 +165,7 @@ def _check_closed(gmsh: ModuleType, path: str) -> None:
     """Refuse triangles that leave an edge open: gmsh may never return from dividing them into faces.
 
     Raises:
-        RequestError: an edge has an odd number of triangles.
+        RequestError: an edge has an odd number of triangles, or closed surfaces lie beside each other.
     """
     triangles = gmsh.model.mesh.getElementsByType(_TRIANGLE)[1].reshape(-1, 3)
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -172,6 +173,30 @@ def _check_closed(gmsh: ModuleType, path: str) -> None:
     if open_count := int((count % 2).sum()):
         remedy = f"{open_count} edges of its triangles lack a neighbour; close the surface and save it again"
         raise bad_value("Cad.path", path, remedy)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    if len(triangles) and (
+        count := _solids(np.searchsorted(np.sort(tags), triangles), coordinates.reshape(-1, 3)[np.argsort(tags)])
+    ):
+        remedy = f"its {count} closed surfaces do not lie in one of them; save each part in a file of its own"
+        raise bad_value("Cad.path", path, remedy)
+
+
+def _solids(triangles: NDArray, points: NDArray) -> int:
+    """Number of closed surfaces, where one lies outside the box around the largest: it bounds no hole; 0 otherwise."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = np.concatenate([triangles[:, :2], triangles[:, 1:]]).T
+    links = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(len(points), len(points)))
+    label = connected_components(links, directed=False)[1]
+    boxes = np.array([_box(points[label == k]) for k in np.unique(label[triangles])])
+    largest = boxes[np.ptp(boxes, axis=1).prod(axis=1).argmax()]
+    inside = (boxes[:, 0] >= largest[0]) & (boxes[:, 1] <= largest[1])
+    return 0 if inside.all() else len(boxes)
+
+
+def _box(points: NDArray) -> NDArray:
+    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 def _part_faces(gmsh: ModuleType, cut: bool) -> None:

@@ -50,12 +50,21 @@ class Mesh:
             index -= len(cells)
         raise IndexError(index)
 
-    @cached_property
+    @property
     def boundary(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Faces that belong to one cell only, oriented outwards: nodes (face_count, 4), cell (face_count,).
 
         Triangles have their last corner twice.
         """
+        return self._faces[:2]
+
+    @property
+    def overlapping(self) -> NDArray[np.int32]:
+        """The first two cells that lie on the same side of a face, shape (2,), int32; as it should be, none, (0,)."""
+        return self._faces[2]
+
+    @cached_property
+    def _faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
         return boundary_faces(self.cells, len(self.points))
 
     def surface(self, name: str) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

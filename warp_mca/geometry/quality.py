@@ -93,7 +93,7 @@ def pieces(mesh: Mesh) -> int:
 
 
 def check(mesh: Mesh, name: str) -> None:
-    """Raise RequestError for a mesh that is incomplete or has an inverted cell.
+    """Raise RequestError for a mesh that is incomplete or has cells that are inverted or overlap.
 
     Hexahedra are judged where they are integrated: a corner may be folded over a little, as in patch tests.
 
@@ -103,7 +103,7 @@ def check(mesh: Mesh, name: str) -> None:
 
     Raises:
         RequestError: as in `check_whole`; or the Jacobian determinant of a hexahedron is not positive at some Gauss
-            point, or the volume of a tetrahedron is not.
+            point, or the volume of a tetrahedron is not; or two cells lie on the same side of a face of both.
     """
     check_whole(mesh, name)
     good = np.concatenate([part.min(axis=1) > 0.0 for part in gauss_jacobians(mesh)])
@@ -113,6 +113,9 @@ def check(mesh: Mesh, name: str) -> None:
             f"body {name}: {len(bad)} of {len(good)} elements are inverted, first element {bad[0]}: "
             "repair the mesh or change the recipe's values"
         )
+    if len(mesh.overlapping):
+        remedy = "these two cells lie on the same side of a face of both, so that they overlap; leave one of them out"
+        raise bad_value(f"body {name}: Mesh cells", mesh.overlapping.tolist(), remedy)
 
 
 def check_whole(mesh: Mesh, name: str) -> None:

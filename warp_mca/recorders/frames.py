@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -38,7 +37,10 @@ if TYPE_CHECKING:
 
 # Frames on their way from a GPU, which goes on meanwhile: while recorders start, or save their files.
 AHEAD, AHEAD_BYTES = 16, 64 << 20  # at most, and their size together
-START = 0.02  # time for which a GPU is given work before recorders start beside it [s]
+# A GPU is given work first, and recorders have the time in which it need not be given more. Where that never comes,
+# they have their turn between rows once they have had none for as long.
+PATIENCE = 0.25  # [s]
+LAST = 3  # frames that are still to come when recorders begin to write each at once, so that little is left at the end
 
 
 def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
@@ -85,7 +87,7 @@ NOTHING: dict[str, Any] = {  # what a frame holds that needs nothing
 
 
 class Recording:
-    """The recorders of one run. Beside a GPU they start once it has work.
+    """The recorders of one run. Beside a GPU they start and work while it has work.
 
     Attributes:
         failed: names of the recorders that failed; what they write, mostly a file, is missing or ends too early.
@@ -112,11 +114,13 @@ class Recording:
             PATHS: _cuts({path: len(position) for path, position in info.paths.items()}),
         }
         self.transfer: Transfer[tuple[str, str]] | None = None
-        self.started, self.due = False, math.inf  # when they start, once rows have been launched [s]
+        self.started = False
+        self.patience = PATIENCE if output and _computes_beside(output) else 0.0
+        self.due = time.monotonic() + self.patience  # when they have their turn between rows [s]
         if output and self.rows:
             arrays = {(need, name): a for need, group in output.arrays.items() for name, a in group.items()}
             self.transfer = Transfer(arrays, output.solver.device, _sets(output, arrays.values()))
-        if output is None or not _computes_beside(output):
+        if not self.patience:
             self.start()
 
     def start(self) -> None:
@@ -146,7 +150,7 @@ class Recording:
         return frozenset().union(*(recorder.needs for recorder, rows in self.rows if rows[row]))
 
     def take(self, row: int, needs: frozenset[str]) -> None:
-        """Copy the frame that the step launched last has reduced, and pass on those that have arrived.
+        """Copy the frame that the step launched last has reduced; pass on one that has arrived, if it is time.
 
         Raises:
             RequestError: as when made.
@@ -157,11 +161,22 @@ class Recording:
             if self.transfer.full:
                 self._deliver(self.transfer)
             self.transfer.send(row, [key for key in self.transfer.source if key[0] in needs])
-        self.due = min(self.due, time.monotonic() + START)
-        if not self.started and time.monotonic() < self.due:
+        if time.monotonic() < self.due:
             return
         self.start()
-        while self.transfer.arrived:
+        if self.transfer.arrived:
+            self._deliver(self.transfer)
+        else:
+            self.due = time.monotonic() + self.patience
+
+    def work(self, until: Callable[[], bool]) -> None:
+        """Pass on frames that have arrived while the device has work, until it may be given more.
+
+        Raises:
+            RequestError: as when made.
+        """
+        self.start()
+        while self.transfer and self.transfer.arrived and not until():
             self._deliver(self.transfer)
 
     def catch_up(self) -> None:
@@ -171,6 +186,10 @@ class Recording:
             RequestError: as when made.
         """
         while self.transfer and self.transfer.pending:
+            self.start()
+            if len(self.transfer.pending) <= LAST and not self.transfer.arrived:
+                for recorder, _ in list(self.rows):
+                    self._call(recorder, getattr(recorder, "idle", lambda: None))
             self._deliver(self.transfer)
 
     def history(self, make: Callable[[], Mapping[str, NDArray[np.float64]]]) -> None:

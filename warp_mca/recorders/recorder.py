@@ -190,7 +190,8 @@ class Recorder(Protocol):
         cadence: when it wants a frame.
 
     It may have besides: `files`, the paths that it writes; `check(info)`, which refuses what it can before any recorder
-    of the run opens a file; `failed`, whether it went on after a failure that it warned of itself.
+    of the run opens a file; `idle()`, called while the run waits for its last frames, which writes what is held;
+    `failed`, whether it went on after a failure that it warned of itself.
     """
 
     @property

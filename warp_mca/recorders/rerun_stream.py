@@ -159,6 +159,12 @@ class RerunStream:
         if self._file_stream and self.frame_count % FLUSH_EVERY == 0:
             self._flush_file()
 
+    def idle(self) -> None:
+        """Send the frames that wait."""
+        self._drop_failed()
+        if self.streams:
+            self._send()
+
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
         """Log rows of the history as curves."""
         import rerun as rr

@@ -145,6 +145,17 @@ class UsdFile:
             if self._waiting > SAVE_BYTES or time.monotonic() > self._saved + SAVE_AFTER:
                 self._save()
 
+    def idle(self) -> None:
+        """Write and save what is held.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        if self.held:
+            self._write()
+        if self._waiting:
+            self._save()
+
     def _write(self) -> None:
         """Write the frames that are held."""
         from pxr import Sdf, Usd

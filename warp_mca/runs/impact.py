@@ -269,7 +269,7 @@ class _Loop:
     def _send(self) -> None:
         if self.transfer.full:
             if self.impact.recording:
-                self.impact.recording.start()  # while the device works on what it has
+                self.impact.recording.work(lambda: self.transfer.arrived)
             self._receive()
         self.transfer.send(self.written)
         self.written = 0

@@ -46,6 +46,8 @@ from warp_mca.solve.workspace import Workspace
 if TYPE_CHECKING:
     from warp_mca.solve.output import Output
 
+BESIDE = 5  # steps from a record on in one graph, which go on while a GPU sums what the record holds
+
 
 class Solver:
     """Advances states of a model on one device; it owns nothing that changes from step to step.
@@ -236,9 +238,9 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
-        if self.output and self.output.needs and count > 1:  # rows with and without frames share all steps but one
-            self.record_and_step(state, 1, needs, is_row, search)
-            self.step(state, count - 1)
+        if self.output and self.output.needs and count > BESIDE:  # rows with and without frames share the other steps
+            self.record_and_step(state, BESIDE, needs, is_row, search)
+            self.step(state, count - BESIDE, schedules=False)
             return
         if search and not self._replays_search:
             self.search(state)
@@ -263,8 +265,8 @@ class Solver:
         self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count
 
-    def step(self, state: State, count: int) -> None:
-        """Advance `count` steps.
+    def step(self, state: State, count: int, schedules: bool = True) -> None:
+        """Advance `count` steps; the order of elements is chosen anew before them unless others have just done so.
 
         Raises:
             Exception: what a thread raised.
@@ -274,10 +276,11 @@ class Solver:
         else:
 
             def steps() -> None:
-                self._schedule()
+                if schedules:
+                    self._schedule()
                 self._steps(state, count)
 
-            self._replay.graph(state, f"step {count}", steps)
+            self._replay.graph(state, f"step {count} {schedules}", steps)
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:

@@ -15,6 +15,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 Key = TypeVar("Key")
+ALIGN = 64  # of arrays in a block [byte]
 SLOTS = 2  # sets under way at least: one that is copied, one that the host reads
 
 
@@ -36,13 +37,8 @@ class Transfer(Generic[Key]):
         where = wp.get_device(device)
         self.source = dict(arrays)
         self.pending: deque[_Slot[Key]] = deque()
-        self.free = [
-            _Slot(
-                {key: wp.empty_like(a, device="cpu", pinned=where.is_cuda) for key, a in arrays.items()},
-                wp.Event(where) if where.is_cuda else None,
-            )
-            for _ in range(most)
-        ]
+        copies = _copies(self.source, most, where.is_cuda)
+        self.free = [_Slot(copy, wp.Event(where) if where.is_cuda else None) for copy in copies]
 
     @property
     def full(self) -> bool:
@@ -71,3 +67,18 @@ class Transfer(Generic[Key]):
             wp.synchronize_event(slot.event)
         self.free.insert(0, slot)
         return slot.tag, {key: np.asarray(slot.arrays[key].numpy()) for key in slot.sent}
+
+
+def _copies(arrays: Mapping[Key, wp.array], count: int, pinned: bool) -> list[dict[Key, wp.array]]:
+    """Host arrays like `arrays`, so many sets: parts of one block, because each allocation of pinned memory is slow."""
+    sizes = {key: -(-array.capacity // ALIGN) * ALIGN for key, array in arrays.items()}
+    block = wp.zeros(count * sum(sizes.values()) // 8, dtype=wp.float64, device="cpu", pinned=pinned)
+    at, sets = block.ptr or 0, []
+    for _ in range(count):
+        found = {}
+        for key, array in arrays.items():
+            found[key] = wp.array(ptr=at, dtype=array.dtype, shape=array.shape, device="cpu", pinned=pinned)
+            found[key].block = block  # lives as long
+            at += sizes[key]
+        sets.append(found)
+    return sets
