@@ -10,7 +10,7 @@ from test_recording import Memory, bar
 
 import warp_mca as mca
 from warp_mca.base.errors import GuardError, RequestError
-from warp_mca.recorders import UsdFile, frames
+from warp_mca.recorders import Cadence, UsdFile, frames
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE
 
 
@@ -98,3 +98,17 @@ def test_a_run_that_ends_before_they_start_leaves_nothing(
         mca.run(bar(), recorders=[UsdFile(tmp_path / "a.usdc"), own], progress=stop)
     assert own.ended is None
     assert list(tmp_path.iterdir()) == []
+
+
+def test_recorders_write_what_they_hold_while_the_run_waits_for_its_last_frames(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, beside: None
+):
+    """Little is then left to do once the last one has come."""
+    monkeypatch.setattr(frames.Transfer, "arrived", property(lambda self: False))
+    usual, own, file = Memory(SURFACE), Memory(SURFACE), UsdFile(tmp_path / "a.usdc", cadence=Cadence(frames=5))
+    held: list[tuple[int, int]] = []
+    vars(own)["idle"] = lambda: held.append((len(own.frames), file.saved_count))
+    mca.run(bar(), recorders=[usual, file, own])
+    assert held == [(2, 2), (3, 3), (4, 4)]
+    assert [frame.step for frame in own.frames] == [frame.step for frame in usual.frames]
+    assert file.saved_count == 5
