@@ -294,10 +294,12 @@ def test_result_names_its_columns():
 
 def test_reversal_needs_both_signs_beyond_the_last_springs():
     wave = np.sin(np.linspace(0.0, np.pi, 50))
-    assert not reverses(-1000.0 * wave)
-    assert not reverses(np.append(-1000.0 * wave, 0.04))
-    assert reverses(np.append(-1000.0 * wave, 100.0 * wave))
-    assert not reverses(np.zeros(4))
+    pressed = np.full(2 * len(wave), 1e4)
+    assert not reverses(-1000.0 * wave, pressed)
+    assert not reverses(np.append(-1000.0 * wave, 0.04), pressed)
+    assert reverses(np.append(-1000.0 * wave, 100.0 * wave), pressed)
+    assert not reverses(np.append(-1e-3 * wave, 1e-4 * wave), pressed)  # rounding
+    assert not reverses(np.zeros(4), np.zeros(4))
 
 
 def test_records_of_a_run_of_1e_30_s_have_peaks_too():

@@ -28,6 +28,7 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
 # Of its greatest force: a contact nearly opens below the first, between forces above the second.
 LIGHT, FIRM = 0.05, 0.1
 OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
+ACROSS = 0.02  # of the normal impulse, above which friction across the axis of F_t is worth a word
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +136,9 @@ def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[st
         found += _nearly_opens(contact)
         found += _grazes(contact)
         if contact.normal is not None:
-            found += _off_axis(contact.name, contact.normal, normal, tangent)
+            found += _off_axis(contact.name, contact.normal, normal, tangent) or _across(
+                contact, contact.normal, tangent
+            )
     return found
 
 
@@ -177,6 +180,20 @@ def _off_axis(name: str, true: Array, normal: Array, tangent: Array) -> list[str
     return [
         f"contact {name}: its normal force is along ({seen}), {off} {column}; set Contact.normal and tangent, or read "
         "the force vectors in forces.npz"
+    ]
+
+
+def _across(contact: ContactHistory, normal: Array, tangent: Array) -> list[str]:
+    """A warning where friction acts across the tangent rather than along it; axes [-], each shape (3,)."""
+    side = np.cross(normal, tangent)
+    along, across = np.abs(contact.force @ tangent).sum(), np.abs(contact.force @ side).sum()
+    across -= np.abs(contact.normal_force @ side).sum()  # what pressure on a curved surface has there
+    if across <= max(along, ACROSS * contact.pressure.sum()):
+        return []
+    seen, axis = (", ".join(f"{x:.3g}" for x in vector + 0.0) for vector in (side, tangent))
+    return [
+        f"contact {contact.name}: its friction is along ({seen}), across the axis ({axis}) of F_t_N; set "
+        "Contact.tangent, or read the force vectors in forces.npz"
     ]
 
 

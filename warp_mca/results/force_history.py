@@ -19,6 +19,7 @@ Interval = tuple[float, float]
 Rows = tuple[int, int]  # the first row and the one after the last
 
 CONTACT_THRESHOLD = 1e-3  # share of the greatest F_n above which the bodies count as touching
+ROUNDING = 1e-6  # of the normal force, below which there is no tangential one
 REVERSAL_THRESHOLD = 1e-2  # share of the greatest |F_t| that both signs must reach
 MERGED_GAP = 0.02  # share of a contact below which a separation is a change of nodes and does not end the contact
 GRAZING = 0.05  # share of the greatest F_n that a contact stays below in which the bodies only graze each other
@@ -138,15 +139,20 @@ def stick_intervals(time: Array, F_n: Array, stick_fraction: Array) -> list[Inte
     return intervals(time, found)
 
 
-def reverses(F_t: Array) -> bool:
+def reverses(F_t: Array, F_n: Array) -> bool:
     """Whether the tangential force changes sign: both signs reach 1 % of its greatest size.
 
-    Less is what the springs of a few nodes give back in the last microseconds of a contact.
+    Less is what the springs of a few nodes give back in the last microseconds of a contact. Where all of it is below a
+    millionth of the normal force, it is rounding.
 
     Args:
         F_t: tangential force [N], shape (row_count,).
+        F_n: normal force [N], shape (row_count,).
     """
-    size = REVERSAL_THRESHOLD * float(np.max(np.abs(F_t), initial=0.0))
+    greatest, normal = (float(np.max(np.abs(force), initial=0.0)) for force in (F_t, F_n))
+    if greatest <= ROUNDING * normal:
+        return False
+    size = REVERSAL_THRESHOLD * greatest
     return bool(size > 0.0 and F_t.max() > size and F_t.min() < -size)
 
 

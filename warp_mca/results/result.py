@@ -238,7 +238,7 @@ def summarise(history: Mapping[str, Array], facts: RunFacts, pairs: Sequence[Con
         "F_n_max": float(np.max(F_n, initial=0.0)),
         "F_t_min": float(np.min(F_t, initial=0.0)),
         "F_t_max": float(np.max(F_t, initial=0.0)),
-        "F_t_reverses": reverses(F_t),
+        "F_t_reverses": reverses(F_t, F_n),
         "contacts": [list(contact) for contact in contacts],
         "contact_duration": sum(end - start for start, end in contacts),
         "touched": bool(contacts) or any(pair.touched for pair in pairs),

@@ -77,6 +77,15 @@ class HandOff:
     chain: Chain | None = None
     swing: Swing | None = None
 
+    def angles(self, coordinates: Array) -> Array:
+        """The links' part of `theta` or `theta_dot`, shape (link_count,)."""
+        return coordinates if self.chain is None else self.chain.angles(coordinates)
+
+    @property
+    def slides(self) -> bool:
+        """Whether the first of the coordinates is the way of a carriage."""
+        return self.chain is not None and self.chain.slide is not None
+
 
 def hand_off(
     scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array], *, t_end: float | None = None
@@ -206,15 +215,16 @@ def _approach(centre: Array, velocity: Array, radius: float, plane: TargetPlane)
 
 
 def _balance(chain: Chain, run: Swing, X: Mapping, V: Mapping, nodal_masses: Mapping[str, Array]) -> dict:
-    """Momenta of the rigid links and of their nodes, and how far they differ."""
+    """Momenta of the rigid links and of their nodes, and how far they differ; neither has the carriage of a base."""
     names = [link.body for link in chain.links]
     m = np.concatenate([nodal_masses[name] for name in names])
     r = np.concatenate([X[name] for name in names])[:, :2] - np.asarray(chain.origin)
     v = np.concatenate([V[name] for name in names])[:, :2]
+    base = chain.hinges(run.theta, run.theta_dot)[1][0]
     rigid = Momenta(
         momentum=chain.momentum(run.theta, run.theta_dot),
         angular_momentum=chain.angular_momentum(run.theta, run.theta_dot),
-        kinetic_energy=chain.kinetic_energy(run.theta, run.theta_dot),
+        kinetic_energy=chain.kinetic_energy(run.theta, run.theta_dot) - 0.5 * chain.carriage_mass * float(base @ base),
     )
     nodes = Momenta(
         momentum=m @ v,

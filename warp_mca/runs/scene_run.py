@@ -153,6 +153,8 @@ class SceneRun:
             **self._solver_facts(),
             "refine": scene.refine,
         }
+        if start.slides:
+            more["carriage"] = {"way": float(start.theta[0]), "speed": float(start.theta_dot[0])}
         if scene.rigid_names:
             more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
         if model.rates:
@@ -190,8 +192,8 @@ class SceneRun:
             t_contact=start.t_contact if scene.rigid else None,
             v_n=start.v_n,
             v_t=start.v_t,
-            theta=tuple(float(x) for x in start.theta),
-            theta_dot=tuple(float(x) for x in start.theta_dot),
+            theta=tuple(float(x) for x in start.angles(start.theta)),
+            theta_dot=tuple(float(x) for x in start.angles(start.theta_dot)),
             more=more,
         )
 
