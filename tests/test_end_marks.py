@@ -9,7 +9,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.geometry.end_marks import missing_end
+from warp_mca.geometry.end_marks import cell_without_property, missing_end
 
 K = """*KEYWORD
 *NODE
@@ -57,3 +57,24 @@ def test_a_keyword_file_without_end_is_read_with_a_warning(tmp_path: Path, caplo
         with caplog.at_level(logging.WARNING, logger="warp_mca"):
             assert len(mca.MeshFile(file).build().points) == 4
         assert sum("lacks *END: if it was cut off" in record.message for record in caplog.records) == warned
+
+
+@pytest.mark.parametrize(
+    ("line", "cell"),
+    [
+        ("CHEXA   1               1       2       5       4       7       8       +11", "1"),
+        ("CTETRA,7,,1,2,3,4", "7"),
+        ("CTETRA* 12                              1               2", "12"),
+        ("CTETRA  12", "12"),
+        ("CTETRA  12      1       1       2       3       4", None),
+        ("CTETRA,7,3,1,2,3,4", None),
+    ],
+)
+def test_nastran_cells_without_a_property_are_refused(tmp_path: Path, line: str, cell: str | None):
+    """Gmsh leaves blank fields out, and would read nodes one field too early."""
+    file = tmp_path / "a.bdf"
+    file.write_text(f"BEGIN BULK\n{line}\nENDDATA\n")
+    assert cell_without_property(file) == cell
+    if cell:
+        with pytest.raises(RequestError, match=rf"^MeshFile\.path = .*: its cell {cell} has no property number; write"):
+            mca.MeshFile(file).build()

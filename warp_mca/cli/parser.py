@@ -221,7 +221,11 @@ def _add_recorders(parser: argparse.ArgumentParser) -> None:
     for option, kind in FILES.items():
         group.add_argument(f"--{option}", metavar="FILE", type=Path, action="append", default=[], help=kind.help)
     group.add_argument(
-        "--frames", type=int, default=100, metavar="N", help="frames of each file (default: %(default)s)"
+        "--frames",
+        type=int,
+        default=run.DRAWING["frames"],
+        metavar="N",
+        help="frames of each file (default: %(default)s)",
     )
     group.add_argument(
         "--snapshot",
@@ -234,11 +238,15 @@ def _add_recorders(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--field",
-        default="von_mises",
+        default=run.DRAWING["field"],
         choices=tuple(FIELDS),
         metavar="FIELD",
         help="what colours --snapshot and --animate: %(choices)s (default: %(default)s)",
     )
     group.add_argument(
-        "--magnify", type=float, default=1.0, metavar="F", help="draw F times the deformation there (default: 1)"
+        "--magnify",
+        type=float,
+        default=run.DRAWING["magnify"],
+        metavar="F",
+        help="draw F times the deformation there (default: 1)",
     )

@@ -16,6 +16,7 @@ from warp_mca.scene.model_file import SUFFIX, Origin
 from warp_mca.scene.options import with_options
 
 SCALE = "time_step_scale"  # an option for every scene, and a parameter of some
+OPTIONS = ("duration", "refine", "mass_scaling", SCALE)  # that scenes may have as parameters, too
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]
 
 
 def _of_source(args: argparse.Namespace, source: catalogue.SceneSource, more: Mapping[str, str]) -> Request:
-    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **more}
+    overrides = _overrides(args, more)
     scale = _where_no_parameter(getattr(args, SCALE, None), source.parameters, overrides)
     values = source.resolve(args.preset, overrides)
     preset = args.preset or source.default_preset
@@ -68,12 +69,26 @@ def _of_source(args: argparse.Namespace, source: catalogue.SceneSource, more: Ma
 
 
 def _of_model(args: argparse.Namespace, stored: model_file.StoredModel, more: Mapping[str, str]) -> Request:
-    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **more}
+    overrides = _overrides(args, more)
     names = stored.origin.parameters if stored.origin else ()
     scale = _where_no_parameter(getattr(args, SCALE, None), names, overrides)
     stored = model_file.changed(stored, overrides)
     scene = _with(stored.scene, args, scale)
     return Request(scene, Path(args.scene).stem, None, stored.origin, stored.meshes)
+
+
+def _overrides(args: argparse.Namespace, more: Mapping[str, str]) -> dict[str, object]:
+    """Parameters that `--set` gives, and `more`.
+
+    Raises:
+        RequestError: an option says the same of all scenes, and would win without a word.
+    """
+    overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **more}
+    for name in OPTIONS:
+        if (value := getattr(args, name, None)) is not None and name in overrides:
+            remedy = f"{name} is given as a parameter as well, {overrides[name]}; leave one of the two out"
+            raise bad_value(f"--{name.replace('_', '-')}", value, remedy)
+    return overrides
 
 
 def parameters_given(args: argparse.Namespace) -> set[str]:

@@ -21,6 +21,8 @@ from warp_mca.runs.checkpoint import DEFAULT, Every, stored_command
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
 
+DRAWING = {"frames": 100, "field": "von_mises", "magnify": 1.0}  # options for recorders, and their defaults
+
 
 def run(args: argparse.Namespace) -> None:
     """Run a scene or a sweep, and print what came of it."""
@@ -70,6 +72,7 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     """The recorders that the arguments ask for."""
     from warp_mca.recorders import FILES, Cadence, SnapshotFile
 
+    _check_drawing(args)
     cadence = Cadence(frames=args.frames)
     drawn = {"field": args.field, "magnify": args.magnify}
     found: list[Recorder] = []
@@ -84,6 +87,25 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     return found + [
         SnapshotFile(out / f"snapshot-{_time_words(t)}{other}.png", time=t, **drawn) for t in args.snapshots
     ]
+
+
+def _check_drawing(args: argparse.Namespace) -> None:
+    """Refuse options of recorders where no recorder takes them: nothing would come of them.
+
+    Raises:
+        RequestError: so it is.
+    """
+    from warp_mca.recorders import FILES
+
+    kinds = [kind for option, kind in FILES.items() if getattr(args, option)]
+    takers = {
+        "frames": args.viewer != "none" or any(kind.frames for kind in kinds),
+        "field": bool(args.snapshots) or any(kind.pictures for kind in kinds),
+    }
+    for option, default in DRAWING.items():
+        if getattr(args, option) != default and not takers.get(option, takers["field"]):
+            remedy = "no file that is asked for has frames" if option == "frames" else "no picture or film is asked for"
+            raise bad_value(f"--{option}", getattr(args, option), f"{remedy}; add one, or leave this out")
 
 
 def _time_words(t: float) -> str:
@@ -116,7 +138,8 @@ def _noting_what_is_left(args: argparse.Namespace) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as stop:
-        if any(getattr(args, option) for option, kind in FILES.items() if kind.frames):
+        files = [file for option, kind in FILES.items() if kind.frames for file in getattr(args, option)]
+        if any(file.exists() for file in files):
             stop.add_note("recordings hold the frames until then")
         if _every(args):
             stop.add_note("the same command goes on from the state that was last stored")

@@ -1,10 +1,11 @@
-"""Owns the marks that end mesh files of other programs, by which one that was cut off is told."""
+"""Owns what is looked for in mesh files of other programs before they are read: marks at their end, blank fields."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 _LAST = {".bdf": "ENDDATA", ".nas": "ENDDATA", ".k": "*END", ".key": "*END", ".dyn": "*END"}
+_SOLIDS = ("CHEXA", "CPENTA", "CPYRA", "CPYRAM", "CTETRA")
 END_REQUIRED = (".unv", ".bdf", ".nas")  # the others may do without
 
 
@@ -20,3 +21,20 @@ def missing_end(path: Path) -> str | None:
         return None
     with path.open(errors="replace") as lines:
         return None if any(line.upper().startswith(last) for line in lines) else last
+
+
+def cell_without_property(path: Path) -> str | None:
+    """Number of the first cell of a Nastran file whose property field is blank; None where there is none.
+
+    gmsh leaves blank fields out, so that all nodes of the cell would move up by one.
+    """
+    if path.suffix.lower() not in (".bdf", ".nas"):
+        return None
+    with path.open(errors="replace") as lines:
+        for line in lines:
+            if line[:8].split(",")[0].strip(" *\n").upper() in _SOLIDS:
+                width = 16 if "*" in line[:8] else 8
+                fields = line.split(",")[1:3] if "," in line else [line[8 : 8 + width], line[8 + width : 8 + 2 * width]]
+                if len(fields) < 2 or not fields[1].strip():
+                    return fields[0].strip()
+    return None

@@ -39,6 +39,8 @@ def read_by_gmsh(path: Path) -> meshio.Mesh:
         cells: list[Any] = []
         for entity in [*model.getEntities(2), *model.getEntities(3)]:
             for kind, nodes in _cells(model, entity):
+                if not np.isin(nodes, tags).all():
+                    raise ValueError("its cells have nodes that it does not give")
                 owners.append(entity)
                 cells.append((kind, np.searchsorted(tags[order], nodes)))
         groups: dict[str, list[tuple[int, int]]] = {}

@@ -18,7 +18,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC, STORED_TYPES
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
-from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
+from warp_mca.geometry.end_marks import END_REQUIRED, cell_without_property, missing_end
 from warp_mca.geometry.gmsh_file import GMSH_SUFFIXES, read_by_gmsh
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
@@ -148,7 +148,10 @@ class MeshFile:
         return names
 
     def _check_end(self) -> None:
-        """Refuses a file that was cut off, where its format says so; warns where it may have been."""
+        """Refuses a file that was cut off, where its format says so, or that gmsh would misread; warns where it may
+        have been cut off."""
+        if cell := cell_without_property(Path(self.path)):
+            raise self._bad(f"its cell {cell} has no property number; write one (PID) into each cell")
         if not (mark := missing_end(Path(self.path))):
             return
         if Path(self.path).suffix.lower() in END_REQUIRED:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.files import nearest
 from warp_mca.base.validate import kinds, members
 from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
@@ -90,6 +91,18 @@ class RerunStream:
         self._file_stream: rr.RecordingStream | None = None
         self._viewer_stream: rr.RecordingStream | None = None
         self._sent = 0.0  # time when frames were sent last [s]
+
+    def check(self, info: RunInfo) -> None:
+        """Check the disk: rerun, which cannot write there, may never come back.
+
+        Raises:
+            RequestError: it is full.
+        """
+        if self.path is not None and shutil.disk_usage(nearest(self.path).absolute()).free < DISK_RESERVE:
+            remedy = (
+                f"it cannot be written (less than {DISK_RESERVE >> 20} MiB are free on its disk); name another file"
+            )
+            raise bad_value("rrd", str(self.path), remedy)
 
     def start(self, info: RunInfo) -> None:
         """Open the streams and log what never changes.

@@ -46,6 +46,7 @@ from warp_mca.solve.workspace import Workspace
 if TYPE_CHECKING:
     from warp_mca.solve.output import Output
 
+MOST = 2000  # steps in one graph
 BESIDE = 5  # steps from a record on in one graph, which go on while a GPU sums what the record holds
 
 
@@ -217,9 +218,7 @@ class Solver:
             self._step(Step(state))
 
     def _schedule(self) -> None:
-        if self.chains:  # few launches are of all elements then
-            return
-        for stage in self.elements:
+        for stage in () if self.chains else self.elements:  # with chains few launches are of all elements
             stage.schedule()
 
     def record_and_step(
@@ -238,7 +237,7 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
-        if self.output and self.output.needs and count > BESIDE:  # rows with and without frames share the other steps
+        if count > (BESIDE if self.output and self.output.needs else MOST):  # rows with and without frames share these
             self.record_and_step(state, BESIDE, needs, is_row, search)
             self.step(state, count - BESIDE, schedules=False)
             return
@@ -273,14 +272,16 @@ class Solver:
         """
         if self._replay.pool:
             self._replay.stages(state, "step", lambda split: self._step(Step(state, split)), count)
-        else:
+            state.steps += count
+            return
 
-            def steps() -> None:
-                if schedules:
-                    self._schedule()
-                self._steps(state, count)
+        def steps(count: int) -> None:
+            if schedules:
+                self._schedule()
+            self._steps(state, count)
 
-            self._replay.graph(state, f"step {count} {schedules}", steps)
+        for part in [MOST] * (count // MOST) + [count % MOST] * (count % MOST > 0):
+            self._replay.graph(state, f"step {part} {schedules}", lambda part=part: steps(part))
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:
