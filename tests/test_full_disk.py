@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +15,7 @@ from test_results import facts, history
 
 import warp_mca as mca
 from warp_mca.base.errors import McaError, RequestError
-from warp_mca.recorders import UsdFile, usd_file
+from warp_mca.recorders import UsdFile, VtkHdfFile
 from warp_mca.results.result import Result, summarise
 from warp_mca.results.storage import save
 from warp_mca.scene import model_file as scene_file
@@ -51,8 +52,14 @@ def test_what_cannot_be_written_is_said_in_one_sentence_and_leaves_nothing(
     write(tmp_path)
 
 
-def test_a_disk_that_is_full_at_the_start_is_refused(bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(usd_file.shutil, "disk_usage", lambda path: SimpleNamespace(free=1 << 20))
-    with pytest.raises(RequestError, match=r"usd = .*less than 64 MiB are free on its disk"):
-        UsdFile(tmp_path / "a.usdc").start(bars.info)
+@pytest.mark.parametrize(
+    ("field", "begin"), [("usd", lambda file: UsdFile(file).start), ("vtkhdf", lambda file: VtkHdfFile(file).check)]
+)
+def test_a_disk_that_is_full_at_the_start_is_refused(
+    bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, field: str, begin: Callable
+):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=24 << 10))
+    file = tmp_path / ("a.usdc" if field == "usd" else "new/a.vtkhdf")
+    with pytest.raises(RequestError, match=rf"^{field} = .*less than 64 MiB are free on its disk"):
+        begin(file)(bars.info)
     assert list(tmp_path.iterdir()) == []

@@ -95,6 +95,7 @@ def test_a_few_faces_do_not_set_the_scale_of_stress():
     [
         ({"field": "heat"}, "field = 'heat': choose one of von_mises, plastic_strain, displacement, velocity"),
         ({"magnify": 0.0}, "magnify = 0.0: give a factor above 0"),
+        ({"magnify": 1e300}, r"magnify = 1e\+300: give a factor above 0, at most 1e\+06"),
         ({"limit": -1.0}, "limit = -1.0: give the von Mises stress at the upper end of the colours"),
     ],
 )

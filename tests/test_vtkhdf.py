@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 import pytest
 from flying_bars import DT, STEPS, FlyingBars
+from test_full_disk import files_up_to
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -245,3 +246,52 @@ def test_a_disk_that_fails_ends_the_recording_and_not_the_program(tmp_path: Path
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "File too large; the file holds the 3 frames before\n"
     check(tmp_path / "full.vtkhdf", bars, 3)
+
+
+@pytest.mark.parametrize("size", [0, 1000, 300_000, 400_000])
+def test_a_limit_of_file_size_refuses_the_run_or_is_kept(tmp_path: Path, bars: FlyingBars, size: int):
+    check_room = VtkHdfFile(tmp_path / "bars.vtkhdf").check
+    with files_up_to(size):
+        if size < 323_000:  # the file's size, bounded from above
+            with pytest.raises(RequestError, match=r"11 frames cannot be written \(File too large\); take fewer"):
+                check_room(bars.info)
+            with pytest.raises(RequestError, match="File too large"):
+                record(tmp_path / "bars.vtkhdf", bars, 0)
+            assert list(tmp_path.iterdir()) == []
+        else:
+            check_room(bars.info)
+            record(tmp_path / "bars.vtkhdf", bars).finish(True)
+            check(tmp_path / "bars.vtkhdf", bars, FRAMES)
+
+
+def test_a_disk_that_fails_at_the_start_refuses_the_run_without_a_crash(tmp_path: Path):
+    """At most sizes the failure comes while HDF5 makes datasets, before the file has its length."""
+    script = f"""
+        import resource, sys
+        sys.path.insert(0, {str(Path(__file__).parent)!r})
+        from flying_bars import FlyingBars
+        from warp_mca.base.errors import RequestError
+        from warp_mca.recorders.vtkhdf_file import VtkHdfFile
+
+        bars = FlyingBars()
+        for size in (0, 100, 2000, 10_000, 30_000, 60_000, 80_000, 86_000):
+            recorder = VtkHdfFile({str(tmp_path / "full.vtkhdf")!r})
+            abandon = recorder._abandon
+
+            def give_up():
+                resource.setrlimit(resource.RLIMIT_FSIZE, before)  # a full disk does not limit files in memory
+                abandon()
+
+            recorder._check_room, recorder._abandon = lambda *args: None, give_up
+            before = resource.getrlimit(resource.RLIMIT_FSIZE)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+            try:
+                recorder.start(bars.info)
+            except RequestError as error:
+                print(error)
+    """
+    command = [sys.executable, "-c", textwrap.dedent(script)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("cannot be written (File too large); name another file") == 8
+    assert list(tmp_path.iterdir()) == []

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"
 # Formats whose readers take six components as xx, yy, zz, xy, yz, xz; XDMF's take yy as the fourth, gmsh takes none.
 SIX_COMPONENTS = ("vtu", "vtk")
+SCALES = (1e3, 1e-6, 1e-17)  # of coordinates along x, y and z in the trial; the last are residues of rounding [m]
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
@@ -159,7 +160,8 @@ def _try(path: Path) -> tuple[list[str], list[str]]:
     Raises:
         RequestError: the element does not come back.
     """
-    points = np.array(HEXAHEDRON.natural, dtype=float)
+    # Some formats have no room for all digits, a sign and an exponent of two digits.
+    points = np.array(HEXAHEDRON.natural, dtype=float) / 3.0 * SCALES
     widths = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
     fields = {name: np.zeros((len(points), *width), np.float32) for name, width in widths.items()}
     nodes, index = np.arange(len(points))[None], np.zeros(1, dtype=np.int32)
@@ -174,10 +176,8 @@ def _try(path: Path) -> tuple[list[str], list[str]]:
                 raise ValueError("they do not come back")
             parts = [part.name for part in trial.parent.iterdir()]
         except (Exception, SystemExit) as error:  # meshio's writers and readers raise any exception, or exit
-            why = " ".join(str(error).split())
-            raise bad_value(
-                "final", str(path), f"meshio cannot write 8-node hexahedra in this format ({why}); {USUAL}"
-            ) from error
+            remedy = f"meshio cannot write 8-node hexahedra in this format ({_reason(error)}); {USUAL}"
+            raise bad_value("final", str(path), remedy) from error
     wanted = [(name, read.point_data) for name in fields] + [(name, read.cell_data) for name in mesh.cell_data]
     # some split fields
     return [name for name, kept in wanted if not any(key.startswith(name) for key in kept)], parts
@@ -200,7 +200,12 @@ def _save(path: Path, mesh: meshio.Mesh) -> None:
         for part in sorted(folder.iterdir(), key=lambda part: part.name == path.name):
             part.replace(path.with_name(part.name))
     except (Exception, SystemExit) as error:
-        raise McaError(f"the final state could not be written: {' '.join(str(error).split())}") from error
+        raise McaError(f"the final state could not be written: {_reason(error)}") from error
     finally:
         if folder:
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _reason(error: BaseException) -> str:
+    """What an error says in one line, or the name of its type."""
+    return " ".join(str(error).split()) or type(error).__name__

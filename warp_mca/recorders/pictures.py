@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo
 
 FILM_PIXELS = 600  # along the longer side of the pictures of a film
+MAX_MAGNIFY = 1e6  # shapes far larger exceed the numbers that pictures are drawn with
 MARGIN = 0.05  # around the bodies that strike, as a share of their size
 
 
@@ -39,12 +40,13 @@ class Subject:
             limit: value at the upper end of the colours, in the field's unit; None takes it from what is shown.
 
         Raises:
-            RequestError: there is no such field, or a number is not above 0.
+            RequestError: there is no such field, a number is not above 0, or `magnify` is above 1e6.
         """
         if field not in FIELDS:
             raise bad_value("field", brief(field), f"choose one of {', '.join(FIELDS)}")
-        if not (is_number(magnify) and magnify > 0.0):
-            raise bad_value("magnify", brief(magnify), "give a factor above 0; 1 shows the shape as it is")
+        if not (is_number(magnify) and 0.0 < magnify <= MAX_MAGNIFY):
+            remedy = f"give a factor above 0, at most {MAX_MAGNIFY:g}; 1 shows the shape as it is"
+            raise bad_value("magnify", brief(magnify), remedy)
         if limit is not None and not (is_number(limit) and limit > 0.0):
             raise bad_value("limit", brief(limit), f"give the {FIELDS[field].words} at the upper end of the colours")
         self.field, self.magnify, self.limit = field, magnify, limit

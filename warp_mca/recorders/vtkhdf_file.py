@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -20,11 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.files import nearest
 from warp_mca.recorders.mesh_file import cells
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
 from warp_mca.report.setting import rigid_planes, up_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import h5py
 
     from warp_mca.model.model import Model
@@ -35,6 +39,8 @@ if TYPE_CHECKING:
 
 FRAMES = Cadence(frames=100)
 FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
+# Bounds from above of what is written at the start for a node, an element, a frame, and in headers [byte].
+NODE_BYTES, ELEMENT_BYTES, FRAME_BYTES, HEADER_BYTES = 24, 88, 256, 256 << 10
 
 
 class VtkHdfFile:
@@ -61,6 +67,40 @@ class VtkHdfFile:
         self._unborn = self.path.with_name(f".{self.path.name}.part")
         self._file: h5py.File | None = None
 
+    def check(self, info: RunInfo) -> None:
+        """Check that the disk has room for the mesh, and that a file may be as long as all frames need.
+
+        Raises:
+            RequestError: it has not, or may not.
+        """
+        folder = nearest(self.path.parent)
+        if shutil.disk_usage(folder.absolute()).free < DISK_RESERVE:
+            why = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
+            raise bad_value("vtkhdf", str(self.path), f"it cannot be written ({why}); name another file")
+        self._check_room(info, folder)
+
+    def _check_room(self, info: RunInfo, folder: Path) -> None:
+        """Try a file as large in `folder`: HDF5 may crash Python where it meets a quota or a limit of file size.
+
+        Raises:
+            RequestError: the system refuses it.
+        """
+        count = self._planned(info)
+        at_start, whole = _file_sizes(info.model, count)
+        try:
+            with tempfile.TemporaryFile(dir=folder) as trial:
+                trial.truncate(whole)  # takes no space
+                if hasattr(os, "posix_fallocate"):
+                    os.posix_fallocate(trial.fileno(), 0, at_start)
+        except OSError as error:
+            remedy = f"{count} frames cannot be written ({_reason(error)}); take fewer frames or name another file"
+            raise bad_value("vtkhdf", str(self.path), remedy) from error
+
+    def _planned(self, info: RunInfo) -> int:
+        """Frames of the whole run."""
+        intervals = round(info.duration / info.output_interval)
+        return int(self.cadence.rows(intervals, info.output_interval).sum())
+
     def start(self, info: RunInfo) -> None:
         """Write the mesh, and give every frame its place.
 
@@ -72,14 +112,12 @@ class VtkHdfFile:
         except ImportError as error:
             raise RequestError(f"h5py cannot be imported ({error}): install it with pip install h5py") from error
 
-        intervals = round(info.duration / info.output_interval)
-        count = int(self.cadence.rows(intervals, info.output_interval).sum())
+        count = self._planned(info)
         self.node_count, self.frame_count = info.model.node_count, 0
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            # The earliest version has no marks that keep readers from a file whose writer was killed. A lock would
-            # keep ParaView from looking on.
-            self._file = h5py.File(self._unborn, "w", libver="earliest", locking=False)
+            self._check_room(info, self.path.parent)  # again: the run may have begun since `check`
+            self._file = h5py.File(_create(self._unborn))
             root = self._file.create_group("VTKHDF")
             self._steps, self._values, self._places = _make_steps(root, count, self.node_count)
             _write_mesh(root, info.model)
@@ -116,7 +154,8 @@ class VtkHdfFile:
         Raises:
             OSError: it cannot be closed; it stays as it was after the last frame.
         """
-        if self._file is None:
+        if self._file is None or not self.frame_count:
+            self._abandon()
             return
         try:
             self._publish(self._file, self.frame_count)  # discards a frame whose writing was interrupted
@@ -161,6 +200,31 @@ class VtkHdfFile:
             self._file = None
         with suppress(OSError):
             self._unborn.unlink(missing_ok=True)
+
+
+def _create(path: Path) -> h5py.h5f.FileID:
+    """Make an HDF5 file without buffers of data.
+
+    A dataset whose buffer cannot be written when it is closed stays half open, which crashes Python at its exit.
+    """
+    import h5py
+
+    h5f, access = h5py.h5f, h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    # The earliest version has no marks that keep readers from a file whose writer was killed. A lock would keep
+    # ParaView from looking on.
+    access.set_libver_bounds(h5f.LIBVER_EARLIEST, h5f.LIBVER_LATEST)
+    access.set_file_locking(False, False)
+    access.set_sieve_buf_size(0)
+    return h5f.create(os.fsencode(path), h5f.ACC_TRUNC, fapl=access)
+
+
+def _file_sizes(model: Model, count: int) -> tuple[int, int]:
+    """Size of a file [byte], bounded from above: what is written at the start, and the whole with `count` frames."""
+    mesh = NODE_BYTES * model.node_count + ELEMENT_BYTES * len(model.element_of)
+    at_start = HEADER_BYTES + mesh + FRAME_BYTES * count
+    values = sum(int(np.prod(width)) for width in FIELDS.values())
+    return at_start, at_start + count * model.node_count * values * np.dtype(np.float32).itemsize
 
 
 def _make_steps(root: h5py.Group, count: int, node_count: int) -> tuple[h5py.Group, h5py.Dataset, _Datasets]:

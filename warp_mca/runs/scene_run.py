@@ -138,12 +138,7 @@ class SceneRun:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
         count = self.steps.per_interval * max(ledger.kept.count - 1, 0)  # fewer than asked where it ended early
         more: dict[str, object] = {
-            "energy_drift_rigid": start.energy_drift,
-            "handoff_mismatch": {
-                "momentum": start.momentum_mismatch,
-                "angular_momentum": start.angular_momentum_mismatch,
-                "kinetic_energy": start.energy_mismatch,
-            },
+            **self._hand_off(),
             "max_penetration": max_penetration(self.solver, self.state, self.index),
             "max_strain": ledger.kept.max_strain,
             "extremes": self._extremes(),
@@ -153,8 +148,6 @@ class SceneRun:
             **self._solver_facts(),
             "refine": scene.refine,
         }
-        if start.slides:
-            more["carriage"] = {"way": float(start.theta[0]), "speed": float(start.theta_dot[0])}
         if scene.rigid_names:
             more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
         if model.rates:
@@ -196,6 +189,19 @@ class SceneRun:
             theta_dot=tuple(float(x) for x in start.angles(start.theta_dot)),
             more=more,
         )
+
+    def _hand_off(self) -> dict[str, object]:
+        """How well rigid links and their nodes agree at the start, and the way of a base that slides."""
+        start = self.ready.start
+        mismatch = {
+            "momentum": start.momentum_mismatch,
+            "angular_momentum": start.angular_momentum_mismatch,
+            "kinetic_energy": start.energy_mismatch,
+        }
+        found: dict[str, object] = {"energy_drift_rigid": start.energy_drift, "handoff_mismatch": mismatch}
+        if start.slides:
+            found["carriage"] = {"way": float(start.theta[0]), "speed": float(start.theta_dot[0])}
+        return found
 
     def _solver_facts(self) -> dict[str, object]:
         """Threads that compute, and whether they do so in floating frames."""
