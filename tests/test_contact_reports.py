@@ -212,6 +212,15 @@ def test_normals_further_than_ten_degrees_off_warn():
     assert "(0.5, 0.866, 0), 30 degrees off the axis (0, 1, 0) of F_n_N" in along(30.0)[0]
 
 
+@pytest.mark.parametrize(("v", "tangent", "warns"), [(0.0, None, 1), (1.0, None, 1), (5.0, None, 0), (0.0, "z", 0)])
+def test_friction_across_the_tangent_warns(v: float, tangent: str | None, warns: int):
+    """F_t_N, along x by default, has little or nothing of a block's that slides along z."""
+    axes = {} if tangent is None else {"tangent": (0.0, 0.0, 1.0)}
+    result = result_of(finished(falling(block("a", v=(v, -1.0, 3.0)), mu=0.2, **axes)))
+    assert sum("friction is along (0, 0, -1), across the axis (1, 0, 0) of F_t" in w for w in result.warnings) == warns
+    assert not result.summary["F_t_reverses"]
+
+
 @pytest.mark.parametrize(
     ("pressure", "says"),
     [

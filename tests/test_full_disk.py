@@ -15,7 +15,7 @@ from test_results import facts, history
 
 import warp_mca as mca
 from warp_mca.base.errors import McaError, RequestError
-from warp_mca.recorders import UsdFile, VtkHdfFile
+from warp_mca.recorders import RerunStream, UsdFile, VtkHdfFile
 from warp_mca.results.result import Result, summarise
 from warp_mca.results.storage import save
 from warp_mca.scene import model_file as scene_file
@@ -53,13 +53,18 @@ def test_what_cannot_be_written_is_said_in_one_sentence_and_leaves_nothing(
 
 
 @pytest.mark.parametrize(
-    ("field", "begin"), [("usd", lambda file: UsdFile(file).start), ("vtkhdf", lambda file: VtkHdfFile(file).check)]
+    ("field", "begin"),
+    [
+        ("usd", lambda file: UsdFile(file).start),
+        ("vtkhdf", lambda file: VtkHdfFile(file).check),
+        ("rrd", lambda file: RerunStream(file).check),
+    ],
 )
 def test_a_disk_that_is_full_at_the_start_is_refused(
     bars: FlyingBars, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, field: str, begin: Callable
 ):
     monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=24 << 10))
-    file = tmp_path / ("a.usdc" if field == "usd" else "new/a.vtkhdf")
+    file = tmp_path / {"usd": "a.usdc", "vtkhdf": "new/a.vtkhdf", "rrd": "a.rrd"}[field]
     with pytest.raises(RequestError, match=rf"^{field} = .*less than 64 MiB are free on its disk"):
         begin(file)(bars.info)
     assert list(tmp_path.iterdir()) == []

@@ -15,7 +15,7 @@ from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.rigid.placement import link_placements
 from warp_mca.rigid.scene_chain import chain_from_scene
 from warp_mca.rigid.target import target_plane
-from warp_mca.scene import Body, ImpactPhase, Revolute, RigidPhase, RigidPlane, Scene, Surface, Tip
+from warp_mca.scene import Body, ImpactPhase, Revolute, RigidPhase, RigidPlane, Scene, Slide, Surface, Tip
 from warp_mca.scene.materials import Elastic
 
 LENGTH, RADIUS, HEIGHT = 0.21, 0.013, 0.37  # Table 1 [m]
@@ -233,6 +233,15 @@ def chain_scene(count: int, **changes):
         "gravity": (0.0, -9.8, 0.0),
     }
     return Scene(**(values | changes)), dict.fromkeys(names, mesh), dict.fromkeys(names, masses)
+
+
+def test_a_carriage_counts_neither_among_links_nor_among_their_nodes():
+    scene, meshes, masses = chain_scene(2)
+    slide = Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.5)
+    state = hand_off(replace(scene, rigid=replace(scene.rigid, slide=slide)), meshes, masses)
+    assert state.slides and abs(state.theta_dot[0]) > 0.1
+    assert max(state.momentum_mismatch, state.angular_momentum_mismatch, state.energy_mismatch) < 1e-12
+    np.testing.assert_array_equal(state.angles(state.theta), state.theta[1:])
 
 
 def test_a_chain_of_four_keeps_momentum_and_closes_its_hinges():
