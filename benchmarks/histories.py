@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -68,7 +69,8 @@ def histories(folder: Path, scene: str, kinds: Sequence[str]) -> list[History]:
     duration = FAST.get(scene, {}).get("duration", 0.0)
     with tempfile.TemporaryDirectory() as out:
         command = [sys.executable, "-P", "-c", RUN, out, scene, repr(duration), *kinds]
-        env = {**os.environ, "PYTHONPATH": str(folder)}
+        paths = [str(folder), *filter(None, [os.environ.get("PYTHONPATH")])]
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
         done = subprocess.run(command, cwd=folder, env=env, check=False, capture_output=True, text=True)
         if done.returncode:
             raise SystemExit(f"{scene} of {folder} fails:\n{done.stderr}")
@@ -80,24 +82,42 @@ def histories(folder: Path, scene: str, kinds: Sequence[str]) -> list[History]:
 
 
 def difference(old: History, new: History) -> str:
-    """Whether all columns have the same bits, or the greatest difference of one, over its greatest value [-]."""
+    """Whether all columns have the same bits, or the greatest difference of one, over what is greatest of its kind [-].
+
+    Components of a velocity are of one kind, and so are energies and forces: rounding of one that should be zero is
+    then no difference worth naming.
+    """
     columns = [name for name in {**old, **new} if name not in old or name not in new]
     columns += [name for name in old if name in new and new[name].shape != old[name].shape]
     if columns:
         return f"columns differ: {', '.join(columns)}"
-    unlike = {name: _share(old[name], new[name]) for name in old if old[name].tobytes() != new[name].tobytes()}
+    most = {kind: max(_greatest(old[name]) for name in old if _kind(name) == kind) for kind in map(_kind, old)}
+    unlike = {
+        name: _share(old[name], new[name], most[_kind(name)])
+        for name in old
+        if old[name].tobytes() != new[name].tobytes()
+    }
     if not unlike:
         return "equal"
     worst = max(unlike, key=lambda name: unlike[name])
     return f"{unlike[worst]:.1e} ({worst})"
 
 
-def _share(old: np.ndarray, new: np.ndarray) -> float:
-    """Greatest difference over the greatest value [-]; inf where only one of the two is a number."""
+def _kind(column: str) -> str:
+    """What columns of the same kind have in common: the point whose velocity they hold, or the first letters."""
+    stem, _, axis = column.rpartition("_v")
+    return stem if axis in ("x", "y", "z") else column[:2] if column[:2] in ("E_", "F_") else column
+
+
+def _greatest(column: np.ndarray) -> float:
+    return float(np.nanmax(np.abs(column), initial=0.0))
+
+
+def _share(old: np.ndarray, new: np.ndarray, most: float) -> float:
+    """Greatest difference over `most` [-]; inf where only one of the two is a number."""
     if not np.array_equal(np.isnan(old), np.isnan(new)):
         return np.inf
-    most, apart = np.nanmax(np.abs(old)), np.nanmax(np.abs(new - old))
-    return float(apart / most) if most > 0.0 else np.inf
+    return _greatest(new - old) / most if most > 0.0 else np.inf
 
 
 def _scene_names(folder: Path) -> list[str]:
@@ -105,8 +125,8 @@ def _scene_names(folder: Path) -> list[str]:
     return sorted(file.stem for file in (folder / "scenes").glob("*.py") if not file.stem.startswith("_"))
 
 
-def compare(old: str, new: str, kinds: Sequence[str], scenes: Sequence[str]) -> list[str]:
-    """Rows of the table, printed as they come.
+def compare(old: str, new: str, kinds: Sequence[str], scenes: Sequence[str], workers: int = 1) -> list[str]:
+    """Rows of the table, printed as they come, of so many scenes side by side.
 
     Raises:
         SystemExit: a scene does not run.
@@ -115,10 +135,15 @@ def compare(old: str, new: str, kinds: Sequence[str], scenes: Sequence[str]) -> 
     print("\n".join(rows), flush=True)
     with checkout(old) as before, checkout(new) as after:
         known = _scene_names(before)
-        for scene in scenes or [name for name in _scene_names(after) if name in known]:
+
+        def row(scene: str) -> str:
             pairs = zip(*(histories(folder, scene, kinds) for folder in (before, after)), strict=True)
-            rows.append(f"| {scene} | " + " | ".join(difference(*pair) for pair in pairs) + " |")
-            print(rows[-1], flush=True)
+            return f"| {scene} | " + " | ".join(difference(*pair) for pair in pairs) + " |"
+
+        with ThreadPoolExecutor(workers) as pool:
+            for text in pool.map(row, scenes or [name for name in _scene_names(after) if name in known]):
+                rows.append(text)
+                print(text, flush=True)
     return rows
 
 
@@ -129,11 +154,12 @@ def main() -> None:
     parser.add_argument("--device", nargs="+", help="(default: cpu, and cuda:0 where there is one)")
     parser.add_argument("--precision", nargs="+", default=["mixed", "float64"])
     parser.add_argument("--scenes", nargs="+", default=[], help="(default: all that both have)")
+    parser.add_argument("--workers", type=int, default=1, help="scenes that run side by side (default: 1)")
     parser.add_argument("--out", type=Path, help="file for the table")
     args = parser.parse_args()
     devices = args.device or (["cpu", "cuda:0"] if wp.is_cuda_available() else ["cpu"])
     kinds = [f"{device} {precision}" for device in devices for precision in args.precision]
-    rows = compare(args.old, args.new, kinds, args.scenes)
+    rows = compare(args.old, args.new, kinds, args.scenes, args.workers)
     if args.out:
         args.out.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
