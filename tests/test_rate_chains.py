@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import warp as wp
 from impacts import begun, figures, finished, prepared
+from test_absorbing import chip_on_slab
 from test_multi_rate import METAL, STEEL, graded, hinged
 from test_overlap import Driver
 
@@ -83,9 +85,10 @@ def leaving() -> mca.Scene:
     )
 
 
-def test_an_impact_in_chains_has_the_bits_of_substeps_in_turn():
+@pytest.mark.parametrize("scene", [leaving, chip_on_slab])
+def test_an_impact_in_chains_has_the_bits_of_substeps_in_turn(scene: Callable[[], mca.Scene]):
     """With its searches and records."""
-    plain, chained = (begun(leaving(), duration=4e-5, multi_rate=3) for _ in range(2))
+    plain, chained = (begun(scene(), duration=4e-5, multi_rate=3) for _ in range(2))
     with wp.ScopedDevice("cpu"):
         chained.solver.chains = Chains(chained.solver)
     for impact in (plain, chained):

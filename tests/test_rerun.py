@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -131,7 +132,7 @@ def test_a_full_disk_is_a_warning_and_what_was_recorded_stays(
     tmp_path: Path, bars: FlyingBars, monkeypatch: pytest.MonkeyPatch
 ):
     free = iter([1 << 40] + [1 << 20] * 9)
-    monkeypatch.setattr(rerun_stream.shutil, "disk_usage", lambda path: SimpleNamespace(free=next(free)))
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=next(free)))
     record(tmp_path / "full.rrd", bars)
     (warning,) = bars.said
     assert "are free on its disk" in warning
@@ -143,7 +144,8 @@ def test_a_file_without_its_end_is_removed_and_counts_as_failed(tmp_path: Path, 
     recorder = RerunStream(tmp_path / "a.rrd")
     recorder.start(bars.info)
     recorder.frame(bars.frame(0))
-    stream = recorder._file_stream
+    assert recorder._file is not None
+    stream = recorder._file.stream
     disconnect = stream.disconnect
     stream.disconnect = lambda: (disconnect(), os.truncate(tmp_path / "a.rrd", 2000))
     recorder.finish(True)

@@ -9,7 +9,7 @@ from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin,
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.nodes.node import TOUCHABLE, hold, nodal_force_function, take_contact
+from warp_mca.kernels.nodes.node import LEVEL_BIT, TOUCHABLE, hold, nodal_force_function, take_contact
 from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
@@ -55,7 +55,8 @@ def absorbing_kernel(
     impulse_out [N s] is what each node has given to what lies beyond the boundary up to t(n), absorbed_out [J] the
     energy that it gave in the frame of the body. As the force at t(n) acts for half a step on either side of
     it, the arrays with `after` hold the same half a step later. With `springs`, stretch_out [m] is u(n) less the way of
-    the body. `rated`, `turned` as in `nodal_force_function`.
+    the body. `rated`, `turned` as in `nodal_force_function`; `rated` nodes are those of `item`, place among the
+    dashpots + (level << LEVEL_BIT), whose step is 2^level times `dt`.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     vec3 = scalars(precision).vec3
@@ -63,6 +64,7 @@ def absorbing_kernel(
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_absorbing(
+        item: wp.array(dtype=wp.int32),
         dashpots: Dashpots,
         inverse_mass: wp.array(dtype=wp.float64),
         first_slots: wp.array(dtype=wp.vec2i),
@@ -87,6 +89,10 @@ def absorbing_kernel(
         wait_for_previous()
         let_next_begin()
         k = wp.tid()
+        step = dt
+        if wp.static(rated):
+            step *= wp.float64(1 << (item[k] >> wp.static(LEVEL_BIT)))
+            k = item[k] & wp.static((1 << LEVEL_BIT) - 1)
         i = dashpots.node[k]
         own = dashpots.velocity[k]
         total = nodal_force(i, first_slots[i], more_slots, force, frames)
@@ -99,8 +105,8 @@ def absorbing_kernel(
             total -= spring
         a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
         before = v_out[i]
-        v, w = dampen(before, before + dt * a, own, dashpots.share[k])
-        half = wp.float64(0.5) * dt * (dashpots.damping[k] * w + spring)
+        v, w = dampen(before, before + step * a, own, dashpots.share[k])
+        half = wp.float64(0.5) * step * (dashpots.damping[k] * w + spring)
         impulse = impulse_after_out[k] + half
         absorbed = absorbed_after_out[k] + wp.dot(half, before - own)
         impulse_out[k] = impulse
@@ -108,11 +114,11 @@ def absorbing_kernel(
         absorbed_out[k] = absorbed
         absorbed_after_out[k] = absorbed + wp.dot(half, v - own)
         if wp.static(springs):
-            stretch_out[k] = stretch_out[k] + dt * (v - own)
+            stretch_out[k] = stretch_out[k] + step * (v - own)
         if v_before_out.shape[0] > 0:
             v_before_out[i] = before
         v_out[i] = v
-        u_out[i] = u_out[i] + dt * v
+        u_out[i] = u_out[i] + step * v
         keep_speed(i, v, speed_square_out)
 
     return begins_early(advance_absorbing)

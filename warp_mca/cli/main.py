@@ -18,12 +18,11 @@ from contextlib import suppress
 from typing import NoReturn
 
 from warp_mca.base.errors import McaError
+from warp_mca.base.garbage import few_collections
 from warp_mca.base.stdio import drop_output, open_streams, what_failed
 from warp_mca.cli import completion
 from warp_mca.cli.parser import make_parser
 from warp_mca.runs.advice import LOGGER
-
-COLLECT = 100_000  # allocations between two garbage collections; at Python's own threshold they cost 0.2 s
 
 
 class _Warnings(logging.Handler):
@@ -53,8 +52,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         atexit.register(gc.freeze)
         os.environ["MPLBACKEND"] = "agg"  # a notebook's backend may be missing in this environment
         open_streams()
-    collect = gc.get_threshold()
-    gc.set_threshold(COLLECT)
     main_thread = threading.current_thread() is threading.main_thread()  # no other may take signals
     signals = (signal.SIGTERM, signal.SIGHUP) if main_thread else ()
     before = {number: signal.getsignal(number) for number in signals}
@@ -66,7 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     level = logger.level  # which commands may change
     logger.addHandler(warnings)
     try:
-        return _carry_out(argv)
+        with few_collections():
+            return _carry_out(argv)
     except McaError as error:
         return _fail(str(error), error.exit_status)
     except BrokenPipeError:
@@ -84,7 +82,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     finally:
         logger.removeHandler(warnings)
         logger.setLevel(level)
-        gc.set_threshold(*collect)
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)
 

@@ -153,9 +153,13 @@ def _tied_nodes(model: Model) -> Index:
 
 
 def _touched_nodes(model: Model) -> Index:
-    """Nodes that something else than elements and gravity acts on."""
+    """Nodes that something else than elements, gravity and dashpots acts on.
+
+    Those of absorbing boundaries move with their elements: dashpots that act more often than these would take up more
+    than they bring, see docs/theory.md.
+    """
     hinges = [side for load in model.hinge_loads for side in (load.inner, load.outer)]
     contacts = [nodes for item in model.passes for nodes in (item.slave, item.master)]
     joints = [model.joint_first, model.joint_second[model.joint_second >= 0], model.prescribed_node]
-    others = [model.absorbing.node, model.ties.slave, model.ties.carriers]
+    others = [model.ties.slave, model.ties.carriers]
     return _joined([*joints, *others, *(body.nodes for body in model.rigid_bodies), *hinges, *contacts])

@@ -179,14 +179,15 @@ class Recording:
         while self.transfer and self.transfer.arrived and not until():
             self._deliver(self.transfer)
 
-    def catch_up(self) -> None:
-        """Pass on the frames that are still being copied, one after the other as they arrive.
+    def catch_up(self, beside: Callable[[], None] = lambda: None) -> None:
+        """Pass on the frames that are still being copied, one after the other as they arrive, each after `beside`.
 
         Raises:
             RequestError: as when made.
         """
         while self.transfer and self.transfer.pending:
             self.start()
+            beside()
             if len(self.transfer.pending) <= LAST and not self.transfer.arrived:
                 for recorder, _ in list(self.rows):
                     self._call(recorder, getattr(recorder, "idle", lambda: None))
@@ -209,6 +210,8 @@ class Recording:
         self._close(ok)
 
     def _close(self, ok: bool) -> None:
+        for recorder, _ in list(self.rows if self.started else ()):
+            self._call(recorder, getattr(recorder, "close", lambda: None))
         for recorder, _ in list(self.rows if self.started else ()):
             self._call(recorder, lambda recorder=recorder: recorder.finish(ok))
             if getattr(recorder, "failed", False):

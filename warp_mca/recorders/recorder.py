@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.files import check_folder, given_path
+from warp_mca.base.files import check_folder, given_path, nearest
 from warp_mca.base.validate import brief, is_list, is_number
 from warp_mca.geometry.cell_types import is_triangle, triangulated
 from warp_mca.scene import RigidPlane
@@ -26,6 +27,7 @@ Float = NDArray[np.float32]
 Index = NDArray[np.int32]
 
 DISK_RESERVE = 64 << 20  # disk space that recorders leave free for the results [byte]
+FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
 # What a frame can hold. Only what a recorder of the run asks for is computed and copied.
 SURFACE, CONTACT, PATHS, VOLUME = NEEDS = "surface", "contact", "paths", "volume"
 
@@ -191,7 +193,8 @@ class Recorder(Protocol):
 
     It may have besides: `files`, the paths that it writes; `check(info)`, which refuses what it can before any recorder
     of the run opens a file; `idle()`, called while the run waits for its last frames, which writes what is held;
-    `failed`, whether it went on after a failure that it warned of itself.
+    `close()`, called before the `finish` of any recorder, which begins what goes on beside them; `failed`, whether it
+    went on after a failure that it warned of itself.
     """
 
     @property
@@ -239,6 +242,16 @@ def file_path(field: str, file: object) -> Path:
         RequestError: it is no path.
     """
     return given_path(field, file, "name a file")
+
+
+def check_disk(field: str, path: Path) -> None:
+    """Check that the disk of a file, which may be made yet, has room.
+
+    Raises:
+        RequestError: it is full.
+    """
+    if shutil.disk_usage(nearest(path).absolute()).free < DISK_RESERVE:
+        raise bad_value(field, str(path), f"it cannot be written ({FULL}); name another file")
 
 
 def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path:

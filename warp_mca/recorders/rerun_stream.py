@@ -6,14 +6,9 @@ vertices takes 3 ms of the run's thread for one of them, rerun's own threads do 
 
 from __future__ import annotations
 
-import atexit
 import os
-import shutil
-import threading
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
@@ -21,10 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.files import nearest
 from warp_mca.base.validate import kinds, members
 from warp_mca.recorders.colours import ColourScale, check_limit
-from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, PATHS, SURFACE, Cadence, apart, check_file
+from warp_mca.recorders.recorder import (
+    CONTACT,
+    PATHS,
+    SURFACE,
+    Cadence,
+    apart,
+    check_disk,
+    check_file,
+)
+from warp_mca.recorders.rerun_file import RerunFile
 from warp_mca.recorders.rerun_frames import FrameQueue
 from warp_mca.recorders.rerun_setting import PLANES, PathBars, Planes, sights, topology
 from warp_mca.report.setting import up_of
@@ -37,8 +40,6 @@ if TYPE_CHECKING:
 
 FLUSH_EVERY = 4  # frames between flushes: as many may be lost when a run is killed
 HOLD = 0.2  # a frame that comes later after the last ones were sent is sent at once, so that a viewer shows it [s]
-CLOSE_TIMEOUT = 10.0  # of the file at the end [s]
-END = b"RRF2FOOT"  # 12 bytes before the end of a whole file
 FRAMES = Cadence(frames=100)
 
 
@@ -88,7 +89,7 @@ class RerunStream:
         self.viewer: Viewer | None = None
         self.frame_count = 0
         self.failed = False
-        self._file_stream: rr.RecordingStream | None = None
+        self._file: RerunFile | None = None
         self._viewer_stream: rr.RecordingStream | None = None
         self._sent = 0.0  # time when frames were sent last [s]
 
@@ -98,11 +99,8 @@ class RerunStream:
         Raises:
             RequestError: it is full.
         """
-        if self.path is not None and shutil.disk_usage(nearest(self.path).absolute()).free < DISK_RESERVE:
-            remedy = (
-                f"it cannot be written (less than {DISK_RESERVE >> 20} MiB are free on its disk); name another file"
-            )
-            raise bad_value("rrd", str(self.path), remedy)
+        if self.path is not None:
+            check_disk("rrd", self.path)
 
     def start(self, info: RunInfo) -> None:
         """Open the streams and log what never changes.
@@ -129,17 +127,11 @@ class RerunStream:
         # The viewer keeps a layout for each application: scenes must not share one.
         application, recording = f"warp_mca {info.scene.name}", uuid4()
         if self.path is not None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            stream = rr.RecordingStream(application, recording_id=recording)
-            try:
-                stream.set_sinks(rr.FileSink(str(self.path)), default_blueprint=layout)
-            except RuntimeError as error:
-                raise bad_value("rrd", str(self.path), f"it cannot be written ({error}); name another file") from error
-            self._file_stream = stream
+            self._file = RerunFile(self.path, application, recording, layout)
         if self.with_viewer:
             stream = self._viewer_stream = rr.RecordingStream(application, recording_id=recording)
             self.viewer = Viewer(stream, layout, self.viewer_options)
-        self.streams = [stream for stream in (self._file_stream, self._viewer_stream) if stream]
+        self.streams = [stream for stream in (self._file and self._file.stream, self._viewer_stream) if stream]
         self.planes = Planes(info)
         bars = {path: PathBars(position, k) for k, (path, position) in enumerate(info.paths.items())}
         self.queue = FrameQueue(self.bodies, self.paths, bars)
@@ -169,8 +161,8 @@ class RerunStream:
             self._send()
         if self.viewer:
             self.viewer.sent(sum(points.nbytes for points in frame.points.values()) * 4 // 3)
-        if self._file_stream and self.frame_count % FLUSH_EVERY == 0:
-            self._flush_file()
+        if self._file and self.frame_count % FLUSH_EVERY == 0 and not self._file.flush():
+            self._close_file(self._file)
 
     def idle(self) -> None:
         """Send the frames that wait."""
@@ -195,13 +187,19 @@ class RerunStream:
                         scalars = rr.Scalars.columns(scalars=rows[column])
                         stream.send_columns(f"plots/{plot}/{column}", indexes=indexes, columns=scalars)
 
-    def finish(self, ok: bool) -> None:
-        """Write and send what is left; a recording that lacks something is a warning."""
+    def close(self) -> None:
+        """Send what is left, and begin to close the file, which takes rerun some milliseconds."""
         self._drop_failed()
         if self.streams:
             self._send()
-        if self._file_stream:
-            self._close_file()
+        if self._file:
+            self._file.begin_to_close()
+
+    def finish(self, ok: bool) -> None:
+        """Write and send what is left; a recording that lacks something is a warning."""
+        self.close()
+        if self._file:
+            self._close_file(self._file)
             if not ok and not self.frame_count and self.path:
                 self.path.unlink(missing_ok=True)
         if self.viewer:
@@ -235,36 +233,13 @@ class RerunStream:
         idle.send_columns("mesh", indexes=[rr.TimeColumn("step", sequence=[0])], columns=mesh.partition([3]))
         sink.drain_as_bytes()
 
-    def _flush_file(self) -> None:
-        """Start writing what was logged, without waiting for it."""
-        assert self._file_stream is not None and self.path is not None
-        if shutil.disk_usage(self.path.parent).free < DISK_RESERVE:
-            self._close_file(f"less than {DISK_RESERVE >> 20} MiB are free on its disk")
-            return
-        try:
-            self._file_stream.flush(timeout_sec=0.0)
-        except RuntimeError as error:
-            self._close_file(str(error))
-
-    def _close_file(self, reason: str = "") -> None:
-        """Write the file's table of contents, and remove a file that takes none; `reason` says why it ends early."""
-        import rerun as rr
-
-        assert self._file_stream is not None and self.path is not None
-        # Once a write has failed, rerun 0.41 may never come back: not from this, nor when Python exits.
-        closing = threading.Thread(target=self._file_stream.disconnect, daemon=True)
-        closing.start()
-        closing.join(CLOSE_TIMEOUT)
-        if closing.is_alive():
-            atexit.unregister(rr.rerun_shutdown)
-        self.streams = [stream for stream in self.streams if stream is not self._file_stream]
-        self._file_stream = None
-        if closing.is_alive() or not _whole(self.path):
-            self.path.unlink(missing_ok=True)
-            reason = f"{reason or 'it could not be written'}; the broken file is removed"
-        if reason:
+    def _close_file(self, file: RerunFile) -> None:
+        file.close()
+        self.streams = [stream for stream in self.streams if stream is not file.stream]
+        self._file = None
+        if file.reason:
             self.failed = True
-            self.info.warn(f"{self.path}: recording stopped after {self.frame_count} frames: {reason}")
+            self.info.warn(f"{self.path}: recording stopped after {self.frame_count} frames: {file.reason}")
 
     def _drop_failed(self) -> None:
         """Stop sending to a viewer that was given up, and say so once."""
@@ -283,11 +258,3 @@ def entity(*parts: str) -> str:
     import rerun as rr
 
     return rr.new_entity_path(list(parts))
-
-
-def _whole(path: Path) -> bool:
-    """Whether a recording is complete: it then ends with its table of contents."""
-    with suppress(OSError), path.open("rb") as file:
-        file.seek(-12, os.SEEK_END)
-        return file.read(len(END)) == END
-    return False

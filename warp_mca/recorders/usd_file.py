@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.base.files import nearest
 from warp_mca.recorders.colours import ColourScale, check_limit
-from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, SURFACE, Cadence, apart, check_file
+from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, FULL, SURFACE, Cadence, apart, check_disk, check_file
 from warp_mca.recorders.usd_prims import BodyPrim, ContactPrim
 from warp_mca.recorders.usd_setting import Setting, bind, make_material, set_up_axis
 from warp_mca.report.setting import up_of
@@ -37,7 +36,6 @@ SAVE_AFTER = 1.0  # time between saves [s]
 SAVE_BYTES = 1 << 20  # or what waits for one
 KEPT = ("points", "von_mises", "plastic_strain", "contact_points", "contact_stick")  # of a frame
 PLAYBACK = 24.0  # frames shown in a second
-FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
 POINT_SIZE = 0.004  # of contact points, as a share of the scene
 
 
@@ -88,8 +86,7 @@ class UsdFile:
         """
         with _signals_held():
             from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401
-        if shutil.disk_usage(nearest(self.path).absolute()).free < DISK_RESERVE:
-            raise bad_value("usd", str(self.path), f"it cannot be written ({FULL}); name another file")
+        check_disk("usd", self.path)
 
     def start(self, info: RunInfo) -> None:
         """Write what never changes.

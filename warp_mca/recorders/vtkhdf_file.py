@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.files import nearest
 from warp_mca.recorders.mesh_file import cells
-from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file
+from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_disk, check_file
 from warp_mca.report.setting import rigid_planes, up_of
 
 if TYPE_CHECKING:
@@ -73,11 +73,8 @@ class VtkHdfFile:
         Raises:
             RequestError: it has not, or may not.
         """
-        folder = nearest(self.path.parent)
-        if shutil.disk_usage(folder.absolute()).free < DISK_RESERVE:
-            why = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
-            raise bad_value("vtkhdf", str(self.path), f"it cannot be written ({why}); name another file")
-        self._check_room(info, folder)
+        check_disk("vtkhdf", self.path)
+        self._check_room(info, nearest(self.path.parent))
 
     def _check_room(self, info: RunInfo, folder: Path) -> None:
         """Try a file as large in `folder`: HDF5 may crash Python where it meets a quota or a limit of file size.

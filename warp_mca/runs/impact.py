@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
+from warp_mca.base.garbage import few_collections
 from warp_mca.model.batch_model import join_models
 from warp_mca.model.floating import with_floating_frames
 from warp_mca.model.layout import offsets
@@ -163,7 +164,7 @@ class Impact:
         """
         if None not in self.stopped or self.state.steps > self.steps.count:
             return  # with the last record of all
-        with suppress(GuardError):  # that of the last scene
+        with suppress(GuardError), few_collections():  # the error is that of the last scene
             _Loop(self, told, ended).run(until)
 
     def at_last_record(self) -> tuple[Array, Array]:
@@ -217,13 +218,13 @@ class _Loop:
             if self.written == ROWS:
                 self._send()
             self._record(1, self.state.steps // self.steps.per_interval, True)
-        if self.impact.recording:
-            self.impact.recording.catch_up()
-        self._receive_all()
+        self._see()
         if self.written:
-            self.transfer.send(self.written)
-            self.written = 0
-        self._receive_all()
+            self._send()
+        if self.impact.recording:
+            self.impact.recording.catch_up(self._receive_arrived)
+        while self.transfer.pending:
+            self._receive()
 
     def _ends(self, interval: int) -> bool:
         """Whether the phase ends with this row, by what the rows before it say."""
@@ -273,6 +274,9 @@ class _Loop:
             self._receive()
         self.transfer.send(self.written)
         self.written = 0
+        self._receive_arrived()
+
+    def _receive_arrived(self) -> None:
         while self.transfer.arrived or (self.ended and self.transfer.pending):
             self._receive()
 
@@ -291,8 +295,3 @@ class _Loop:
             _, shape = self.looks.receive()
             for item in self.impact.scene_runs:
                 item.ledger.kept.stiffened = item.look(shape["u"])
-
-    def _receive_all(self) -> None:
-        self._see()
-        while self.transfer.pending:
-            self._receive()

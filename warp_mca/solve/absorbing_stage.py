@@ -10,6 +10,7 @@ import warp as wp
 
 from warp_mca.elements.stage import BLOCK_DIM
 from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
+from warp_mca.kernels.nodes.node import LEVEL_BIT
 from warp_mca.kernels.records.absorbing import sum_absorbed
 from warp_mca.kernels.records.columns import absorbing_column
 from warp_mca.model.layout import Layout
@@ -46,6 +47,7 @@ class AbsorbingStage:
 
     Attributes:
         count: nodes of absorbing boundaries.
+        items, chains: of the kernel: those up to each level, and those of each.
     """
 
     def __init__(self, model: Model, layout: Layout, nodes: NodeStage, precision: str) -> None:
@@ -54,7 +56,13 @@ class AbsorbingStage:
         self.count, self.model = len(own.node), model
         if not self.count:
             return
-        decay = 0.5 * nodes.dt * own.damping / model.mass[own.node, None, None]
+        level = model.rates.node_level[own.node].astype(np.int32) if model.rates else np.zeros(self.count, np.int32)
+        step = (nodes.base * 2.0**level)[:, None, None]
+        decay = 0.5 * step * own.damping / model.mass[own.node, None, None]
+        item = np.arange(self.count, dtype=np.int32) + (level << LEVEL_BIT)
+        levels = range(model.rates.top + 1 if model.rates else 1)
+        self.items = [wp.array(item[level <= k], dtype=wp.int32) for k in levels]
+        self.chains = [wp.array(item[level == k], dtype=wp.int32) for k in levels]
         self.dashpots = Dashpots()
         self.dashpots.node = wp.array(own.node, dtype=wp.int32)
         self.dashpots.damping = wp.array(own.damping, dtype=wp.mat33d)
@@ -89,14 +97,20 @@ class AbsorbingStage:
         """Those of a record, after all nodes have moved."""
         return [Stage("absorbed energy", lambda s: self._sum(s, records), only_records=True)] if self.count else []
 
-    def advance(self, step: Step, level: int | None = None) -> None:
-        """The nodes that dashpots act on, with forces of elements up to a level, or of all."""
-        work, state, own = self.nodes.work, step.state, step.state.absorbing
-        inputs = [self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
-        inputs += [work.force, work.frames(state), self.nodes.scene, self.nodes.gravity, self.nodes.dt]
+    def active(self, level: int | None, chain: int | None) -> wp.array:
+        """Its nodes up to a level, or all; of one level where a chain is given. As the kernel takes them."""
+        if not self.count:
+            return wp.zeros(0, dtype=wp.int32)
+        return self.chains[chain] if chain is not None else self.items[-1 if level is None else level]
+
+    def advance(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
+        """The nodes that are `active`, with forces of elements up to a level, or of all."""
+        work, state, own, item = self.nodes.work, step.state, step.state.absorbing, self.active(level, chain)
+        inputs = [item, self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
+        inputs += [work.force, work.frames(state), self.nodes.scene, self.nodes.gravity, self.nodes.base]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
-        wp.launch(self.kernel, self.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+        wp.launch(self.kernel, len(item), inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def _sum(self, step: Step, records: RecordStage) -> None:
         """Energy absorbed and work of what lies beyond, in the record."""

@@ -153,9 +153,12 @@ def node_stage(
     elements: Sequence[ElementStage],
     precision: str,
     dt: float,
-    rounds: int,
+    touched: bool,
 ) -> NodeStage:
-    """The nodal stage of a model; arguments as `RatedNodeStage` has them."""
+    """The nodal stage of a model, of which bodies may be `touched`; other arguments as `RatedNodeStage` has them."""
+    rounds = 0  # of patches that the elements take, where nothing else waits for the nodes
+    if not (touched or constraints.bound):
+        rounds = min(0 if stage.block.plastic else stage.rounds for stage in elements)
     if model.rates:
         return RatedNodeStage(model, work, constraints, elements, precision, dt, rounds)
     return NodeStage(model, work, constraints, precision, dt, rounds)

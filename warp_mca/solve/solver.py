@@ -31,7 +31,7 @@ from warp_mca.solve.rate_chains import Chains
 from warp_mca.solve.rated_nodes import node_stage
 from warp_mca.solve.record_stage import RecordStage
 from warp_mca.solve.records import SceneRecords
-from warp_mca.solve.replay import Replay
+from warp_mca.solve.replay import MOST, Replay
 from warp_mca.solve.resident import resident
 from warp_mca.solve.rigid_stage import RigidStage
 from warp_mca.solve.sensor_stage import SensorStage
@@ -46,8 +46,7 @@ from warp_mca.solve.workspace import Workspace
 if TYPE_CHECKING:
     from warp_mca.solve.output import Output
 
-MOST = 2000  # steps in one graph
-BESIDE = 5  # steps from a record on in one graph, which go on while a GPU sums what the record holds
+BESIDE = 5  # steps that follow a record in its graph at least: a GPU goes on with them while it sums the record
 
 
 class Solver:
@@ -99,13 +98,13 @@ class Solver:
         self.normal_force = NormalForce(scenes if passes else [], self.threads)
         self.contacts = [ContactStage(model.passes[k::passes], model, k, self.normal_force) for k in range(passes)]
         self.constraints = ConstraintStage(model, self.layout)
-        dt = self.dt / model.common_steps
+        dt, touched = self.dt / model.common_steps, bool(self.contacts)
         self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, dt)
         self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, dt)
         if blocks := max((stage.blocks for stage in self.contacts), default=0) + self.couplings.blocks:
             for stage in self.elements:
                 stage.make_room(blocks)
-        self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, self._early)
+        self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, touched)
         self.rigid = RigidStage(model, self.nodes, self.precision)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
         self.ties = TieStage(model, self.nodes, self.precision)
@@ -117,15 +116,7 @@ class Solver:
         self.chains = Chains(self) if model.rates and cuda else None
         levels = range(model.rates.top) if model.rates and not cuda else ()
         self.subgroups = [step_groups(self, level) for level in levels]
-        self._streams = Streams(cuda)
-        self.resident = resident(self)
-
-    @property
-    def _early(self) -> int:
-        """Rounds of patches that the elements take, where nothing else waits for the nodes."""
-        if self.contacts or self.constraints.bound:
-            return 0
-        return min(0 if stage.block.plastic else stage.rounds for stage in self.elements)
+        self._streams, self.resident = Streams(cuda), resident(self)
 
     def new_state(self) -> State:
         """State at the start of the phase: the model's velocities, no displacement, no stress."""
@@ -200,6 +191,11 @@ class Solver:
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
 
+    @property
+    def _captured(self) -> int:
+        """Substeps of a step that graphs hold; none where one kernel takes all steps."""
+        return self.chains.substeps if self.chains else int(not self.resident)
+
     def _step(self, step: Step) -> None:
         self._streams.run(self.groups, step)
         if self.chains:
@@ -237,9 +233,10 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
-        if count > (BESIDE if self.output and self.output.needs else MOST):  # rows with and without frames share these
-            self.record_and_step(state, BESIDE, needs, is_row, search)
-            self.step(state, count - BESIDE, schedules=False)
+        most, beside = self._replay.most(state, count, self._captured), max(1, BESIDE // max(1, self._captured))
+        if count > (beside if needs else most):  # rows with and without frames share what follows
+            self.record_and_step(state, beside, needs, is_row, search)
+            self.step(state, count - beside, most)
             return
         if search and not self._replays_search:
             self.search(state)
@@ -264,8 +261,8 @@ class Solver:
         self._replay.graph(state, f"{name} {count}", interval)
         state.steps += count
 
-    def step(self, state: State, count: int, schedules: bool = True) -> None:
-        """Advance `count` steps; the order of elements is chosen anew before them unless others have just done so.
+    def step(self, state: State, count: int, most: int = 0) -> None:
+        """Advance `count` steps, in graphs of at most `most`, where a graph before has chosen the order of elements.
 
         Raises:
             Exception: what a thread raised.
@@ -275,13 +272,18 @@ class Solver:
             state.steps += count
             return
 
+        schedules, most = not most, most or self._replay.most(state, count, self._captured)
+
         def steps(count: int) -> None:
             if schedules:
                 self._schedule()
             self._steps(state, count)
 
-        for part in [MOST] * (count // MOST) + [count % MOST] * (count % MOST > 0):
+        left = count
+        while left:
+            part = min(left, most)
             self._replay.graph(state, f"step {part} {schedules}", lambda part=part: steps(part))
+            left, schedules = left - part, schedules and part == MOST  # a few more share an order
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:

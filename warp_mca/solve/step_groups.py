@@ -154,7 +154,7 @@ def _sums(solver: Solver) -> Group:
 
 
 def _advance(solver: Solver, level: int | None, common: bool, chain: int | None = None) -> Group:
-    """Stages that move nodes, those up to a level or all; with `common` also those that other things act on."""
+    """Stages that move nodes, those up to a level or all; `common` tells that contact and joints act now."""
     nodes, found = solver.nodes, []
     if common and solver.constraints.count:
         found.append(Stage("joints, driven nodes", lambda s: nodes.advance_bound(s, level), BESIDE))
@@ -164,8 +164,8 @@ def _advance(solver: Solver, level: int | None, common: bool, chain: int | None 
         found.append(Stage("couplings", solver.couplings.couple, BESIDE))
     if common and solver.model.bases:
         found.append(Stage("bases", solver.loads.move_bases, BESIDE))
-    if common and solver.absorbing.count:
-        found.append(Stage("absorbing boundaries", lambda s: solver.absorbing.advance(s, level), BESIDE))
+    if len(solver.absorbing.active(level, chain)):
+        found.append(Stage("absorbing boundaries", lambda s: solver.absorbing.advance(s, level, chain), BESIDE))
     if common and solver.rigid.count:
         found.append(Stage("rigid bodies", lambda s: solver.rigid.advance(s, level), BESIDE))
     if common and solver.ties.count:

@@ -72,7 +72,7 @@ class Transfer(Generic[Key]):
 def _copies(arrays: Mapping[Key, wp.array], count: int, pinned: bool) -> list[dict[Key, wp.array]]:
     """Host arrays like `arrays`, so many sets: parts of one block, because each allocation of pinned memory is slow."""
     sizes = {key: -(-array.capacity // ALIGN) * ALIGN for key, array in arrays.items()}
-    block = wp.zeros(count * sum(sizes.values()) // 8, dtype=wp.float64, device="cpu", pinned=pinned)
+    block = wp.empty(count * sum(sizes.values()) // 4, dtype=float, device="cpu", pinned=pinned)
     at, sets = block.ptr or 0, []
     for _ in range(count):
         found = {}
