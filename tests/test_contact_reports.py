@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from impacts import finished, momentum, prepared, result_of
+from impacts import begun, finished, momentum, prepared, result_of
 
 import warp_mca as mca
 from warp_mca.model.build import build_model
 from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
 from warp_mca.results.force_history import grazing_share
+from warp_mca.runs.contact_warnings import symmetry_of
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 SOFT = mca.Elastic(E=1e7, nu=0.3, rho=1000.0)
@@ -219,6 +220,19 @@ def test_friction_across_the_tangent_warns(v: float, tangent: str | None, warns:
     result = result_of(finished(falling(block("a", v=(v, -1.0, 3.0)), mu=0.2, **axes)))
     assert sum("friction is along (0, 0, -1), across the axis (1, 0, 0) of F_t" in w for w in result.warnings) == warns
     assert not result.summary["F_t_reverses"]
+
+
+def test_friction_that_the_other_half_cancels_is_none_across_the_tangent():
+    """Of half a block, in whose plane of symmetry nodes are held along z; held everywhere, that is its guide."""
+    scene = falling(block("a", v=(0.0, -1.0, 3.0)), mu=0.2)
+    result = result_of(finished(scene))
+    axes = np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]])
+    assert any("across the axis" in text for text in contact_warnings(result.contacts, axes))
+    assert not any("across" in text for text in contact_warnings(result.contacts, axes, {0: np.eye(3)[[2]]}))
+    for nodes, count in (("zmin", 1), ("boundary", 0)):
+        held = replace(falling(block("a")), fixed=(mca.Fixed(body="a", nodes=nodes, axes="z"),))
+        (planes,) = symmetry_of(begun(held).scene_runs[0].ready.model).values()
+        assert len(planes) == count
 
 
 @pytest.mark.parametrize(

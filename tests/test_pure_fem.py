@@ -19,7 +19,7 @@ import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.recorders import SnapshotFile
 from warp_mca.runs import pure_fem
-from warp_mca.runs.checkpoint import FILE, Checkpoint
+from warp_mca.runs.checkpoint import FILE, Checkpoint, Every
 
 SCENE = '''"""A short, coarse rod that turns fast strikes a plate 1.1 ms after its release."""
 from dataclasses import replace
@@ -174,6 +174,11 @@ def test_the_same_command_goes_on_after_a_kill(monkeypatch: pytest.MonkeyPatch, 
         ({"t_end": 1.0}, {}, "leave t_end out"),
         ({"contacts": ()}, {}, "no link can touch"),
         ({}, {"recorders": [SnapshotFile("a.png", time=0.0)]}, "leave recorders out"),
+        (
+            {},
+            {"method": "mca", "checkpoint": Every.parse("10"), "recorders": [SnapshotFile("a.png", time=0.0)]},
+            "= '10': recordings",
+        ),
         ({}, {"checkpoint": "30w"}, "name one by out"),
         ({}, {"checkpoint": "fast"}, "2e-5s"),
         ({}, {"method": "fem"}, "choose mca or pure-fem"),

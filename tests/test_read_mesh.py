@@ -145,4 +145,7 @@ def test_mesh_file_refusals(tmp_path: Path, capfd):
         (tmp_path / name).write_text("nonsense")
         with pytest.raises(RequestError, match="cannot read it"):
             MeshFile(path=tmp_path / name).build()
+    (tmp_path / "empty.msh").write_bytes(b"")
+    with pytest.raises(RequestError, match=r"meshio cannot read it \(it is empty\)"):
+        MeshFile(path=tmp_path / "empty.msh").build()
     assert capfd.readouterr() == ("", "")

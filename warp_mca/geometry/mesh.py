@@ -87,11 +87,13 @@ class Mesh:
         return faces[whole], elements[whole]
 
     def nodes(self, name: str) -> NDArray[np.int32]:
-        """Node indices of the set `name`, shape (count,), int32.
+        """Node indices of the set `name`, shape (count,), int32; "boundary" is the whole skin, unless it is a set.
 
         Raises:
             RequestError: there is no such set, or no node in it.
         """
+        if name == "boundary" and name not in self.node_sets:
+            return np.unique(self.boundary[0]).astype(np.int32)
         if name not in self.node_sets:
             raise bad_value("node set", name, f"the mesh has {', '.join(sorted(self.node_sets)) or 'no sets'}")
         if not len(self.node_sets[name]):

@@ -18,7 +18,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC, STORED_TYPES
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
-from warp_mca.geometry.end_marks import END_REQUIRED, cell_without_property, missing_end
+from warp_mca.geometry.end_marks import END_REQUIRED, cell_without_property, missing_end, unread_cells
 from warp_mca.geometry.gmsh_file import GMSH_SUFFIXES, read_by_gmsh
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
@@ -113,7 +113,11 @@ class MeshFile:
             raise
         except (Exception, SystemExit) as error:  # some of its readers exit, others raise whatever went wrong
             reason = textwrap.shorten(said.getvalue() if isinstance(error, SystemExit) else str(error), 200).rstrip(".")
-            what = f"{reader} cannot read it ({reason})" if reason else f"{reader} cannot read it"
+            if not Path(self.path).stat().st_size:
+                reason = "it is empty"
+            elif " " not in reason:  # a number or a key, which tells a user nothing
+                reason = "it is damaged, or of an unknown kind"
+            what = f"{reader} cannot read it ({reason})"
             remedy = "in gmsh's format 4.1 with Mesh.SaveAll off" if suffix == ".msh" else "as binary .msh"
             raise self._bad(f"{what}; save it {remedy} or as .vtu") from error
 
@@ -152,6 +156,9 @@ class MeshFile:
         have been cut off."""
         if cell := cell_without_property(Path(self.path)):
             raise self._bad(f"its cell {cell} has no property number; write one (PID) into each cell")
+        for card, count in unread_cells(Path(self.path)).items():
+            what = f"{self.path}: {count} cards {card} are left out, which gmsh does not know: look at them"
+            logging.getLogger("warp_mca").warning("%s", what)
         if not (mark := missing_end(Path(self.path))):
             return
         if Path(self.path).suffix.lower() in END_REQUIRED:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
 LIGHT, FIRM = 0.05, 0.1
 OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
 ACROSS = 0.02  # of the normal impulse, above which friction across the axis of F_t is worth a word
+ALONG = 0.99  # cosine from which on an axis is taken as that of a plane of symmetry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,12 +117,16 @@ def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[str]:
+def contact_warnings(
+    contacts: Sequence[ContactHistory], axes: Array, symmetry: Mapping[int, Array] | None = None
+) -> list[str]:
     """Warnings about contacts: none touched, some did not end, nearly opened or grazed, normals are off the axes.
 
     Args:
         contacts: of the scene.
         axes: as `Model.contact_axes`.
+        symmetry: normals of planes that contacts lie in [-], by contact, shape (plane_count, 3): forces along these are
+            cancelled by what lies beyond.
     """
     found: list[str] = []
     if contacts and not any(contact.touched for contact in contacts):
@@ -132,13 +137,13 @@ def contact_warnings(contacts: Sequence[ContactHistory], axes: Array) -> list[st
             f"{which} still in progress when the run ended: impulse, duration and peaks are those so far; give a "
             "longer duration if it should end"
         )
-    for contact, (normal, tangent) in zip(contacts, axes, strict=True):
+    for k, (contact, (normal, tangent)) in enumerate(zip(contacts, axes, strict=True)):
+        cancelled = (symmetry or {}).get(k, np.zeros((0, 3)))
         found += _nearly_opens(contact)
         found += _grazes(contact)
         if contact.normal is not None:
-            found += _off_axis(contact.name, contact.normal, normal, tangent) or _across(
-                contact, contact.normal, tangent
-            )
+            off = _off_axis(contact.name, contact.normal, normal, tangent)
+            found += off or _across(contact, contact.normal, tangent, cancelled)
     return found
 
 
@@ -183,9 +188,14 @@ def _off_axis(name: str, true: Array, normal: Array, tangent: Array) -> list[str
     ]
 
 
-def _across(contact: ContactHistory, normal: Array, tangent: Array) -> list[str]:
-    """A warning where friction acts across the tangent rather than along it; axes [-], each shape (3,)."""
+def _across(contact: ContactHistory, normal: Array, tangent: Array, cancelled: Array) -> list[str]:
+    """A warning where friction acts across the tangent rather than along it; axes [-], each shape (3,).
+
+    Not where it is `cancelled`, see `contact_warnings`.
+    """
     side = np.cross(normal, tangent)
+    if (np.abs(cancelled @ side) > ALONG).any():
+        return []
     along, across = np.abs(contact.force @ tangent).sum(), np.abs(contact.force @ side).sum()
     across -= np.abs(contact.normal_force @ side).sum()  # what pressure on a curved surface has there
     if across <= max(along, ACROSS * contact.pressure.sum()):

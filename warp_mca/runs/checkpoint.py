@@ -31,6 +31,7 @@ METHODS = ("mca", METHOD)
 DEFAULT = "30w"
 HEADER, MORE = "run/header", "run/more/"  # in that file, beside the arrays of the state
 REMEDY = "write it as 100 (steps), 2e-5s (simulated seconds) or 30w (seconds of wall time)"
+_LETTER = {"steps": "", "simulated": "s", "wall": "w"}
 SHORTEST = 4.0  # parts into which the time between two checkpoints is cut at least, to hit it
 
 
@@ -44,6 +45,11 @@ class Every:
     count: float
     unit: Literal["steps", "simulated", "wall"]
     command: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """As the user writes it."""
+        return f"{self.count:g}{_LETTER[self.unit]}"
 
     @staticmethod
     def parse(value: object, command: tuple[str, ...] = ()) -> Every:
@@ -85,7 +91,7 @@ def every_of(
     if every is None and method != METHOD:
         return None
     asked = "method" if method == METHOD else "checkpoint"
-    value = method if method == METHOD else validate.brief(checkpoint)
+    value = method if method == METHOD else checkpoint.text if isinstance(checkpoint, Every) else checkpoint
     if recorders:
         raise bad_value(asked, value, "recordings cannot be continued from a stored state; leave recorders out")
     if scene.t_end is not None:

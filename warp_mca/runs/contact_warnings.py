@@ -40,19 +40,33 @@ def resolution_warnings(
     found: list[str] = []
     for k, item in enumerate(model.passes):
         contact = contacts[item.contact]
-        if item.sign > 0.0:
-            found += _small_patch(contact, model, item, ledger, k)
+        small = list(_small_patch(contact, model, item, ledger, k)) if item.sign > 0.0 else []
+        found += small
         if item.plane is not None:
             found += _pushed_through(contact, model, item, depths[k])
         else:
             found += _sunk_through(contact, model, item, depths[k])
-            if item.sign > 0.0:
+            if item.sign > 0.0 and not small:  # which says more of the master than can be known then
                 found += _coarse_master(contact, model, item, ledger.nodes_at_peak(k), depths[k], rigid)
     return found
 
 
+def symmetry_of(model: Model) -> dict[int, Array]:
+    """Normals of planes of symmetry through each contact [-], shape (plane_count, 3), by contact.
+
+    A plane of symmetry holds some nodes of the slave along an axis, and leaves others free.
+    """
+    first = [item for item in model.passes if item.sign > 0.0]
+    return {item.contact: np.eye(3)[[0.0 < share < 1.0 for share in _held(model, item)]] for item in first}
+
+
+def _held(model: Model, item: ContactPass) -> list[float]:
+    """Share of a pass's slave nodes that are held along each axis [-]."""
+    return [float((model.fixed_axes[item.slave] >> axis & 1).mean()) for axis in range(3)]
+
+
 def _small_patch(contact: Contact, model: Model, item: ContactPass, ledger: Ledger, k: int) -> Iterator[str]:
-    planes = sum(bool((model.fixed_axes[item.slave] >> axis & 1).any()) for axis in range(3))
+    planes = sum(share > 0.0 for share in _held(model, item))
     # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
     count = ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes
     curved = is_curved_contact(model.X, item)

@@ -201,7 +201,7 @@ class _Loop:
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
-        looked_at = any(item.samples for item in impact.scene_runs)
+        looked_at = any(item.samples or item.pairs for item in impact.scene_runs)
         self.looks = Transfer({"u": self.state.u}, self.solver.device) if looked_at else None
         self.written = 0
 
@@ -294,4 +294,4 @@ class _Loop:
         while self.looks and self.looks.pending:
             _, shape = self.looks.receive()
             for item in self.impact.scene_runs:
-                item.ledger.kept.stiffened = item.look(shape["u"])
+                item.ledger.kept.stiffened, item.ledger.kept.passed = item.look(shape["u"])

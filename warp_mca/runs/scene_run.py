@@ -16,15 +16,17 @@ from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
-from warp_mca.runs.contact_warnings import resolution_warnings
+from warp_mca.runs.contact_warnings import resolution_warnings, symmetry_of
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.flutter_warnings import flutter_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.inertia_warnings import inertia_warnings
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
+from warp_mca.runs.passing import Pair, pairs_of, passed, passing_warnings
 from warp_mca.runs.rate_groups import rate_figures
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
+from warp_mca.runs.start_warnings import start_warnings
 from warp_mca.solve.state_figures import (
     joint_impulses,
     max_normal_force,
@@ -98,15 +100,20 @@ class SceneRun:
         """Cells that `runs.bending` looks at."""
         return samples_of(self.ready.model)
 
-    def look(self, u: Array) -> Array:
-        """What `runs.bending` has seen of the bodies, with these displacements of all scenes [m] too.
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """What `runs.passing` looks at."""
+        return pairs_of(self.ready.scene, self.ready.meshes, self.ready.model)
 
-        See `SceneRecords.stiffened`.
+    def look(self, u: Array) -> tuple[Array, Array]:
+        """What `runs.bending` and `runs.passing` have seen, with these displacements of all scenes [m] too.
+
+        See `SceneRecords.stiffened` and `passed`.
         """
-        if not self.samples:
-            return self.ledger.kept.stiffened
+        kept, model = self.ledger.kept, self.ready.model
         first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        return seen(self.ready.model, self.samples, u[first:end], self.ledger.kept.stiffened)
+        stiffened = seen(model, self.samples, u[first:end], kept.stiffened) if self.samples else kept.stiffened
+        return stiffened, passed(model, self.pairs, u[first:end], kept.passed) if self.pairs else kept.passed
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
@@ -129,7 +136,7 @@ class SceneRun:
         probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
         model = self.ready.model
-        told = [*contact_warnings(contacts, model.contact_axes), *flutter_warnings(history, model)]
+        told = [*contact_warnings(contacts, model.contact_axes, symmetry_of(model)), *flutter_warnings(history, model)]
         warnings = (*self._warnings(shares, stopped), *told, *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
         return Result(summary, history, None, warnings, paths, stopped, **own)
@@ -222,8 +229,9 @@ class SceneRun:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
         if stopped is None:
-            shape = np.asarray(self.state.u.numpy(), dtype=np.float64)
-            found += bending_warnings(self.ready.model, self.look(shape), ledger.kept.exchanged)
+            stiffened, depths = self.look(np.asarray(self.state.u.numpy(), dtype=np.float64))
+            found += bending_warnings(self.ready.model, stiffened, ledger.kept.exchanged)
+            found += passing_warnings(self.pairs, depths)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
@@ -241,6 +249,8 @@ class SceneRun:
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths, scene.rigid_names)
         if scene.rigid_names:
             found += inertia_warnings(self.ready, self.solver.model.rigid_bodies, self.state, self.index)
+        kinetic, time = ledger.kept.initial_kinetic, self.steps.dt * self.state.steps
+        found += start_warnings(scene, self.ready.meshes, self.ready.model, kinetic, time)
         found += self.ready.warnings
         if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
             found.append(

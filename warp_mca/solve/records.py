@@ -25,6 +25,8 @@ class SceneRecords:
             (pass_count, 2), float64.
         stiffened: of each body, energy that its cells spent on their own stiffness and its strain energy [J], when that
             was greatest of a few looks, see `runs.bending`, shape (body_count, 2), float64.
+        passed: of each pair that may go into each other, how deep it did in these looks [m], see `runs.passing`, shape
+            (pair_count,), float64.
         count: rows so far [-].
         records: check records so far, rows included [-].
         energy_error: greatest imbalance, as a share of initial energy and external work [-].
@@ -48,6 +50,7 @@ class SceneRecords:
     sensors: list[Array] = field(default_factory=list)
     peaks: Array = field(default_factory=lambda: np.zeros((0, 2)))
     stiffened: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    passed: Array = field(default_factory=lambda: np.zeros(0))
     count: int = 0
     records: int = 0
     energy_error: float = 0.0
@@ -66,7 +69,7 @@ class SceneRecords:
     def copy(self) -> SceneRecords:
         """A copy of its own; rows, which never change, are shared."""
         lists = {name: list(getattr(self, name)) for name in _LISTS}
-        return replace(self, **lists, peaks=self.peaks.copy(), stiffened=self.stiffened.copy())
+        return replace(self, **lists, **{name: getattr(self, name).copy() for name in _EXTREMES})
 
     def without_rows(self) -> SceneRecords:
         """What a run goes on with whose history begins anew: sums and extremes so far, no rows."""
@@ -85,14 +88,16 @@ class SceneRecords:
     @staticmethod
     def of(arrays: Mapping[str, NDArray]) -> SceneRecords:
         """The inverse of `arrays`."""
-        found = SceneRecords(peaks=arrays["peaks"], stiffened=arrays["stiffened"])
+        found = SceneRecords()
         for f in fields(found):
             array = arrays[f.name]
             if f.name in ("sums", "velocities", "sensors"):
                 setattr(found, f.name, list(array))
             elif f.name == "path_stress":
                 found.path_stress = [array] if len(array) else []
-            elif f.name not in ("peaks", "stiffened"):
+            elif f.name in _EXTREMES:
+                setattr(found, f.name, array)
+            else:
                 setattr(found, f.name, type(getattr(found, f.name))(array))
         return found
 
@@ -102,4 +107,5 @@ class SceneRecords:
         return [name for name in a if a[name].shape != b[name].shape or a[name].tobytes() != b[name].tobytes()]
 
 
+_EXTREMES = ("peaks", "stiffened", "passed")
 _LISTS = ("sums", "velocities", "path_stress", "sensors")
