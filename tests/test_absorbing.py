@@ -199,9 +199,7 @@ def chip_on_slab() -> mca.Scene:
         name="slab",
         bodies=(
             mca.Body(name="slab", geometry=slab, material=steel),
-            mca.Body(
-                name="chip", geometry=chip, material=steel, position=(0.028, 0.027, 0.02001), velocity=(0, 0, -10.0)
-            ),
+            mca.Body(name="chip", geometry=chip, material=steel, velocity=(0.0, 0.0, -10.0)),
         ),
         contacts=(mca.Contact(slave=mca.Surface(body="chip", nodes="zmin"), master=top, penalty=0.2),),
         absorbing=(mca.Absorbing(body="slab", nodes="zmin"),),
