@@ -136,7 +136,7 @@ def main() -> None:
     for number, (name, body, count) in enumerate(part for some in parts for part in some):
 
         def call(body: Body = body, graph: str = f"part {number}") -> None:
-            solver._replay.graph(state, graph, body)
+            solver.replay.graph(state, graph, body)
 
         def reset() -> None:
             with wp.ScopedDevice(solver.device):

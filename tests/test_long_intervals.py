@@ -20,7 +20,7 @@ def test_parts_of_an_interval_give_the_same_bits(monkeypatch: pytest.MonkeyPatch
 
     whole = run()
     assert whole.summary["n_steps"] > 3 * 7
-    monkeypatch.setattr(Replay, "most", lambda self, state, count, substeps: 7)
+    monkeypatch.setattr(Replay, "most", lambda self, state, count, substeps, needs=(): 7)
     parts = run()
     for name, column in whole.history.items():
         np.testing.assert_array_equal(column, parts[name], err_msg=name)

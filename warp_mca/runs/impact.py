@@ -204,14 +204,14 @@ class _Loop:
         looked_at = any(item.samples or item.pairs for item in impact.scene_runs)
         self.looks = Transfer({"u": self.state.u}, self.solver.device) if looked_at else None
         self.written = 0
+        if ended:  # each part of the ring is waited for
+            self.solver.replay.is_ahead(self.state)
 
     def run(self, until: int | None) -> None:
         """As `Impact.advance`."""
         last = self.steps.count if until is None else min(until, self.steps.count)
         interval = self.state.steps // self.steps.per_interval
-        while self.state.steps < last:
-            if self._ends(interval):
-                break
+        while self.state.steps < last and not self._ends(interval):
             self._interval(interval, last)
             interval += 1
         if until is None or self.state.steps >= self.steps.count:
@@ -271,6 +271,8 @@ class _Loop:
         if self.transfer.full:
             if self.impact.recording:
                 self.impact.recording.work(lambda: self.transfer.arrived)
+            if not self.transfer.arrived:  # the device has two parts more to compute
+                self.solver.replay.is_ahead(self.state)
             self._receive()
         self.transfer.send(self.written)
         self.written = 0

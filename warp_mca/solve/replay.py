@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from warp_mca.solve.state import State
 
 MOST = 2000  # steps in one graph
-# In the first EARLY graphs of a GPU, which begins once the first of them is captured; then it has work while graphs of
-# whole rows are.
-FEW, EARLY = 12, 100
+FEW = 12  # where a GPU waits for it to be captured, or where few rows are alike
 
 
 class Replay:
@@ -32,15 +30,21 @@ class Replay:
         self.device, self.threads = device, threads
         self.pool = Pool(threads) if threads > 1 else None
         self._graphs: weakref.WeakKeyDictionary[State, dict[str, Any]] = weakref.WeakKeyDictionary()
-        self._launched: weakref.WeakKeyDictionary[State, int] = weakref.WeakKeyDictionary()
+        self._ahead: weakref.WeakSet[State] = weakref.WeakSet()
         self._flushing: AbstractContextManager[object] | None = None
 
-    def most(self, state: State, count: int, substeps: int) -> int:
-        """How many of the `count` steps that follow, of so many substeps each, one graph may hold."""
-        is_late = self._launched.get(state, 0) >= EARLY
-        if is_late or count * substeps <= 2 * FEW or not wp.get_device(self.device).is_cuda:
+    def is_ahead(self, state: State) -> None:
+        """Say that a GPU has work for longer than a graph of a whole row takes to be captured."""
+        self._ahead.add(state)
+
+    def most(self, state: State, count: int, substeps: int, needs: frozenset[str] = frozenset()) -> int:
+        """How many of the `count` steps that follow, of so many substeps each, one graph may hold.
+
+        Few at first, so that a GPU begins at once, and after a frame of `needs`.
+        """
+        if count * substeps <= 2 * FEW or not wp.get_device(self.device).is_cuda:
             return MOST
-        return max(1, FEW // substeps)
+        return MOST if state in self._ahead and not needs else max(1, FEW // substeps)
 
     def graph(self, state: State, name: str, body: Callable[[], None]) -> None:
         """Replay the graph `name` of a state, captured from `body` at its first use."""
@@ -54,7 +58,6 @@ class Replay:
                 graphs[name] = capture.graph
             with self._flush():
                 wp.capture_launch(graphs[name])
-            self._launched[state] = self._launched.get(state, 0) + 1
 
     def stages(self, state: State, name: str, body: Callable[[Split], None], count: int = 1) -> None:
         """Replay the stages `name`, captured from `body` at their first use, `count` times with all threads of `pool`.

@@ -67,6 +67,7 @@ class Solver:
         floating: frames that elements compute in.
         output: what is read off the state for paths and recorders, or None.
         sensors: probes and sections.
+        replay: graphs of what is launched.
     """
 
     def __init__(self, model: Model, *, device: str, precision: str, dt: float, threads: int = 1) -> None:
@@ -84,7 +85,7 @@ class Solver:
         self.output: Output | None = None
         with wp.ScopedDevice(self.device):
             self._allocate()
-        self._replay = Replay(self.device, self.threads)
+        self.replay = Replay(self.device, self.threads)
 
     def _allocate(self) -> None:
         model, passes = self.model, len(self.model.passes) // self.layout.count
@@ -159,7 +160,7 @@ class Solver:
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
         if self._replays_search:
-            self._replay.graph(state, "search", lambda: self._search(state))
+            self.replay.graph(state, "search", lambda: self._search(state))
         else:
             with wp.ScopedDevice(self.device):
                 self._search(state)
@@ -233,8 +234,8 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
-        most, beside = self._replay.most(state, count, self._captured), max(1, BESIDE // max(1, self._captured))
-        if count > (beside if needs else most):  # rows with and without frames share what follows
+        most, beside = self.replay.most(state, count, self._captured, needs), max(1, BESIDE // max(1, self._captured))
+        if count > (beside if needs else most):
             self.record_and_step(state, beside, needs, is_row, search)
             self.step(state, count - beside, most)
             return
@@ -246,8 +247,8 @@ class Solver:
         def record(split: Split = whole) -> None:
             self._step(Step(state, split, True, is_row, needs, search))
 
-        if self._replay.pool:
-            self._replay.stages(state, name, record)
+        if self.replay.pool:
+            self.replay.stages(state, name, record)
             state.steps += 1
             self.step(state, count - 1)
             return
@@ -258,7 +259,7 @@ class Solver:
             self._steps(state, count - 1)
             self._streams.finish()
 
-        self._replay.graph(state, f"{name} {count}", interval)
+        self.replay.graph(state, f"{name} {count}", interval)
         state.steps += count
 
     def step(self, state: State, count: int, most: int = 0) -> None:
@@ -267,23 +268,22 @@ class Solver:
         Raises:
             Exception: what a thread raised.
         """
-        if self._replay.pool:
-            self._replay.stages(state, "step", lambda split: self._step(Step(state, split)), count)
+        if self.replay.pool:
+            self.replay.stages(state, "step", lambda split: self._step(Step(state, split)), count)
             state.steps += count
             return
 
-        schedules, most = not most, most or self._replay.most(state, count, self._captured)
+        schedules, most = not most, most or self.replay.most(state, count, self._captured)
 
         def steps(count: int) -> None:
             if schedules:
                 self._schedule()
             self._steps(state, count)
 
-        left = count
-        while left:
-            part = min(left, most)
-            self._replay.graph(state, f"step {part} {schedules}", lambda part=part: steps(part))
-            left, schedules = left - part, schedules and part == MOST  # a few more share an order
+        for first in range(0, count, most):
+            part = min(most, count - first)
+            self.replay.graph(state, f"step {part} {schedules}", lambda part=part: steps(part))
+            schedules = schedules and part == MOST  # a few more share an order
         state.steps += count
 
     def rings(self, state: State) -> dict[str, wp.array]:
