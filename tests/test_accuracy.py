@@ -18,10 +18,11 @@ from warp_mca.accuracy.choice import LEAST, WORTH, Choice, best, choices
 from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
-from warp_mca.accuracy.plan import planned
+from warp_mca.accuracy.plan import Plan, carried_out, planned
 from warp_mca.accuracy.prediction import CORE, HIGH, LOW, NOISE, Expected, gaussian_process
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.cli.main import main
 from warp_mca.runs.rate_groups import COSTS
 
@@ -166,6 +167,35 @@ def test_variants_may_have_other_elements_unless_the_model_is_to_stay_full(known
     full = planned(scene, Accuracy(share=0.09, full=True), {}, "cpu", None, fake)
     assert full is not None
     assert full.variant.element is None
+
+
+def test_of_mass_that_the_model_refuses_less_is_taken(known: store.Family):
+    """How much elements gain is known once the model is made."""
+    (file,) = store.user_folder().glob("*.json")
+    data = json.loads(file.read_text())
+    for variant in data["families"]["rod_on_wall"]["variants"]:
+        variant["mass_scaling"] = 2.4
+    file.write_text(json.dumps(data))
+    scene = mca.make_scene("rod_on_wall", v=1.0)
+
+    def carry_out(plan: Plan | None, most: float) -> mca.Result:
+        assert plan is not None
+        asked.append(factor := plan.scene.impact.mass_scaling)
+        if factor is not None and float(factor) > most:
+            raise bad_value("ImpactPhase.mass_scaling", factor, "it would add too much")
+        return plan.judged(fake(plan.scene))
+
+    for most, expected in ((3.0, [2.4]), (2.0, [2.4, 1.5]), (1.0, [2.4, 1.5, None])):
+        asked: list[object] = []
+        plan = planned(scene, 0.09, {}, "cpu", None, fake)
+        result = carried_out(plan, lambda plan, most=most: carry_out(plan, most))
+        assert asked == expected
+        assert result.summary["accuracy"]["chosen"].get("mass_scaling") == expected[-1]
+        words = shlex.split(result.summary["accuracy"]["command"])
+        assert ("--mass-scaling" in words) == (expected[-1] is not None)
+    typed = planned(scene, Accuracy(share=0.09, typed={"mass_scaling": 2.4}), {}, "cpu", None, fake)
+    with pytest.raises(RequestError, match="too much"):
+        carried_out(typed, lambda plan: carry_out(plan, 2.0))
 
 
 def test_what_was_typed_stays(known: store.Family):

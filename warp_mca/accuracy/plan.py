@@ -18,7 +18,7 @@ from warp_mca.accuracy.prediction import SMALL
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.store import Family, family_of
 from warp_mca.accuracy.variant import Variant
-from warp_mca.base.errors import bad_value
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.results.force_history import grazing_share
 from warp_mca.runs.advice import LOGGER
 from warp_mca.runs.rate_groups import cost_of
@@ -39,6 +39,7 @@ OPEN = "still in contact at the end of the run; lengthen duration"
 GRAZE = "it counts touches with hardly any force, whose length is the mesh's; contacts has the first one's"
 STRAIN = "it grows without bound at the edge of the contact as cells shrink"
 
+MODEST = 1.5  # mass scaling that few models refuse
 AT_END = ("contact_duration", "impulse")  # figures that depend on when a run ends in contact
 
 Run = Callable[..., "Result"]  # a scene, and options of `warp_mca.run`
@@ -148,6 +149,38 @@ def planned(
         logger.info("%s", f"accuracy {asked.share:.3g} does not bind the {NAMES[name]}: {why}")
     own = found.pilots.wall if found.pilots and found.ready else 0.0  # the pilot that is the run did not decide
     return replace(found, wall=time.perf_counter() - begin - own)
+
+
+def carried_out(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -> Result:
+    """The result of a plan, with less mass where its model would gain too much; errors are smaller then.
+
+    How much mass elements gain is known once the model is made, which deciding does not wait for.
+
+    Raises:
+        RequestError: the request cannot be carried out.
+    """
+    while True:
+        try:
+            return carry_out(plan)
+        except RequestError as error:
+            lighter = _lighter(plan, error) if plan else None
+            if lighter is None:
+                raise
+            said = (
+                f"accuracy {lighter.asked.share:.3g}: mass scaling {lighter.variant.mass_scaling or 'none'} ({error})"
+            )
+            logging.getLogger(LOGGER).info("%s", said)
+            plan = lighter
+
+
+def _lighter(plan: Plan, error: RequestError) -> Plan | None:
+    """The plan with less mass, if too much is what was refused."""
+    asked = plan.variant.mass_scaling
+    if asked is None or "mass_scaling" in plan.asked.typed or not str(error).startswith("ImpactPhase.mass_scaling"):
+        return None
+    less = MODEST if isinstance(asked, float | int) and asked > MODEST else None
+    scene = replace(plan.scene, impact=replace(plan.scene.impact, mass_scaling=less))
+    return replace(plan, variant=replace(plan.variant, mass_scaling=less), scene=scene)
 
 
 def _check(scene: Scene, asked: Accuracy, finished_meshes: bool) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from warp_mca.accuracy.plan import Plan, planned
+from warp_mca.accuracy.plan import Plan, carried_out, planned
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.base import validate
 from warp_mca.base.errors import GuardError, bad_value
@@ -94,7 +94,22 @@ def run(
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    result = partial(_result, plan, scene, meshes, span, tell, settings, recorders, method)
+    request = partial(_result, scene, meshes, span, tell, settings, recorders, method)
+    return carried_out(plan, partial(_carry_out, request, out, force, every))
+
+
+def _carry_out(
+    request: Callable[[Plan | None, Checkpoint | None], Result],
+    out: str | os.PathLike[str] | None,
+    force: bool,
+    every: Every | None,
+    plan: Plan | None,
+) -> Result:
+    """What came of a run, kept in a folder if it has one; arguments as in `run`."""
+
+    def result(store: Checkpoint | None) -> Result:
+        return request(plan, store)
+
     return result(None) if out is None else _kept(result, out, force, every)
 
 
@@ -170,7 +185,6 @@ def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | No
 
 
 def _result(
-    plan: Plan | None,
     scene: Scene,
     meshes: Mapping[str, Mesh] | None,
     span: float,
@@ -178,6 +192,7 @@ def _result(
     settings: Settings,
     recorders: Sequence[Recorder],
     method: str,
+    plan: Plan | None,
     store: Checkpoint | None,
 ) -> Result:
     """One impact, or many in turn, of the scene or what was planned in its place; arguments as in `simulate`.
