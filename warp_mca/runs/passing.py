@@ -29,6 +29,7 @@ class Skin:
 
     Attributes:
         name: of the body.
+        own: all of its nodes.
         nodes: of its surface, shape (node_count,), int32.
         faces: their corners, shape (face_count, 4), int32.
         cells: of the body by stored cell type, each shape (cell_count, corner_count), int32.
@@ -36,6 +37,7 @@ class Skin:
     """
 
     name: str
+    own: slice
     nodes: Index
     faces: Index
     cells: Mapping[str, Index]
@@ -48,32 +50,51 @@ class Skin:
         faces = (mesh.boundary[0] + start).astype(np.int32)
         width = float(np.sqrt(np.median(face_geometry(model.X, faces)[0])))
         cells = {kind: (conn + start).astype(np.int32) for kind, conn in mesh.cells.items() if len(conn)}
-        return Skin(name, np.unique(faces), faces, cells, width)
+        return Skin(name, slice(start, start + len(mesh.points)), np.unique(faces), faces, cells, width)
 
-    def depth(self, x: Array, other: Skin) -> float:
-        """How deep nodes of another body lie in this one [m], 0 where none is deeper than a face is wide."""
-        own = x[self.nodes]
-        lower, upper = own.min(axis=0) + self.width, own.max(axis=0) - self.width
-        found = x[other.nodes]
-        found = found[((found > lower) & (found < upper)).all(axis=1)]
-        if not len(found):
+
+class Shape:
+    """All bodies as they are at one time.
+
+    Attributes:
+        x: positions of the nodes [m], shape (node_count, 3), float64.
+    """
+
+    def __init__(self, x: Array) -> None:
+        self.x = x
+        self._boxes: dict[str, tuple[Array, Array]] = {}
+
+    def depth(self, skin: Skin, other: Skin) -> float:
+        """How deep nodes of another body lie in one [m], 0 where none is deeper than a face of it is wide."""
+        (lower, upper), (least, greatest) = self._box(skin), self._box(other)
+        lower, upper = lower + skin.width, upper - skin.width
+        if (least > upper).any() or (greatest < lower).any():
             return 0.0
-        return self._deepest(x, found[:: -(-len(found) // SAMPLE)])
+        found = self.x[other.nodes]
+        found = found[((found > lower) & (found < upper)).all(axis=1)]
+        return self._deepest(skin, found[:: -(-len(found) // SAMPLE)]) if len(found) else 0.0
 
-    def _deepest(self, x: Array, at: Array) -> float:
+    def _box(self, skin: Skin) -> tuple[Array, Array]:
+        if skin.name not in self._boxes:
+            columns = self.x[skin.own].T  # numpy's extremes along the longer axis take many times as long
+            least, greatest = (np.array([f(column) for column in columns]) for f in (np.min, np.max))
+            self._boxes[skin.name] = least, greatest
+        return self._boxes[skin.name]
+
+    def _deepest(self, skin: Skin, at: Array) -> float:
         from scipy.spatial import KDTree
 
-        inside = np.zeros(len(at), dtype=bool)
-        for kind, cells in self.cells.items():
-            inside |= LOCATE[kind](at, x, cells, cell_boxes(x, cells))[2] < INSIDE * self.width
+        inside, x = np.zeros(len(at), dtype=bool), self.x
+        for kind, cells in skin.cells.items():
+            inside |= LOCATE[kind](at, x, cells, cell_boxes(x, cells))[2] < INSIDE * skin.width
         if not inside.any():
             return 0.0
-        area, normal = face_geometry(x, self.faces)
-        middle = x[self.faces].mean(axis=1)
+        area, normal = face_geometry(x, skin.faces)
+        middle = x[skin.faces].mean(axis=1)
         near = KDTree(middle).query(at[inside])[1]
         depth = np.abs(((at[inside] - middle[near]) * normal[near]).sum(axis=1)) / area[near]
         deepest = float(depth.max())
-        return deepest if deepest > self.width else 0.0
+        return deepest if deepest > skin.width else 0.0
 
 
 @dataclass(frozen=True)
@@ -85,10 +106,10 @@ class BelowPlane:
     plane: RigidPlane
     width: float
 
-    def depth(self, x: Array) -> float:
+    def depth(self, shape: Shape) -> float:
         """How deep the deepest lies below the plane [m], 0 where none is deeper than a face is wide."""
         normal = np.asarray(self.plane.normal, dtype=float)
-        height = (x[self.nodes] - self.plane.point) @ normal / np.linalg.norm(normal)
+        height = (shape.x[self.nodes] - self.plane.point) @ normal / np.linalg.norm(normal)
         deepest = -float(height.min(initial=0.0))
         return deepest if deepest > self.width else 0.0
 
@@ -105,9 +126,9 @@ class WithinBody:
     one: Skin
     other: Skin
 
-    def depth(self, x: Array) -> float:
+    def depth(self, shape: Shape) -> float:
         """How deep nodes of one lie in the other [m], 0 where none is deeper than a face of it is wide."""
-        return max(self.one.depth(x, self.other), self.other.depth(x, self.one))
+        return max(shape.depth(self.one, self.other), shape.depth(self.other, self.one))
 
     @property
     def sentence(self) -> str:
@@ -129,7 +150,8 @@ def pairs_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> list[Pai
     bound = {frozenset((joint.body, joint.other)) for joint in scene.joints}
     bound |= {frozenset((tie.slave.body, tie.master.body)) for tie in scene.ties}
     found += [WithinBody(skins[a], skins[b]) for a, b in combinations(skins, 2) if frozenset((a, b)) not in bound]
-    return [pair for pair in found if not pair.depth(model.X)]
+    start = Shape(model.X)
+    return [pair for pair in found if not pair.depth(start)]
 
 
 def passed(model: Model, pairs: list[Pair], u: Array, before: Array) -> Array:
@@ -143,8 +165,8 @@ def passed(model: Model, pairs: list[Pair], u: Array, before: Array) -> Array:
     """
     if not np.isfinite(u).all():
         return before
-    x = model.X + u
-    found = np.array([pair.depth(x) for pair in pairs])
+    shape = Shape(model.X + u)
+    found = np.array([pair.depth(shape) for pair in pairs])
     return np.maximum(found, before) if len(before) else found
 
 
