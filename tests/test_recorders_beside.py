@@ -112,3 +112,13 @@ def test_recorders_write_what_they_hold_while_the_run_waits_for_its_last_frames(
     assert held == [(2, 2), (3, 3), (4, 4)]
     assert [frame.step for frame in own.frames] == [frame.step for frame in usual.frames]
     assert file.saved_count == 5
+
+
+def test_what_goes_on_beside_others_begins_before_any_finishes():
+    order: list[str] = []
+    first, second = Memory(SURFACE), Memory(SURFACE)
+    for name, recorder in (("first", first), ("second", second)):
+        vars(recorder)["finish"] = lambda ok, name=name: order.append(f"finish {name} {ok}")
+    vars(second)["before_finish"] = lambda: order.append("before")
+    mca.run(bar(), recorders=[first, second])
+    assert order == ["before", "finish first True", "finish second True"]

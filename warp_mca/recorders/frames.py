@@ -211,7 +211,7 @@ class Recording:
 
     def _close(self, ok: bool) -> None:
         for recorder, _ in list(self.rows if self.started else ()):
-            self._call(recorder, getattr(recorder, "close", lambda: None))
+            self._call(recorder, getattr(recorder, "before_finish", lambda: None))
         for recorder, _ in list(self.rows if self.started else ()):
             self._call(recorder, lambda recorder=recorder: recorder.finish(ok))
             if getattr(recorder, "failed", False):

@@ -193,8 +193,8 @@ class Recorder(Protocol):
 
     It may have besides: `files`, the paths that it writes; `check(info)`, which refuses what it can before any recorder
     of the run opens a file; `idle()`, called while the run waits for its last frames, which writes what is held;
-    `close()`, called before the `finish` of any recorder, which begins what goes on beside them; `failed`, whether it
-    went on after a failure that it warned of itself.
+    `before_finish()`, called before the `finish` of any recorder, which begins what goes on beside them; `failed`,
+    whether it went on after a failure that it warned of itself.
     """
 
     @property

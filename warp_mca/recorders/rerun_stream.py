@@ -187,7 +187,7 @@ class RerunStream:
                         scalars = rr.Scalars.columns(scalars=rows[column])
                         stream.send_columns(f"plots/{plot}/{column}", indexes=indexes, columns=scalars)
 
-    def close(self) -> None:
+    def before_finish(self) -> None:
         """Send what is left, and begin to close the file, which takes rerun some milliseconds."""
         self._drop_failed()
         if self.streams:
@@ -197,7 +197,7 @@ class RerunStream:
 
     def finish(self, ok: bool) -> None:
         """Write and send what is left; a recording that lacks something is a warning."""
-        self.close()
+        self.before_finish()
         if self._file:
             self._close_file(self._file)
             if not ok and not self.frame_count and self.path:
