@@ -49,8 +49,8 @@ TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [r
 _FLAGS = (
     "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh "
     "both sides more alike, or choose a smaller output_interval if they are fast",
-    "a node outran the contact search; choose a smaller output_interval, or, where no body is so fast, other cells under "
-    "the contact, since these have given way",
+    "a node outran the contact search; choose a smaller output_interval, or, where no body is so fast, other cells "
+    "under the contact, since these have given way",
     "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or, if penalty is high, "
     "lower time_step_scale",
 )
