@@ -77,8 +77,6 @@ class Mesh:
             RequestError: the set is unknown or holds no whole face.
         """
         faces, elements = self.boundary
-        if name == "boundary" and name not in self.node_sets:
-            return faces, elements
         member = np.zeros(len(self.points), dtype=bool)
         member[self.nodes(name)] = True
         whole = member[faces].all(axis=1)

@@ -46,7 +46,7 @@ def resolution_warnings(
             found += _pushed_through(contact, model, item, depths[k])
         else:
             found += _sunk_through(contact, model, item, depths[k])
-            if item.sign > 0.0 and not small:  # which says more of the master than can be known then
+            if item.sign > 0.0 and not small:  # a few nodes do not tell how wide the pressed place is
                 found += _coarse_master(contact, model, item, ledger.nodes_at_peak(k), depths[k], rigid)
     return found
 

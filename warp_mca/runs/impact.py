@@ -205,7 +205,7 @@ class _Loop:
         self.looks = Transfer({"u": self.state.u}, self.solver.device) if looked_at else None
         self.written = 0
         if ended:  # each part of the ring is waited for
-            self.solver.replay.is_ahead(self.state)
+            self.solver.replay.note_ahead(self.state)
 
     def run(self, until: int | None) -> None:
         """As `Impact.advance`."""
@@ -272,7 +272,7 @@ class _Loop:
             if self.impact.recording:
                 self.impact.recording.work(lambda: self.transfer.arrived)
             if not self.transfer.arrived:  # the device has two parts more to compute
-                self.solver.replay.is_ahead(self.state)
+                self.solver.replay.note_ahead(self.state)
             self._receive()
         self.transfer.send(self.written)
         self.written = 0

@@ -33,7 +33,7 @@ class Replay:
         self._ahead: weakref.WeakSet[State] = weakref.WeakSet()
         self._flushing: AbstractContextManager[object] | None = None
 
-    def is_ahead(self, state: State) -> None:
+    def note_ahead(self, state: State) -> None:
         """Say that a GPU has work for longer than a graph of a whole row takes to be captured."""
         self._ahead.add(state)
 
