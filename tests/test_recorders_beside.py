@@ -114,11 +114,11 @@ def test_recorders_write_what_they_hold_while_the_run_waits_for_its_last_frames(
     assert file.saved_count == 5
 
 
-def test_what_goes_on_beside_others_begins_before_any_finishes():
+def test_what_goes_on_beside_others_begins_before_any_finishes_and_is_waited_for_last():
     order: list[str] = []
     first, second = Memory(SURFACE), Memory(SURFACE)
     for name, recorder in (("first", first), ("second", second)):
         vars(recorder)["finish"] = lambda ok, name=name: order.append(f"finish {name} {ok}")
-    vars(second)["before_finish"] = lambda: order.append("before")
+    vars(first)["before_finish"] = lambda: order.append("before")
     mca.run(bar(), recorders=[first, second])
-    assert order == ["before", "finish first True", "finish second True"]
+    assert order == ["before", "finish second True", "finish first True"]

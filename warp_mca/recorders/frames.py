@@ -212,7 +212,8 @@ class Recording:
     def _close(self, ok: bool) -> None:
         for recorder, _ in list(self.rows if self.started else ()):
             self._call(recorder, getattr(recorder, "before_finish", lambda: None))
-        for recorder, _ in list(self.rows if self.started else ()):
+        # What goes on beside others is waited for last.
+        for recorder, _ in sorted(self.rows if self.started else (), key=_goes_on_beside):
             self._call(recorder, lambda recorder=recorder: recorder.finish(ok))
             if getattr(recorder, "failed", False):
                 self.failed.append(recorder.name)
@@ -263,6 +264,11 @@ class Recording:
         for need in needs:
             found |= parts.get(need, {})
         return Frame(index=index, step=row * self.steps, time=row * self.info.output_interval, **found)
+
+
+def _goes_on_beside(row: tuple[Recorder, object]) -> bool:
+    """Whether a recorder begins to close before others finish."""
+    return hasattr(row[0], "before_finish")
 
 
 def _missing_folders(recorder: Recorder) -> set[Path]:
