@@ -40,7 +40,8 @@ class Family:
         variants: from which to choose.
         fine: variant of the reference.
         partner: number of the variant with which the reference is extrapolated.
-        order: of that extrapolation [-].
+        between: number of a variant whose mesh lies between these two.
+        order: of the extrapolation [-].
         sample: parameters of a random scene.
     """
 
@@ -53,6 +54,7 @@ class Family:
     variants: tuple[Variant, ...]
     fine: Variant
     partner: int
+    between: int
     order: float
     sample: Callable[[random.Random], Values]
 
@@ -72,17 +74,37 @@ def _between(rng: random.Random, low: float, high: float) -> float:
 
 
 def _links(
-    refine: float, axial: int, penalty: float, mass_scaling: float | None = 1.5, element: str | None = None
+    refine: float,
+    axial: int,
+    penalty: float,
+    mass_scaling: float | None = 1.5,
+    element: str | None = None,
+    finer: float = 1.0,
 ) -> Variant:
-    """`two_link` with so many cells along OA after refinement, and as long ones along AB."""
+    """`two_link` with so many cells along OA after refinement, and as long ones along AB.
+
+    `finer`: how many times smaller cells are at the contact, over the same patch, than `refine` alone makes them [-].
+    """
     cells = {"axial_OA": max(1, round(axial / refine)), "axial_AB": max(1, round(axial * 15 / 16 / refine))}
     return Variant(
         refine=refine,
         mass_scaling=mass_scaling,
         element=element,
         multi_rate="auto",
-        parameters={"penalty": penalty, **cells},
+        parameters={"penalty": penalty, **cells, **(_patch(finer) if finer != 1.0 else {})},
     )
+
+
+def _patch(finer: float) -> Values:
+    """Mesh of tip and plate at the contact, with cells so many times smaller than those of `quick` [-]."""
+    return {
+        "focus_size": 0.6e-3 / finer,
+        "focus_layers": round(4 * math.sqrt(finer)),
+        "plate_core_x": 2 * round(5 * finer),
+        "plate_core_z": 2 * round(3 * finer),
+        "plate_core_depth": round(3 * finer),
+        "plate_layers": round(8 * finer**0.33),
+    }
 
 
 def _two_link(rng: random.Random) -> Values:
@@ -167,9 +189,15 @@ FAMILIES = (
             _links(4 / 3, 42, 3.0, 2.2),
             _links(5 / 3, 56, 2.0, 2.2),
             _links(2.0, 64, 2.0, 2.0),
+            _links(1.0, 42, 2.0, 3.0, finer=1.5),
+            _links(4 / 3, 42, 2.0, 3.0, finer=1.25),
+            _links(4 / 3, 42, 2.0, 3.0, finer=1.5),
+            _links(4 / 3, 42, 2.0, 2.6, finer=1.25),
+            _links(4 / 3, 42, 2.0, 2.6, finer=1.125),
         ),
         fine=_links(3.0, 72, 3.0, None),
         partner=10,
+        between=12,
         order=2.0,
         sample=_two_link,
     ),
@@ -194,6 +222,7 @@ FAMILIES = (
         ),
         fine=_axial(4.0, 72, 3.0, None),
         partner=5,
+        between=6,
         order=2.0,
         sample=lambda rng: {
             "mu": round(rng.uniform(0.1, 1.0), 3),
@@ -210,6 +239,7 @@ FAMILIES = (
         variants=tuple(_plain(refine, 10.0) for refine in REFINES),
         fine=_plain(4.0, 10.0),
         partner=4,
+        between=5,
         order=1.5,
         sample=lambda rng: {
             "v": _between(rng, 0.5, 2.0),
@@ -226,6 +256,7 @@ FAMILIES = (
         variants=tuple(_plain(refine, 1.0) for refine in REFINES),
         fine=_plain(4.0, 1.0),
         partner=4,
+        between=5,
         order=1.5,
         sample=lambda rng: {"v": _between(rng, 7.0, 13.0), "mu": round(rng.uniform(0.2, 0.4), 3)},
     ),
@@ -238,6 +269,7 @@ FAMILIES = (
         variants=FLAT,
         fine=_plain(4.0, 3.0),
         partner=4,
+        between=6,
         order=1.0,
         sample=lambda rng: {
             "v": _between(rng, 0.5, 4.0),
@@ -254,6 +286,7 @@ FAMILIES = (
         variants=FLAT,
         fine=_plain(4.0, 3.0),
         partner=4,
+        between=6,
         order=1.0,
         sample=lambda rng: {
             "v": _between(rng, 1.0, 4.0),

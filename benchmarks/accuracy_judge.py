@@ -22,8 +22,8 @@ def judged(
 ) -> dict[str, Any]:
     """What came of the runs of one scene, and errors and cost of each variant that was measured in it."""
 
-    def bound(figures: Sequence[float | None]) -> list[float | None]:
-        return list(bound_errors(errors_of(figures, truth), family.no_limit).values())
+    def bound(row: Row) -> list[float | None]:
+        return list(bound_errors(errors_of(family, row, truth), family.no_limit).values())
 
     rows = []
     for run in sorted(runs, key=lambda item: item["asked"]):
@@ -33,18 +33,18 @@ def judged(
         within = [
             (cost(row, device), number)
             for number, row in table.items()
-            if number != FINE and _worst(bound(row["figures"])) <= run["asked"]
+            if number != FINE and _worst(bound(row)) <= run["asked"]
         ]
         rows.append(
             {
                 **run,
-                "errors": bound(run["figures"]),
-                "worst": _worst(bound(run["figures"])),
+                "errors": bound(run),
+                "worst": _worst(bound(run)),
                 "cost": cost(run, device),
                 "cheapest": min(within, default=(None, None)),
             }
         )
-    tried = {number: [*bound(row["figures"]), cost(row, device)] for number, row in table.items() if number != FINE}
+    tried = {number: [*bound(row), cost(row, device)] for number, row in table.items() if number != FINE}
     return {"scene": family.scene, "parameters": values, "truth": list(truth), "runs": rows, "tried": tried}
 
 

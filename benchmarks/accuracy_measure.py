@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import os
 import random
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +17,9 @@ from typing import Any
 
 import warp_mca as mca
 from benchmarks.accuracy_families import FAMILIES, Family, Values
+from warp_mca.accuracy.convergence import STEADY, limit_of
 from warp_mca.accuracy.figures import BOUND, figures_of
+from warp_mca.accuracy.prediction import INTERVAL
 from warp_mca.accuracy.variant import Variant
 
 BATCH = 8  # scenes side by side at most
@@ -24,7 +27,7 @@ WORK = {"hex8r": 0.65}  # processor time of an element over that of hex8 with pl
 COMPUTED = 0.4  # share of the elements that a step computes on a CPU with several rates, where it was not measured
 FINE = -1  # number of the reference among the variants
 
-Row = dict[str, Any]  # figures, elements, steps, refine, computed, work
+Row = dict[str, Any]  # figures, elements, steps, refine, computed, work, open
 Table = dict[int, Row]  # by number of the variant
 FAMILY = {family.scene: family for family in FAMILIES}
 
@@ -81,6 +84,7 @@ def row_of(result: mca.Result, element: str | None) -> Row:
         "refine": summary["refine"],
         "computed": work / summary["n_elements"] if work else None,
         "work": WORK.get(element or "", 1.0),
+        "open": bool(summary["contact_open_at_end"]),
     }
 
 
@@ -126,13 +130,14 @@ def jobs_of(
     Scenes that last longest come first, so that no process has one of them to itself in the end.
 
     On a GPU scenes of `two_link` of equal duration share a batch; references are alone. `wanted` tells whether a
-    variant of a scene is measured; the reference and its partner always are, and come first.
+    variant of a scene is measured; the reference, its partner and the one between always are, and come first.
     """
     rounds = zip_longest(*([(f, part) for part in _parts(f, scenes[f.scene], device)] for f in families))
     jobs = []
     for family, part in (item for found in rounds for item in found if item is not None):
-        others = [number for number in range(len(family.variants)) if number != family.partner]
-        pieces = [(FINE, [k]) for k in part] + [(family.partner, part)]
+        always = (family.partner, family.between)
+        others = [number for number in range(len(family.variants)) if number not in always]
+        pieces = [(FINE, [k]) for k in part] + [(number, part) for number in always]
         pieces += [(number, [k for k in part if wanted(family.scene, k, number)]) for number in others]
         known = scenes[family.scene]
         jobs += [
@@ -171,7 +176,8 @@ def attempted(job: Job) -> list[tuple[str, int, int, Row]]:
     try:
         return measured(job)
     except Exception as error:
-        print(f"left out: {job.family}, variant {job.variant}: {type(error).__name__}: {error}", flush=True)
+        which = f"{job.family}, variant {job.variant}, scenes {list(job.scenes)}, process {os.getpid()}"
+        print(f"left out: {which}: {type(error).__name__}: {error}", flush=True)
         return []
 
 
@@ -196,22 +202,41 @@ def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[
 def truth_of(family: Family, table: Table) -> list[float | None] | None:
     """Limits of the figures, extrapolated from the reference and its partner; None without one of the two.
 
-    f0 = f + (f - f_c) h^p / (h_c^p - h^p) with the order p of the family.
+    f0 = f + (f - f_c) h^p / (h_c^p - h^p) with the order p of the family. Figures whose differences from mesh to mesh
+    grow, by the mesh between, have no limit, nor, without that mesh, those that move by more than STEADY.
     """
     if FINE not in table or family.partner not in table:
         return None
-    fine, partner = table[FINE], table[family.partner]
-    ratio = fine["refine"] / partner["refine"]
-    if ratio <= 1.1:
-        return fine["figures"]
-    factor = 1.0 / (ratio**family.order - 1.0)
-    both = zip(fine["figures"], partner["figures"], strict=True)
-    return [None if f is None else f if c is None else f + factor * (f - c) for f, c in both]
+    rows = [table[number] for number in (family.partner, family.between, FINE) if number in table]
+    sizes = [1.0 / row["refine"] for row in rows]
+    if sizes[0] <= 1.1 * sizes[-1]:
+        return table[FINE]["figures"]
+    factor = 1.0 / ((sizes[0] / sizes[-1]) ** family.order - 1.0)
+
+    def limit(values: Sequence[float | None]) -> float | None:
+        coarse, fine = values[0], values[-1]
+        if fine is None or coarse is None:
+            return fine
+        if len(values) == 3 and values[1] is not None:
+            moves = limit_of(sizes, values, INTERVAL * abs(fine)).value is None
+        else:
+            moves = abs(coarse - fine) > STEADY * abs(fine)
+        return None if moves else fine + factor * (fine - coarse)
+
+    found = [limit(values) for values in zip(*(row["figures"] for row in rows), strict=True)]
+    return _so_far(family, table[FINE], found)
 
 
-def errors_of(figures: Sequence[float | None], truth: Sequence[float | None]) -> list[float | None]:
-    """Signed errors [-]."""
-    return [None if f is None or not t else f / t - 1.0 for f, t in zip(figures, truth, strict=True)]
+def errors_of(family: Family, row: Row, truth: Sequence[float | None]) -> list[float | None]:
+    """Signed errors of a run [-]."""
+    shares = [None if f is None or not t else f / t - 1.0 for f, t in zip(row["figures"], truth, strict=True)]
+    return _so_far(family, row, shares)
+
+
+def _so_far(family: Family, row: Row, values: list[float | None]) -> list[float | None]:
+    """Values of the figures; the impulse of a contact still open, where contacts end, depends on when the run does."""
+    ends = row["open"] and "contact_duration" not in family.no_limit
+    return [None if ends and name == "impulse" else value for name, value in zip(BOUND, values, strict=True)]
 
 
 def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]) -> dict[str, Any]:
@@ -239,7 +264,7 @@ def _run(family: Family, number: int, row: Row, truth: Sequence[float | None]) -
     work = WORK.get(family.variants[number].element or "", 1.0)
     return {
         "variant": number,
-        "errors": [None if e is None else round(e, 5) for e in errors_of(row["figures"], truth)],
+        "errors": [None if e is None else round(e, 5) for e in errors_of(family, row, truth)],
         "elements": row["elements"],
         "steps": row["steps"],
         "computed": round((row["computed"] or COMPUTED) * work, 3),
@@ -255,7 +280,11 @@ def lacking(families: Sequence[Family], known: Mapping[str, Any], device: str) -
     }
     scenes = {family.scene: [item["parameters"] for item in known[family.scene]["scenes"]] for family in families}
     jobs = jobs_of(families, scenes, device, 1.0, lambda name, scene, number: number not in have[name, scene])
-    return [job for job in jobs if job.variant not in (FINE, FAMILY[job.family].partner)]
+    return [
+        job
+        for job in jobs
+        if job.variant != FINE and any(job.variant not in have[job.family, scene] for scene in job.scenes)
+    ]
 
 
 def completed(family: Family, before: Mapping[str, Any], tables: Mapping[int, Table]) -> dict[str, Any]:

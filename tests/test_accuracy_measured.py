@@ -39,6 +39,7 @@ def row(refine: float, error: float = 0.0, **more: Any) -> dict[str, Any]:
         "computed": 1.0,
         "work": 1.0,
         "refine": refine,
+        "open": False,
     }
     return {"figures": [None, 2.0 * (1.0 + 0.1 / refine + error), 1e-3], "refine": refine, **size, **more}
 
@@ -60,6 +61,24 @@ def test_references_are_extrapolated_with_the_order_of_the_family():
     assert truth_of(ROD, {FINE: row(5.0)}) is None
 
 
+def test_figures_whose_differences_grow_from_mesh_to_mesh_have_no_limit():
+    def table(coarse: float, between: float | None, ends: bool = True) -> dict[int, dict[str, Any]]:
+        rows = {ROD.partner: row(1.4, coarse - 0.1 / 1.4), FINE: row(4.0, -0.1 / 4.0, open=not ends)}
+        return rows if between is None else {**rows, ROD.between: row(2.8, between - 0.1 / 2.8)}
+
+    def impulse(found: dict[int, dict[str, Any]]) -> float | None:
+        truth = truth_of(ROD, found)
+        assert truth is not None
+        assert truth[2] == pytest.approx(1e-3)
+        return truth[1]
+
+    assert impulse(table(0.06, 0.04)) is None
+    assert impulse(table(0.06, 0.005)) == pytest.approx(2.0 * (1.0 - 0.06 * 1.4 / 2.6))
+    assert impulse(table(0.06, None)) is None  # it moves by more than can be told without the mesh between
+    assert impulse(table(0.01, None)) is not None
+    assert impulse(table(0.06, 0.005, ends=False)) is None  # that so far, as the run ends
+
+
 def test_choices_are_judged_by_true_errors_estimates_and_cost():
     good, poor = run(2.8, 0.06, 0.04), run(1.0, 0.06, 0.02, deciding=0.5)
     scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
@@ -73,7 +92,7 @@ def test_choices_are_judged_by_true_errors_estimates_and_cost():
     assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
 
 
-def test_scenes_of_all_families_are_measured_in_turn_each_reference_with_its_partner_first():
+def test_scenes_of_all_families_are_measured_in_turn_references_and_what_they_need_first():
     links, rods = FAMILY["two_link"], ROD
     scenes = {family.scene: sampled(family, 1, 7) for family in (links, rods)}
     jobs = jobs_of([links, rods], scenes, "cuda:0", 1.0)
@@ -83,11 +102,12 @@ def test_scenes_of_all_families_are_measured_in_turn_each_reference_with_its_par
         measured = sorted((scene, job.variant) for job in own for scene in job.scenes)
         assert measured == [(k, n) for k in range(7) for n in range(FINE, len(family.variants))]
     alone = [job for job in jobs if job.family == "rod_on_wall"]
-    assert [job.variant for job in alone[:2]] == [FINE, rods.partner]
+    assert [job.variant for job in alone[:3]] == [FINE, rods.partner, rods.between]
     assert {len({values["duration"] for values in job.values}) for job in jobs if job.family == "two_link"} == {1}
 
     few = jobs_of([rods], scenes, "cpu", 1.0, lambda family, scene, variant: scene == 3)
-    assert sum(len(job.scenes) for job in few if job.variant not in (FINE, rods.partner)) == len(rods.variants) - 1
+    always = (FINE, rods.partner, rods.between)
+    assert sum(len(job.scenes) for job in few if job.variant not in always) == len(rods.variants) - 2
 
 
 def test_scenes_are_added_to_those_of_the_store():
@@ -112,11 +132,11 @@ def test_what_is_stored_can_be_chosen_from():
 
 
 def test_variants_that_scenes_lack_are_added_to_the_store():
-    few = replace(ROD, variants=ROD.variants[:6])
+    few = replace(ROD, variants=ROD.variants[:7])
     scenes = sampled(ROD, 1, 3)
-    before = stored(few, scenes, {k: {n: TABLE[n] for n in range(FINE, 6)} for k in range(3)})
+    before = stored(few, scenes, {k: {n: TABLE[n] for n in range(FINE, 7)} for k in range(3)})
     jobs = lacking([ROD], {"rod_on_wall": before}, "cpu")
-    new = set(range(6, len(ROD.variants)))
+    new = set(range(7, len(ROD.variants)))
     assert {(job.variant, job.scenes) for job in jobs} == {(number, (k,)) for number in new for k in range(3)}
     rows = {k: {number: TABLE[number] for number in new} for k in range(3)}
     assert completed(ROD, before, rows) == stored(ROD, scenes, dict.fromkeys(range(3), TABLE))

@@ -11,9 +11,10 @@ import pytest
 from impacts import begun, finished, momentum, prepared, result_of
 
 import warp_mca as mca
+from warp_mca.accuracy.figures import why_unsure
 from warp_mca.model.build import build_model
 from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
-from warp_mca.results.force_history import grazing_share
+from warp_mca.results.force_history import faint_share, grazing_share
 from warp_mca.runs.contact_warnings import symmetry_of
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
@@ -279,6 +280,23 @@ def test_touches_in_which_bodies_only_graze_say_so(pressure: tuple[float, ...], 
     found = [text for text in contact_warnings([contact], np.zeros((1, 2, 3))) if "touches of their own" in text]
     says = [f"for {share:.0%} of its time, contact c has less than 5% of its greatest force"] if share else []
     assert [text.partition(" in ")[0] for text in found] == says
+
+
+@pytest.mark.parametrize(
+    ("pressure", "share"),
+    [
+        ((0.0, *[100.0] * 5, 0.9, 0.5, *[100.0] * 3, 0.0), 0.2),
+        ((0.0, *[100.0] * 5, 0.9, 0.5, *[1.1] * 3, 0.0), 0.0),  # fades away
+        ((0.0, *[100.0] * 5, 1.1, 2.0, *[100.0] * 3, 0.0), 0.0),  # presses
+        ((0.0, *[100.0] * 5, 0.0, 0.0, *[100.0] * 3, 0.0), 0.0),  # parts
+        ((0.0, *[100.0] * 200, 0.5, *[100.0] * 3, 0.0), 0.0),  # too short to matter
+        ((0.0, 0.0), 0.0),
+        ((), 0.0),
+    ],
+)
+def test_rows_in_which_bodies_hardly_touch_between_compressions_are_found(pressure: tuple[float, ...], share: float):
+    assert faint_share(np.array(pressure)) == pytest.approx(share)
+    assert bool(why_unsure(np.array(pressure))) == bool(share)
 
 
 def test_of_a_closed_master_the_tangent_must_lie_across_the_normal():

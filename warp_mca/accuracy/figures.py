@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from warp_mca.results.force_history import grazing_share
+from warp_mca.results.force_history import faint_share, grazing_share
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from warp_mca.results.result import Result
 
 Figures = Mapping[str, float | None]  # by name; None where a run has none
@@ -19,10 +22,11 @@ NAMES = (*BOUND, "max_plastic_strain", "path_stress")  # [-], [Pa]
 def figures_of(result: Result) -> Figures:
     """Headline figures of a run, each None where it has none: a contact without a peak, elastic bodies, no path.
 
-    A contact that is still open when the run ends has no duration, nor have bodies that graze each other after it.
+    A contact that is still open when the run ends has no duration, nor has one that another mesh may cut or lengthen:
+    where bodies graze each other after it, or hardly touch between two compressions.
     """
     summary = result.summary
-    unsure = summary.get("contact_open_at_end") or grazing_share(result.F_n) > 0.0
+    unsure = summary.get("contact_open_at_end") or why_unsure(result.F_n)
     peaks = summary["F_n_peaks"]
     return {
         "F_n_first_peak": float(peaks[0][1]) if peaks else None,
@@ -31,6 +35,15 @@ def figures_of(result: Result) -> Figures:
         "max_plastic_strain": summary["max_plastic_strain"] or None,
         "path_stress": max((float(path.von_mises.max()) for path in result.paths if path.stress.size), default=None),
     }
+
+
+def why_unsure(F_n: NDArray[np.float64]) -> str:
+    """Why the duration of a contact is that of the mesh, empty if it is not; F_n as of `contact_rows` [N]."""
+    if grazing_share(F_n):
+        return "it counts touches with hardly any force, whose length is the mesh's; contacts has the first one's"
+    if share := faint_share(F_n):
+        return f"for {share:.0%} of it bodies hardly touch, between two compressions: another mesh may part them there"
+    return ""
 
 
 def normal_impulse(result: Result) -> float:
@@ -50,15 +63,8 @@ def errors(found: Figures, truth: Figures) -> dict[str, float | None]:
 
 
 def bound_errors(shares: Sequence[float | None], no_limit: Container[str]) -> dict[str, float | None]:
-    """Errors of a run that an asked accuracy binds, by figure, of those in the order of BOUND [-].
-
-    The impulse of a contact that is still open, where durations have a limit, is that so far: it depends on when the
-    run ends, and has None.
-    """
-    found = dict(zip(BOUND, shares, strict=True))
-    if found["contact_duration"] is None and "contact_duration" not in no_limit:
-        found["impulse"] = None
-    return {name: None if name in no_limit else error for name, error in found.items()}
+    """Errors that an asked accuracy binds, by figure, of those in the order of BOUND [-]; None without a limit."""
+    return {name: None if name in no_limit else error for name, error in zip(BOUND, shares, strict=True)}
 
 
 def worst(shares: Mapping[str, float | None]) -> float:

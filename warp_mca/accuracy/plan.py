@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from warp_mca.accuracy.catalogued import source_of
 from warp_mca.accuracy.choice import Choice, best, choices
-from warp_mca.accuracy.figures import BOUND, figures_of
+from warp_mca.accuracy.figures import BOUND, figures_of, why_unsure
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import Pilots, run_pilots
 from warp_mca.accuracy.prediction import SMALL
@@ -19,7 +19,6 @@ from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.store import Family, family_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.results.force_history import grazing_share
 from warp_mca.runs.advice import LOGGER
 from warp_mca.runs.rate_groups import cost_of
 from warp_mca.scene import Scene
@@ -36,7 +35,6 @@ NAMES = {
     "max_plastic_strain": "greatest plastic strain",
 }
 OPEN = "still in contact at the end of the run; lengthen duration"
-GRAZE = "it counts touches with hardly any force, whose length is the mesh's; contacts has the first one's"
 STRAIN = "it grows without bound at the edge of the contact as cells shrink"
 
 MODEST = 1.5  # mass scaling that few models refuse
@@ -92,9 +90,8 @@ class Plan:
             if name in reasons:
                 continue
             if found[name] is None:
-                reasons[name] = (
-                    GRAZE if name == AT_END[0] and grazing_share(result.F_n) else "the run has no such figure"
-                )
+                unsure = why_unsure(result.F_n) if name == AT_END[0] else ""
+                reasons[name] = unsure or "the run has no such figure"
             elif isinstance(value, str):
                 reasons[name] = value
             else:

@@ -84,7 +84,7 @@ def is_close(family: Family, parameters: Mapping[str, object]) -> bool:
 
     Scenes lie from it the root of the number of features, in standard deviations of these.
     """
-    points = np.array([family.coordinates(scene.parameters) for scene in family.scenes])
+    points = family.points
     if len(points) < FEWEST:
         return False
     apart = (points - np.array(family.coordinates(parameters))) / _scale(points)
@@ -97,15 +97,14 @@ def _scale(points: Array) -> Array:
 
 
 def _expected(family: Family, parameters: Mapping[str, object], variant: int, figure: str) -> Expected | None:
-    rows = [(scene, (scene.errors.get(variant) or {}).get(figure)) for scene in family.scenes]
-    known = [(scene, error) for scene, error in rows if error is not None]
+    errors = [(scene.errors.get(variant) or {}).get(figure) for scene in family.scenes]
+    known = [k for k, error in enumerate(errors) if error is not None]
     if len(known) < FEWEST:
         return None
-    points = np.array([family.coordinates(scene.parameters) for scene, _ in known])
-    here = np.array(family.coordinates(parameters))
+    points, here = family.points[known], np.array(family.coordinates(parameters))
     scale = _scale(points)
     noise = INTERVAL if figure == "contact_duration" else NOISE
-    return gaussian_process(points / scale, np.array([error for _, error in known]), here / scale, noise)
+    return gaussian_process(points / scale, np.array([errors[k] for k in known]), here / scale, noise)
 
 
 def gaussian_process(points: Array, errors: Array, here: Array, noise: float = NOISE) -> Expected:

@@ -12,9 +12,12 @@ import os
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.accuracy.catalogued import source_of
 from warp_mca.accuracy.figures import bound_errors
@@ -80,6 +83,11 @@ class Family:
     variants: tuple[Variant, ...]
     sizes: tuple[Size, ...]
     scenes: tuple[Measured, ...]
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """Features of the measured scenes [-], shape (scene_count, feature_count)."""
+        return np.array([self.coordinates(scene.parameters) for scene in self.scenes])
 
     def coordinates(self, parameters: Mapping[str, Any]) -> list[float]:
         """Features of a scene of the family [-], logarithms of those that are "log"."""
@@ -166,7 +174,7 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
 
 def _sizes(count: int, scenes: Any) -> tuple[Size, ...]:
     """Mean sizes; steps relative to those of the first variant in the same scene, times its mean; 0 where unknown."""
-    rows = [{run["variant"]: run for run in item["runs"]} for item in scenes]
+    rows = [{run["variant"]: run for run in item["runs"] if "elements" in run} for item in scenes]
     rows = [row for row in rows if 0 in row]
     first = sum(row[0]["steps"] for row in rows) / max(len(rows), 1)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.results.force_history import GRAZING, contact_intervals, grazing_share, unfinished
+from warp_mca.results.force_history import FIRM, GRAZING, contact_intervals, grazing_share, unfinished
 from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Contact, RigidPlane
 
@@ -25,8 +25,7 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
     "normal_force_N": "normal_force",
     "closing_speed": "closing_speed",
 }
-# Of its greatest force: a contact nearly opens below the first, between forces above the second.
-LIGHT, FIRM = 0.05, 0.1
+LIGHT = 0.05  # of its greatest force: a contact nearly opens below it, between forces above FIRM
 OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
 ACROSS = 0.02  # of the normal impulse, above which friction across the axis of F_t is worth a word
 ALONG = 0.99  # cosine from which on an axis is taken as that of a plane of symmetry

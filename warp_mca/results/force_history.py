@@ -24,6 +24,7 @@ REVERSAL_THRESHOLD = 1e-2  # share of the greatest |F_t| that both signs must re
 MERGED_GAP = 0.02  # share of a contact below which a separation is a change of nodes and does not end the contact
 GRAZING = 0.05  # share of the greatest F_n that a contact stays below in which the bodies only graze each other
 GRAZING_TIME = 0.01  # share of the time in contact from which on such contacts matter
+FAINT, FIRM = 0.01, 0.1  # shares of the greatest F_n: below the first, between forces above the other, a mesh may part
 STICK_THRESHOLD = 0.5  # share of the contact that must stick
 SMOOTHING = 0.02  # share of a contact: standard deviation of the Gaussian that takes the jitter out of its force
 PROMINENCE = 0.05  # share of the greatest F_n by which a peak must stand out of its valleys
@@ -97,7 +98,30 @@ def grazing_share(F_n: Array) -> float:
     rows = contact_rows(F_n)
     peak = max((float(F_n[first:end].max()) for first, end in rows), default=0.0)
     light = [end - first for first, end in rows if end < len(F_n) and F_n[first:end].max() < GRAZING * peak]
-    share = sum(light) / max(1, sum(end - first for first, end in rows))
+    return _mattering(sum(light), rows)
+
+
+def faint_share(F_n: Array) -> float:
+    """Share of the time in contact in which the bodies hardly touch between two compressions [-].
+
+    Another mesh may part them there, and the contact is shorter by as much. 0 where it is too small to matter.
+
+    Args:
+        F_n: as of `contact_rows`.
+    """
+    rows = contact_rows(F_n)
+    peak = float(np.max(F_n, initial=0.0))
+    count = 0
+    for first, end in rows:
+        firm = np.flatnonzero(F_n[first:end] > FIRM * peak)
+        if len(firm):
+            count += int(np.count_nonzero(F_n[first + firm[0] : first + firm[-1]] <= FAINT * peak))
+    return _mattering(count, rows)
+
+
+def _mattering(count: int, rows: list[Rows]) -> float:
+    """Share that some rows are of those in contact [-]; 0 where it is too small to matter."""
+    share = count / max(1, sum(end - first for first, end in rows))
     return share if share > GRAZING_TIME else 0.0
 
 
