@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -14,8 +15,9 @@ from warp_mca.base.errors import bad_value
 Angles = tuple[float, ...]
 
 
+@lru_cache(maxsize=64)  # who chooses a model of the scene builds it again
 def _approach_angle(
-    names: Sequence[str], length: float, radius: float, H: float, gravity: float, theta: Angles
+    names: tuple[str, ...], length: float, radius: float, H: float, gravity: float, theta: Angles
 ) -> float:
     """Angle of the last link at contact [rad], by the slender-rod chain: where the tip's mesh must be fine."""
     from warp_mca.rigid.chain import Chain, slender_link
@@ -163,7 +165,7 @@ def arm(
         position=(0.0, -H, 0.0),
         velocity=(v_plate, 0.0, 0.0),
     )
-    angle = _approach_angle(links, length, radius, H, gravity, theta)
+    angle = _approach_angle(tuple(links), length, radius, H, gravity, tuple(theta))
     meshes = [{"radius": radius, "length": length, "tip": "flat", **mesh} for mesh in rods[:-1]]
     meshes.append({"radius": radius, "length": length, **rods[-1], **focus, "focus_angle": angle})
     shapes = _rods(meshes, hinge)
