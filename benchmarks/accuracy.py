@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,22 +32,24 @@ from benchmarks.accuracy_measure import (
     Job,
     Table,
     added,
+    attempted,
+    carried_out,
     completed,
     jobs_of,
     lacking,
     row_of,
-    run_jobs,
     sampled,
     stored,
     truth_of,
 )
 from warp_mca.accuracy.store import OWN
+from warp_mca.runs.sweep_job import check_device_after
 
 ROOT = Path(__file__).resolve().parents[1]
 JSON = ROOT / "docs" / "accuracy.json"
 PAGE = ROOT / "docs" / "accuracy.md"
 ASKED = (0.02, 0.05)
-LEARN, HELD_OUT = 1, 13  # seeds: choices are never tried on scenes that they were learnt from
+LEARN, HELD_OUT = 1, 14  # seeds: choices are never tried on scenes that they were learnt from
 LEARNING = 0.45  # share of the time of `both` that is spent on the store
 GALLERY = 6  # scenes of each other family to learn from; one of each is tried
 
@@ -93,7 +96,8 @@ def _scenes(args: argparse.Namespace, family: Family, seed: int, others: int) ->
 def _tables(jobs: Sequence[Job], workers: int, until: float) -> Iterable[dict[str, dict[int, Table]]]:
     """All rows so far, by family, scene and variant, after each few runs."""
     tables: dict[str, dict[int, Table]] = {job.family: {} for job in jobs}
-    for count, (name, scene, variant, row) in enumerate(run_jobs(jobs, workers, until), 1):
+    rows = chain.from_iterable(carried_out(attempted, jobs, workers, until))
+    for count, (name, scene, variant, row) in enumerate(rows, 1):
         tables[name].setdefault(scene, {})[variant] = row
         if count % 20 == 0:
             print(f"{count} runs, {until - time.monotonic():.0f} s left", flush=True)
@@ -165,32 +169,47 @@ def validate(args: argparse.Namespace, families: list[Family], until: float) -> 
 
 def _accurate_runs(args: argparse.Namespace, scenes: Mapping[str, list[Values]], until: float) -> list[dict[str, Any]]:
     tasks = [
-        (name, k, values, asked, args.device)
+        Asking(name, k, values, asked, args.device)
         for name, items in scenes.items()
         for k, values in enumerate(items)
         for asked in ASKED
     ]
-    if args.workers < 2:
-        return [accurate_run(task) for task in tasks if time.monotonic() < until]
-    found: list[dict[str, Any]] = []
-    with multiprocessing.get_context("spawn").Pool(args.workers) as pool:
-        pending = pool.imap_unordered(accurate_run, tasks)
-        try:
-            for _ in tasks:
-                found.append(pending.next(timeout=max(until - time.monotonic(), 0.01)))
-        except multiprocessing.TimeoutError:
-            pool.terminate()
-    return found
+    return list(carried_out(accurate_run, tasks, args.workers, until))
 
 
-def accurate_run(task: tuple[str, int, Values, float, str]) -> dict[str, Any]:
-    """One run with an accuracy: its figures, estimates, and what deciding took of its time."""
-    name, number, values, asked, device = task
+@dataclass(frozen=True)
+class Asking:
+    """A run with an accuracy: its family, the number and parameters of the scene, the share, the device."""
+
+    scene: str
+    number: int
+    values: Values
+    asked: float
+    device: str
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return f"{self.scene}, scene {self.number}, accuracy {self.asked:g}"
+
+    def on(self, device: str) -> Asking:
+        """The same on a device."""
+        return replace(self, device=device)
+
+
+def accurate_run(task: Asking) -> dict[str, Any]:
+    """One run with an accuracy: its figures, estimates, and what deciding took of its time.
+
+    Raises:
+        DeviceLost: the device takes no more work of this process.
+    """
     begin = time.perf_counter()
-    entry = {"scene": name, "number": number, "asked": asked}
+    entry = {"scene": task.scene, "number": task.number, "asked": task.asked}
     try:
-        result = mca.run(mca.make_scene(name, **values), accuracy=asked, device=device, threads=1)
+        scene = mca.make_scene(task.scene, **task.values)
+        result = mca.run(scene, accuracy=task.asked, device=task.device, threads=1)
     except Exception as error:  # which must not end the runs of others
+        check_device_after(error, task.device)
         return {**entry, "refused": f"{type(error).__name__}: {error}"}
     wall = time.perf_counter() - begin
     accuracy = result.summary["accuracy"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.accuracy_families import Family, Values
 from benchmarks.accuracy_measure import COMPUTED, FINE, Row, Table, errors_of
 from warp_mca.accuracy.choice import cost_of
+from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import BOUND, bound_errors
 from warp_mca.accuracy.prediction import HIGH, LOW, SMALL
 from warp_mca.accuracy.store import Size, families
@@ -18,34 +20,53 @@ MARGIN = 1.5  # costs by the store, means over its scenes, over those of the run
 
 
 def judged(
-    family: Family, values: Values, table: Table, truth: Sequence[float | None], runs: Sequence[Row], device: str
+    family: Family, values: Values, table: Table, truth: Sequence[Limit], runs: Sequence[Row], device: str
 ) -> dict[str, Any]:
-    """What came of the runs of one scene, and errors and cost of each variant that was measured in it."""
+    """What came of the runs of one scene, and errors and cost of each variant that was measured in it.
 
-    def bound(row: Row) -> list[float | None]:
-        return list(bound_errors(errors_of(family, row, truth), family.no_limit).values())
+    A reference that may be off by more than what was asked cannot tell whether a figure is within.
+    """
 
+    def bound(row: Row, asked: float) -> list[float | None]:
+        errors = bound_errors(errors_of(family, row, truth), family.no_limit).values()
+        return [error if told(limit.left, asked) else None for error, limit in zip(errors, truth, strict=True)]
+
+    measured = {number: row for number, row in table.items() if number != FINE}
     rows = []
     for run in sorted(runs, key=lambda item: item["asked"]):
         if "refused" in run:
             rows.append(dict(run))
             continue
+        errors = bound(run, run["asked"])
         within = [
             (cost(row, device), number)
             for number, row in table.items()
-            if number != FINE and _worst(bound(row)) <= run["asked"]
+            if number != FINE
+            and any(e is not None for e in errors)
+            and _worst(bound(row, run["asked"])) <= run["asked"]
         ]
         rows.append(
             {
                 **run,
-                "errors": bound(run),
-                "worst": _worst(bound(run)),
+                "errors": errors,
+                "worst": _worst(errors),
                 "cost": cost(run, device),
                 "cheapest": min(within, default=(None, None)),
             }
         )
-    tried = {number: [*bound(row), cost(row, device)] for number, row in table.items() if number != FINE}
-    return {"scene": family.scene, "parameters": values, "truth": list(truth), "runs": rows, "tried": tried}
+    tried = {number: [*bound(row, math.inf), cost(row, device)] for number, row in measured.items()}
+    limits = {"truth": [limit.value for limit in truth], "left": [limit.left for limit in truth]}
+    return {"scene": family.scene, "parameters": values, **limits, "runs": rows, "tried": tried}
+
+
+def is_judged(errors: Iterable[float | None]) -> bool:
+    """Whether the reference tells anything about a run."""
+    return any(error is not None for error in errors)
+
+
+def told(left: float | None, asked: float) -> bool:
+    """Whether a limit of which so much may be left tells if errors are within what was asked [-]."""
+    return left is None or left <= asked
 
 
 def cost(row: Row, device: str) -> float:
@@ -82,7 +103,7 @@ def _worst(errors: Iterable[float | None]) -> float:
 
 def counts(data: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
     """How many of how many cases meet each aim."""
-    runs = [run for scene in data["scenes"] for run in scene["runs"] if "errors" in run]
+    runs = [run for scene in data["scenes"] for run in scene["runs"] if is_judged(run.get("errors", ()))]
     estimates = [item for run in runs for item in _estimates(run)]
     costs = [run["cost"] <= 2.0 * run["cheapest"][0] for run in runs if run["cheapest"][0] is not None]
     return {

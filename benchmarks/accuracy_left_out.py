@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from statistics import fmean, median
 from typing import Any
 
-from benchmarks.accuracy_judge import right
+from benchmarks.accuracy_judge import right, told
 from warp_mca.accuracy.choice import Choice, best, choices
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.prediction import SMALL
 from warp_mca.accuracy.request import Accuracy
-from warp_mca.accuracy.store import Family, family_from
+from warp_mca.accuracy.store import Family, Measured, family_from
 from warp_mca.runs.rate_groups import COSTS
 
 COARSE, FINE = 0.05, 0.02  # shares that are asked for
@@ -20,35 +20,45 @@ COARSE, FINE = 0.05, 0.02  # shares that are asked for
 
 @dataclass(frozen=True)
 class Trial:
-    """A scene that was left out, with what the others foresee for each of its variants, and its true errors."""
+    """A scene that was left out, with what the others foresee for each of its variants, and what was measured."""
 
     found: Sequence[Choice]
-    errors: Mapping[int, Mapping[str, float | None]]
+    scene: Measured
 
     def chosen(self, asked: float) -> Choice | None:
         """The variant that a run would take; None if none will do, or no figure of it is bound."""
-        choice = best([item for item in self.found if item.number in self.errors], asked)
-        return choice if choice is not None and self._sizes(choice) else None
+        choice = best(self._tried(), asked)
+        return choice if choice is not None and self._sizes(choice, asked) else None
 
     def dearer(self, choice: Choice, asked: float) -> float | None:
         """Cost of a choice over that of the cheapest variant within what is asked; None if none is."""
-        known = [item for item in self.found if item.number in self.errors]
-        within = [item for item in known if self._sizes(item) and self.worst(item) <= asked]
+        within = [item for item in self._tried() if self._sizes(item, asked) and self.worst(item, asked) <= asked]
         return choice.cost / within[0].cost if within else None
 
-    def worst(self, choice: Choice) -> float:
+    def worst(self, choice: Choice, asked: float) -> float:
         """Greatest true error of a choice [-]."""
-        return max(self._sizes(choice), default=0.0)
+        return max(self._sizes(choice, asked), default=0.0)
 
     def marks(self, choice: Choice, asked: float) -> list[bool]:
         """Whether its estimates are right, as in `accuracy_judge`."""
-        errors = self.errors[choice.number]
-        pairs = [(own.estimate(SMALL * asked), errors[name]) for name, own in choice.errors.items() if own]
-        return [right(estimate, true, asked) for estimate, true in pairs if true is not None]
+        true = self._true(choice, asked)
+        return [
+            right(own.estimate(SMALL * asked), true[name], asked)
+            for name, own in choice.errors.items()
+            if own and name in true
+        ]
 
-    def _sizes(self, choice: Choice) -> list[float]:
-        errors = self.errors[choice.number]
-        return [abs(error) for name in choice.errors if (error := errors[name]) is not None]
+    def _tried(self) -> list[Choice]:
+        return [item for item in self.found if item.number in self.scene.errors]
+
+    def _true(self, choice: Choice, asked: float) -> dict[str, float]:
+        """True errors of the figures that the reference can tell [-]."""
+        errors = self.scene.errors[choice.number]
+        pairs = [(name, errors[name]) for name in choice.errors if told(self.scene.left.get(name), asked)]
+        return {name: error for name, error in pairs if error is not None}
+
+    def _sizes(self, choice: Choice, asked: float) -> list[float]:
+        return [abs(error) for error in self._true(choice, asked).values()]
 
 
 def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,7 +72,7 @@ def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
     trials = [_trial(family, k) for k in range(len(family.scenes))]
     pairs = [(trial, asked, trial.chosen(asked)) for trial in trials for asked in (FINE, COARSE)]
     made = [(trial, asked, choice) for trial, asked, choice in pairs if choice is not None]
-    shares = [trial.worst(choice) / asked for trial, asked, choice in made]
+    shares = [trial.worst(choice, asked) / asked for trial, asked, choice in made]
     beside = [ratio for trial, asked, choice in made if (ratio := trial.dearer(choice, asked)) is not None]
     marks = [mark for trial, asked, choice in made for mark in trial.marks(choice, asked)]
     both = [
@@ -90,4 +100,4 @@ def _trial(family: Family, k: int) -> Trial:
     left = family.scenes[k]
     others = replace(family, scenes=family.scenes[:k] + family.scenes[k + 1 :])
     bound = [name for name in BOUND if name not in family.no_limit]
-    return Trial(choices(others, left.parameters, Accuracy(share=FINE), bound, COSTS["H100"], False), left.errors)
+    return Trial(choices(others, left.parameters, Accuracy(share=FINE), bound, COSTS["H100"], False), left)

@@ -6,21 +6,22 @@ Each process takes jobs in turn: a reference alone, or a variant of some scenes 
 from __future__ import annotations
 
 import math
-import multiprocessing
-import os
 import random
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, replace
 from itertools import groupby, zip_longest
 from typing import Any
 
 import warp_mca as mca
 from benchmarks.accuracy_families import FAMILIES, Family, Values
-from warp_mca.accuracy.convergence import STEADY, limit_of
+from warp_mca.accuracy.convergence import STEADY, Limit, limit_of
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.prediction import INTERVAL
 from warp_mca.accuracy.variant import Variant
+from warp_mca.runs.sweep_job import check_device_after
+from warp_mca.runs.sweep_workers import WorkerDied, Workers
 
 BATCH = 8  # scenes side by side at most
 WORK = {"hex8r": 0.65}  # processor time of an element over that of hex8 with plasticity (docs/performance.md) [-]
@@ -51,6 +52,15 @@ class Job:
     values: tuple[Values, ...]
     device: str
     scale: float
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return f"{self.family}, variant {self.variant}, scenes {list(self.scenes)}"
+
+    def on(self, device: str) -> Job:
+        """The same job on a device."""
+        return replace(self, device=device)
 
 
 def variant_of(family: Family, number: int, scale: float = 1.0) -> Variant:
@@ -172,71 +182,91 @@ def _steps(values: Values) -> float:
 
 
 def attempted(job: Job) -> list[tuple[str, int, int, Row]]:
-    """As `measured`; a job that breaks, for lack of memory say, has no rows and does not end the others."""
+    """As `measured`; a job that breaks, for lack of memory say, has no rows and does not end the others.
+
+    Raises:
+        DeviceLost: the device takes no more work of this process.
+    """
     try:
         return measured(job)
     except Exception as error:
-        which = f"{job.family}, variant {job.variant}, scenes {list(job.scenes)}, process {os.getpid()}"
-        print(f"left out: {which}: {type(error).__name__}: {error}", flush=True)
+        print(f"left out: {job.name}: {type(error).__name__}: {error}", flush=True)
+        check_device_after(error, job.device)
         return []
 
 
-def run_jobs(jobs: Sequence[Job], workers: int, until: float) -> Iterator[tuple[str, int, int, Row]]:
-    """Rows as they come, until all are there or the clock (`time.monotonic`) says `until`."""
+def carried_out(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int, until: float) -> Iterator[Any]:
+    """Answers to jobs, which have `on(device)`, `device` and `name`, as they come.
+
+    Until all are there or the clock (`time.monotonic`) says `until`. A job whose worker dies is tried once more.
+    """
     if workers < 2:
         for job in jobs:
             if time.monotonic() > until:
                 return
-            yield from attempted(job)
+            yield function(job)
         return
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
-        pending = pool.imap_unordered(attempted, jobs)
-        for _ in jobs:
-            try:
-                yield from pending.next(timeout=max(until - time.monotonic(), 0.01))
-            except multiprocessing.TimeoutError:
-                pool.terminate()
+    with Workers([jobs[0].device] * workers) as pool:
+        running = {pool.submit(function, job): job for job in jobs}
+        again = set()
+        while running:
+            done = wait(running, max(until - time.monotonic(), 0.01), return_when=FIRST_COMPLETED).done
+            if not done:
                 return
+            for future in done:
+                job = running.pop(future)
+                try:
+                    yield future.result()
+                except WorkerDied as error:
+                    print(f"worker ended in {job.name}: {error}", flush=True)
+                    if job.name not in again:
+                        again.add(job.name)
+                        running[pool.submit(function, job)] = job
 
 
-def truth_of(family: Family, table: Table) -> list[float | None] | None:
+def truth_of(family: Family, table: Table) -> list[Limit] | None:
     """Limits of the figures, extrapolated from the reference and its partner; None without one of the two.
 
     f0 = f + (f - f_c) h^p / (h_c^p - h^p) with the order p of the family. Figures whose differences from mesh to mesh
-    grow, by the mesh between, have no limit, nor, without that mesh, those that move by more than STEADY.
+    grow, by the mesh between, have no limit, nor, without that mesh, those that move by more than STEADY. What may be
+    left is that of the three meshes, or all that two of them differ by.
     """
     if FINE not in table or family.partner not in table:
         return None
     rows = [table[number] for number in (family.partner, family.between, FINE) if number in table]
     sizes = [1.0 / row["refine"] for row in rows]
     if sizes[0] <= 1.1 * sizes[-1]:
-        return table[FINE]["figures"]
+        return _so_far(family, table[FINE], [Limit(value) for value in table[FINE]["figures"]], Limit(None))
+    found = [extrapolated(family, sizes, values) for values in zip(*(row["figures"] for row in rows), strict=True)]
+    return _so_far(family, table[FINE], found, Limit(None))
+
+
+def extrapolated(family: Family, sizes: Sequence[float], values: Sequence[float | None]) -> Limit:
+    """The limit of a figure of two or three meshes, as in `truth_of`."""
+    coarse, fine = values[0], values[-1]
+    if not fine or coarse is None:
+        return Limit(fine)
+    if len(values) == 3 and values[1] is not None:
+        found = limit_of(sizes, values, INTERVAL * abs(fine))
+        left = None if found.value is None else found.left
+    else:
+        moved = abs(coarse / fine - 1.0)
+        left = moved + INTERVAL if moved <= STEADY else None
     factor = 1.0 / ((sizes[0] / sizes[-1]) ** family.order - 1.0)
-
-    def limit(values: Sequence[float | None]) -> float | None:
-        coarse, fine = values[0], values[-1]
-        if fine is None or coarse is None:
-            return fine
-        if len(values) == 3 and values[1] is not None:
-            moves = limit_of(sizes, values, INTERVAL * abs(fine)).value is None
-        else:
-            moves = abs(coarse - fine) > STEADY * abs(fine)
-        return None if moves else fine + factor * (fine - coarse)
-
-    found = [limit(values) for values in zip(*(row["figures"] for row in rows), strict=True)]
-    return _so_far(family, table[FINE], found)
+    return Limit(None) if left is None else Limit(fine + factor * (fine - coarse), left)
 
 
-def errors_of(family: Family, row: Row, truth: Sequence[float | None]) -> list[float | None]:
+def errors_of(family: Family, row: Row, truth: Sequence[Limit]) -> list[float | None]:
     """Signed errors of a run [-]."""
-    shares = [None if f is None or not t else f / t - 1.0 for f, t in zip(row["figures"], truth, strict=True)]
-    return _so_far(family, row, shares)
+    pairs = zip(row["figures"], truth, strict=True)
+    shares = [None if f is None or not limit.value else f / limit.value - 1.0 for f, limit in pairs]
+    return _so_far(family, row, shares, None)
 
 
-def _so_far(family: Family, row: Row, values: list[float | None]) -> list[float | None]:
+def _so_far(family: Family, row: Row, values: list[Any], none: Any) -> list[Any]:
     """Values of the figures; the impulse of a contact still open, where contacts end, depends on when the run does."""
     ends = row["open"] and "contact_duration" not in family.no_limit
-    return [None if ends and name == "impulse" else value for name, value in zip(BOUND, values, strict=True)]
+    return [none if ends and name == "impulse" else value for name, value in zip(BOUND, values, strict=True)]
 
 
 def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]) -> dict[str, Any]:
@@ -248,7 +278,8 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
         if truth is None:
             continue
         runs = [_run(family, number, row, truth) for number, row in sorted(table.items()) if number != FINE]
-        entries.append({"parameters": values, "truth": truth, "runs": runs})
+        left = [None if limit.left is None else round(limit.left, 5) for limit in truth]
+        entries.append({"parameters": values, "truth": [limit.value for limit in truth], "left": left, "runs": runs})
     return {
         "features": dict(family.features),
         "mesh": family.base(),
@@ -259,7 +290,7 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
     }
 
 
-def _run(family: Family, number: int, row: Row, truth: Sequence[float | None]) -> dict[str, Any]:
+def _run(family: Family, number: int, row: Row, truth: Sequence[Limit]) -> dict[str, Any]:
     """A run as the store has it."""
     work = WORK.get(family.variants[number].element or "", 1.0)
     return {
@@ -294,7 +325,8 @@ def completed(family: Family, before: Mapping[str, Any], tables: Mapping[int, Ta
     scenes = []
     for k, item in enumerate(before["scenes"]):
         runs = {run["variant"]: run for run in item["runs"]}
-        runs |= {number: _run(family, number, row, item["truth"]) for number, row in tables.get(k, {}).items()}
+        truth = [Limit(value) for value in item["truth"]]
+        runs |= {number: _run(family, number, row, truth) for number, row in tables.get(k, {}).items()}
         scenes.append({**item, "runs": [runs[number] for number in sorted(runs)]})
     return {**before, "variants": variants, "scenes": scenes}
 

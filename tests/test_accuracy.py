@@ -14,7 +14,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.accuracy import store
-from warp_mca.accuracy.choice import LEAST, REGRET, SHARED, Choice, best, choices
+from warp_mca.accuracy.choice import LEAST, REGRET, Choice, best, choices
 from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
@@ -40,12 +40,21 @@ def test_shares_are_read_as_users_write_them():
 def test_a_process_keeps_to_what_was_measured_and_knows_nothing_far_away():
     points = np.linspace(-2.0, 2.0, 9)[:, None]
     errors = 0.03 * np.sin(points[:, 0])
-    between = gaussian_process(points, errors, np.array([0.25]))
+    noise = np.full(len(points), NOISE)
+    between = gaussian_process(points, errors, np.array([0.25]), noise)
     assert between.mean == pytest.approx(0.03 * math.sin(0.25), abs=2.0 * NOISE)
     assert between.spread < 2.0 * NOISE
-    far = gaussian_process(points, errors, np.array([100.0]))
+    far = gaussian_process(points, errors, np.array([100.0]), noise)
     assert far.mean == pytest.approx(errors.mean(), abs=1e-6)
     assert far.spread == pytest.approx(math.hypot(errors.std(), math.sqrt(2.0) * NOISE), rel=1e-3)
+
+
+def test_a_scene_whose_limits_are_not_sure_tells_less():
+    points = np.linspace(-2.0, 2.0, 9)[:, None]
+    errors, noise = np.where(points[:, 0] == 0.0, 0.05, 0.0), np.full(len(points), NOISE)
+    sure = gaussian_process(points, errors, np.zeros(1), noise)
+    noise[4] = 0.1
+    assert abs(gaussian_process(points, errors, np.zeros(1), noise).mean) < 0.5 * sure.mean
 
 
 @pytest.fixture
@@ -108,7 +117,7 @@ def offer(chance: float, cost: float) -> Choice:
 
 def test_more_than_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
     cheap = offer(0.75, 1.0)
-    least = 0.75 + REGRET * SHARED * 0.75  # which makes up for what the cheap one would have done as well
+    least = 0.75 + REGRET * 0.75  # which makes up for what the cheap one would have done as well
     assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
     assert best([cheap, offer(least - 0.01, 2.1)], 0.01) is cheap
     for dear in (offer(least + 0.01, 2.1), offer(0.76, 1.9)):

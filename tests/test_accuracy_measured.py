@@ -26,6 +26,7 @@ from benchmarks.accuracy_measure import (
     truth_of,
     variant_of,
 )
+from warp_mca.accuracy.convergence import Limit
 from warp_mca.geometry.refinement import refined
 
 ROD = FAMILY["rod_on_wall"]  # extrapolated with order 1, its first peak has no limit
@@ -45,6 +46,7 @@ def row(refine: float, error: float = 0.0, **more: Any) -> dict[str, Any]:
 
 
 TABLE = {FINE: row(5.0), **{k: row(item.refine or 1.0) for k, item in enumerate(ROD.variants)}}
+LIMITS = [Limit(None), Limit(2.0, 0.03), Limit(1e-3)]
 
 
 def run(refine: float, asked: float, estimate: float, deciding: float = 0.1) -> dict[str, Any]:
@@ -55,8 +57,8 @@ def run(refine: float, asked: float, estimate: float, deciding: float = 0.1) -> 
 def test_references_are_extrapolated_with_the_order_of_the_family():
     truth = truth_of(ROD, TABLE)
     assert truth is not None
-    assert truth[0] is None
-    assert truth[1:] == pytest.approx([2.0, 1e-3], rel=1e-12)
+    assert truth[0].value is None
+    assert [limit.value for limit in truth[1:]] == pytest.approx([2.0, 1e-3], rel=1e-12)
     assert truth_of(ROD, {0: row(0.5)}) is None
     assert truth_of(ROD, {FINE: row(5.0)}) is None
 
@@ -69,8 +71,8 @@ def test_figures_whose_differences_grow_from_mesh_to_mesh_have_no_limit():
     def impulse(found: dict[int, dict[str, Any]]) -> float | None:
         truth = truth_of(ROD, found)
         assert truth is not None
-        assert truth[2] == pytest.approx(1e-3)
-        return truth[1]
+        assert truth[2].value == pytest.approx(1e-3)
+        return truth[1].value
 
     assert impulse(table(0.06, 0.04)) is None
     assert impulse(table(0.06, 0.005)) == pytest.approx(2.0 * (1.0 - 0.06 * 1.4 / 2.6))
@@ -81,14 +83,17 @@ def test_figures_whose_differences_grow_from_mesh_to_mesh_have_no_limit():
 
 def test_choices_are_judged_by_true_errors_estimates_and_cost():
     good, poor = run(2.8, 0.06, 0.04), run(1.0, 0.06, 0.02, deciding=0.5)
-    scene = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [good], "cuda:0")
-    other = judged(ROD, {"v": 1.0}, TABLE, [None, 2.0, 1e-3], [poor, run(2.8, 0.1, 0.9)], "cuda:0")
+    scene = judged(ROD, {"v": 1.0}, TABLE, LIMITS, [good], "cuda:0")
+    other = judged(ROD, {"v": 1.0}, TABLE, LIMITS, [poor, run(2.8, 0.1, 0.9)], "cuda:0")
     assert scene["runs"][0]["worst"] == pytest.approx(0.1 / 2.8)
     assert set(scene["tried"]) == set(range(len(ROD.variants)))
     assert scene["tried"][10][:3] == pytest.approx([None, 0.1 / 1.7, 0.0])
     assert scene["runs"][0]["cheapest"][1] == 10  # refine 1.7: 0.1 / 1.7 is within 6 %, 0.1 / 1.4 is not
     found = list(counts({"scenes": [scene, other]}).values())
     assert found == [(2, 3), (3, 3), (2, 3), (1, 3), (2, 3)]
+    unsure = judged(ROD, {"v": 1.0}, TABLE, [*LIMITS[:1], Limit(2.0, 0.07), Limit(None)], [good], "cuda:0")
+    assert unsure["runs"][0]["errors"] == [None, None, None]  # the reference may be off by more than what was asked
+    assert list(counts({"scenes": [unsure]}).values()) == [(0, 0)] * 5
     assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
 
 
@@ -158,7 +163,7 @@ def test_the_page_shows_what_was_measured():
         assert page == render(page, json.loads(JSON.read_text(encoding="utf-8")))
     data = {
         "device": "it",
-        "scenes": [judged(ROD, {"v": 1.5}, TABLE, [None, 2.0, 1e-3], [run(2.8, 0.05, 0.04)], "cpu")],
+        "scenes": [judged(ROD, {"v": 1.5}, TABLE, LIMITS, [run(2.8, 0.05, 0.04)], "cpu")],
     }
     shown = render(page, data)
     assert "| `rod_on_wall` v=1.5 | 5% | none | +3.6 % (est. 4.0 %) | +0.0 % |" in shown

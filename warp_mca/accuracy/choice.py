@@ -16,7 +16,6 @@ from warp_mca.runs.rate_groups import StepCost
 # Measured with scenes of the store that are left out in turn (docs/accuracy.md):
 LEAST = 0.5  # probability that all errors are within what was asked, below which a variant is not chosen [-]
 REGRET = 0.2  # what it counts that a variant of less than half the cost would have done as well [-]
-SHARED = 0.6  # share of such a variant's own probability: errors of variants go together [-]
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def best(found: Sequence[Choice], share: float) -> Choice | None:
     def none_would_do(k: int) -> float:
         """Probability that no variant of less than half the cost of one is within the share [-]."""
         halves = takewhile(lambda pair: 2.0 * pair[0].cost < found[k].cost, zip(found, chances, strict=True))
-        return math.prod(1.0 - SHARED * chance for _, chance in halves)
+        return math.prod(1.0 - chance for _, chance in halves)
 
     return found[max(likely, key=lambda k: chances[k] + REGRET * none_would_do(k))]
 

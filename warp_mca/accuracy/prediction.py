@@ -3,10 +3,11 @@
 Errors of one figure of one variant are a Gaussian process over the features x of a scene (Rasmussen and Williams,
 Gaussian Processes for Machine Learning, 2.2 and 5.4.2): with the mean m of all scenes and their variance s^2,
 
-    k(x, y) = s^2 exp(-|x - y|^2 / (2 l^2)),  K = k(X, X) + n^2 I,
+    k(x, y) = s^2 exp(-|x - y|^2 / (2 l^2)),  K = k(X, X) + diag(n^2),
     e(x) = m + k(x, X) K^-1 (e - m),   var(x) = s^2 - k(x, X) K^-1 k(X, x) + n^2
 
-with the length l under which each measured scene would have been foreseen best from the others.
+with the length l under which each measured scene would have been foreseen best from the others. The noise n is that of
+the limits from which errors are counted, in each scene as far as these are known; for another scene it is the median.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from warp_mca.accuracy.store import Family
 
 Array = NDArray[np.float64]
 
-NOISE = 2e-3  # error of the references themselves [-]
+NOISE = 2e-3  # least noise of the limits [-]
 INTERVAL = 5e-3  # the same of durations, which are known to the output interval [-]
+DEVIATION = 0.3  # standard deviation of a limit over what may be left of it at most [-]
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
 NEAR = 0.02  # distance from the median within which it is none [-]
@@ -103,30 +105,32 @@ def _expected(family: Family, parameters: Mapping[str, object], variant: int, fi
         return None
     points, here = family.points[known], np.array(family.coordinates(parameters))
     scale = _scale(points)
-    noise = INTERVAL if figure == "contact_duration" else NOISE
+    least = INTERVAL if figure == "contact_duration" else NOISE
+    left = [family.scenes[k].left.get(figure) or 0.0 for k in known]
+    noise = np.maximum(least, DEVIATION * np.array(left))
     return gaussian_process(points / scale, np.array([errors[k] for k in known]), here / scale, noise)
 
 
-def gaussian_process(points: Array, errors: Array, here: Array, noise: float = NOISE) -> Expected:
+def gaussian_process(points: Array, errors: Array, here: Array, noise: Array) -> Expected:
     """What values at scaled points tell of another point.
 
     Args:
         points: features of the measured scenes [-], shape (count, feature_count).
         errors: measured there [-], shape (count,).
         here: features of the scene in question [-], shape (feature_count,).
-        noise: of the errors [-].
+        noise: standard deviations of the errors [-], shape (count,).
     """
     errors = _without_outliers(errors)
     middle = float(np.mean(errors))
     about = errors - middle
-    variance = float(np.mean(about**2)) + noise**2
+    variance = float(np.mean(about**2) + np.min(noise) ** 2)
     squares = ((points[:, None] - points[None]) ** 2).sum(axis=2)
     lengths = [scale * math.sqrt(points.shape[1]) for scale in LENGTHS]
     length = max(lengths, key=lambda item: _likelihood(_covariance(squares, variance, item, noise), about))
     K = _covariance(squares, variance, length, noise)
     k = variance * np.exp(-((points - here) ** 2).sum(axis=1) / (2.0 * length**2))
     weights = np.linalg.solve(K, k)
-    left = max(variance - float(k @ weights), 0.0) + noise**2
+    left = max(variance - float(k @ weights), 0.0) + float(np.median(noise)) ** 2
     return Expected(middle + float(weights @ about), math.sqrt(left))
 
 
@@ -137,8 +141,8 @@ def _without_outliers(errors: Array) -> Array:
     return np.clip(errors, middle - reach, middle + reach)
 
 
-def _covariance(squares: Array, variance: float, length: float, noise: float) -> Array:
-    return variance * np.exp(-squares / (2.0 * length**2)) + noise**2 * np.eye(len(squares))
+def _covariance(squares: Array, variance: float, length: float, noise: Array) -> Array:
+    return variance * np.exp(-squares / (2.0 * length**2)) + np.diag(noise**2)
 
 
 def _likelihood(covariance: Array, about: Array) -> float:

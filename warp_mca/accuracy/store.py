@@ -11,7 +11,7 @@ import math
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.accuracy.catalogued import source_of
-from warp_mca.accuracy.figures import bound_errors
+from warp_mca.accuracy.figures import BOUND, bound_errors
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import bad_value
 from warp_mca.scene import Scene
@@ -52,10 +52,12 @@ class Measured:
     Attributes:
         parameters: that differ from the scene's defaults.
         errors: signed, by variant and figure [-]; None where a run has no such figure.
+        left: how far off the limits may be from which errors are counted, by figure [-]; None where nobody knows.
     """
 
     parameters: Mapping[str, Any]
     errors: Mapping[int, Mapping[str, float | None]]
+    left: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,7 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
         Measured(
             item["parameters"],
             {run["variant"]: bound_errors(run["errors"], data["no_limit"]) for run in item["runs"]},
+            dict(zip(BOUND, item.get("left", ()), strict=False)),
         )
         for item in data["scenes"]
     )

@@ -6,8 +6,9 @@ import logging
 import pickle
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from warp_mca.runs.batch import run_batch
 from warp_mca.runs.simulation import run
 from warp_mca.runs.sweep_plan import RunOptions, one_line, plain
 from warp_mca.scene import Scene, catalogue, model_file
+from warp_mca.solve.device import answers
 
 Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
 
@@ -30,6 +32,10 @@ DONE, STOPPED, FAILED = "done", "stopped", "failed"  # what a row's status may b
 # entries of a summary that rows hold otherwise
 NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files", "units")
 BETWEEN = " | "  # between the warnings of a run
+
+
+class DeviceLost(BrokenExecutor):
+    """The device takes no more work of this process; another process may have it do the job."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,10 @@ class Job:
     folders: tuple[Path | None, ...]
     options: RunOptions
     model: Path | None = None
+
+    def on(self, device: str) -> Job:
+        """The same job on a device."""
+        return replace(self, options=replace(self.options, device=device))
 
     def __reduce__(self) -> tuple[Callable[..., Job], tuple[object, ...]]:
         """Scenes travel as bytes, which can be read once the scene files with their classes have been."""
@@ -76,11 +86,15 @@ def _stored_meshes(path: Path, changed: int) -> Mapping[str, Mesh]:
 def run_job(job: Job) -> list[Row]:
     """Carry out the runs of a job, and keep the files of those that no guard stopped.
 
-    Scenes that cannot be run in one model run one by one. Nothing that goes wrong in a run is raised.
+    Scenes that cannot be run in one model run one by one. Nothing else that goes wrong in a run is raised.
 
     Returns:
         Of each run `status`, `reason`, `warnings`, figures and `wall`.
+
+    Raises:
+        DeviceLost: the device takes no more work of this process.
     """
+    device = job.options.device
     with _silent():
         if len(job.scenes) > 1:
             try:
@@ -88,8 +102,8 @@ def run_job(job: Job) -> list[Row]:
             except Exception:
                 pass
             else:
-                return [_attempt(lambda k=k: _kept(results[k], job.folders[k])) for k in range(len(results))]
-        return [_attempt(lambda k=k: _alone(job, k)) for k in range(len(job.scenes))]
+                return [_attempt(lambda k=k: _kept(results[k], job.folders[k]), device) for k in range(len(results))]
+        return [_attempt(lambda k=k: _alone(job, k), device) for k in range(len(job.scenes))]
 
 
 def failure(reason: str) -> Row:
@@ -131,8 +145,18 @@ def _kept(result: Result, folder: Path | None) -> Row:
     return _outcome(save(result, folder, force=True) if folder else result)
 
 
-def _attempt(attempt: Callable[[], Row]) -> Row:
-    """What the attempt returns, or the row of a run that was stopped or failed."""
+def check_device_after(error: Exception, device: str) -> None:
+    """Raise DeviceLost if the device takes no more work after that error."""
+    if not answers(device):
+        raise DeviceLost(f"{device} takes no more work of its process ({one_line(str(error))})") from error
+
+
+def _attempt(attempt: Callable[[], Row], device: str) -> Row:
+    """What the attempt returns, or the row of a run that was stopped or failed.
+
+    Raises:
+        DeviceLost: the device takes no more work of this process.
+    """
     try:
         return attempt()
     except GuardError as error:
@@ -140,6 +164,7 @@ def _attempt(attempt: Callable[[], Row]) -> Row:
     except McaError as error:
         return failure(str(error))
     except Exception as error:  # whatever a user's own classes, the device or the disk raise
+        check_device_after(error, device)
         return failure(f"{type(error).__name__}: {error}")
 
 

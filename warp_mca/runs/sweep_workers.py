@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
 from importlib import import_module
 from multiprocessing import connection
 from queue import SimpleQueue
@@ -17,7 +16,7 @@ from typing import Any
 
 from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
-from warp_mca.runs.sweep_job import Job, Row
+from warp_mca.runs.sweep_job import DeviceLost
 from warp_mca.runs.sweep_plan import RunOptions
 
 DASK = "dask://"
@@ -25,7 +24,7 @@ STARTS = 5  # of a worker in turn that is killed before it is ready, after which
 CONNECTING = "10s"  # at most, to a Dask scheduler
 REMEDY = "give process, dask://HOST:PORT, or in Python a concurrent.futures.Executor"
 
-Function = Callable[[Job], list[Row]]
+Function = Callable[[Any], Any]  # of a job, which has `on(device)`
 Prepare = Callable[[], None]
 
 
@@ -46,7 +45,8 @@ class Here(Executor):
 class Workers(Executor):
     """Processes that carry out one job after the other, each on its device.
 
-    One that is killed is replaced by a new one, and only the job that it had is lost: its future raises `WorkerDied`.
+    One that is killed, or whose device takes no more work, is replaced by a new one, and only the job that it had is
+    lost: its future raises `WorkerDied`.
     """
 
     def __init__(self, devices: Sequence[str], prepare: Prepare | None = None) -> None:
@@ -75,7 +75,7 @@ class Workers(Executor):
             worker.end()
         self._threads.shutdown(wait=wait)
 
-    def _call(self, function: Function, job: Job) -> list[Row]:
+    def _call(self, function: Function, job: Any) -> Any:
         worker = self._idle.get()
         try:
             return worker.call(function, job)
@@ -92,7 +92,7 @@ class _Worker:
         self._pipe: connection.Connection | None = None
         self._ended = threading.Event()
 
-    def call(self, function: Function, job: Job) -> list[Row]:
+    def call(self, function: Function, job: Any) -> Any:
         """What the process answers.
 
         Raises:
@@ -100,12 +100,14 @@ class _Worker:
             McaError: none can be started.
         """
         pipe = self._pipe if self._process and self._process.is_alive() and self._pipe else self._start()
-        job = replace(job, options=replace(job.options, device=self.device))
         try:
-            pipe.send((function, job))
-            answer, error = pipe.recv()
+            pipe.send((function, job.on(self.device)))
+            answer, error, lost = pipe.recv()
         except (EOFError, OSError) as broken:
             raise WorkerDied(self._how_it_ended()) from broken
+        if lost:
+            self._process.join()
+            raise WorkerDied(error)
         if error is not None:
             raise RuntimeError(error)
         return answer
@@ -167,12 +169,16 @@ def _serve(pipe: connection.Connection, prepare: Prepare | None) -> None:
     while True:
         try:
             function, job = pipe.recv()
-            answer, error = function(job), None
+            answer, error, lost = function(job), None, False
         except EOFError:
             return
+        except DeviceLost as failed:
+            answer, error, lost = None, str(failed), True
         except Exception as wrong:  # a job whose classes cannot be imported here
-            answer, error = None, f"{type(wrong).__name__}: {wrong}"
-        pipe.send((answer, error))
+            answer, error, lost = None, f"{type(wrong).__name__}: {wrong}", False
+        pipe.send((answer, error, lost))
+        if lost:
+            return
 
 
 def _end_with_parent() -> None:

@@ -1,4 +1,4 @@
-"""Owns the check for the device that a run asks for."""
+"""Owns checks of the device that a run asks for: whether the machine has it, and whether it still takes work."""
 
 from __future__ import annotations
 
@@ -18,3 +18,12 @@ def check_device(name: str) -> str:
     if name not in known:
         raise bad_value("device", name, f"this machine has {', '.join(known)}")
     return name
+
+
+def answers(name: str) -> bool:
+    """Whether a device takes work: after a fault in a kernel or in the driver a GPU refuses all that a process asks."""
+    try:
+        wp.zeros(1, dtype=wp.int32, device=name).numpy()
+    except Exception:
+        return False
+    return True
