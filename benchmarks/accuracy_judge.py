@@ -55,7 +55,8 @@ def judged(
             }
         )
     tried = {number: [*bound(row, math.inf), cost(row, device)] for number, row in measured.items()}
-    limits = {"truth": [limit.value for limit in truth], "left": [limit.left for limit in truth]}
+    left = bound_errors([limit.left for limit in truth], family.no_limit)
+    limits = {"truth": [limit.value for limit in truth], "left": list(left.values())}
     return {"scene": family.scene, "parameters": values, **limits, "runs": rows, "tried": tried}
 
 
@@ -205,15 +206,15 @@ def _row(scene: Mapping[str, Any], run: Row) -> str:
     name = f"`{scene['scene']}` {own}" + (f", on {scene['device']}" if "device" in scene else "")
     if "refused" in run:
         return f"| {name} | {run['asked']:.0%} | refused: {run['refused']} | | | | | |"
-    pairs = zip(BOUND, run["errors"], strict=True)
-    errors = [_percent(error, run["estimate"][figure]) for figure, error in pairs]
+    figures = zip(BOUND, run["errors"], scene["left"], strict=True)
+    errors = [_percent(error, run["estimate"][name], left, run["asked"]) for name, error, left in figures]
     cheapest = run["cheapest"][0]
     beside = f"{run['cost'] / cheapest:.2f}" if cheapest else "none within"
     cells = [name, f"{run['asked']:.0%}", *errors, f"{run['elements']:,}", f"{run['deciding']:.0%}", beside]
     return f"| {' | '.join(cells)} |"
 
 
-def _percent(error: float | None, estimate: float | None) -> str:
+def _percent(error: float | None, estimate: float | None, left: float | None, asked: float) -> str:
     if error is None:
-        return "none"
+        return "none" if told(left, asked) else f"limit to {100.0 * (left or 0.0):.1f} %"
     return f"{100.0 * error:+.1f} %" + (f" (est. {100.0 * estimate:.1f} %)" if estimate is not None else "")

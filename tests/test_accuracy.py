@@ -14,12 +14,12 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.accuracy import store
-from warp_mca.accuracy.choice import LEAST, REGRET, Choice, best, choices
+from warp_mca.accuracy.choice import LEAST, WORTH, Choice, best, choices
 from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
 from warp_mca.accuracy.plan import Plan, carried_out, planned
-from warp_mca.accuracy.prediction import CORE, HIGH, LOW, NOISE, Expected, gaussian_process
+from warp_mca.accuracy.prediction import HIGH, LOW, NOISE, Expected, gaussian_process
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
@@ -115,13 +115,11 @@ def offer(chance: float, cost: float) -> Choice:
     return Choice(variant=Variant(), number=0, errors={"impulse": Expected(0.0, spread)}, cost=cost)
 
 
-def test_more_than_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
-    cheap = offer(0.75, 1.0)
-    least = 0.75 + REGRET * 0.75  # which makes up for what the cheap one would have done as well
+def test_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
+    cheap, dear = offer(0.75, 1.0), offer(0.75 + 0.9 * WORTH, 2.0)
     assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
-    assert best([cheap, offer(least - 0.01, 2.1)], 0.01) is cheap
-    for dear in (offer(least + 0.01, 2.1), offer(0.76, 1.9)):
-        assert best([cheap, dear], 0.01) is dear
+    assert best([cheap, dear], 0.01) is cheap
+    assert best([cheap, offer(0.75 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
     assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
     assert replace(dear, errors={**dear.errors, "F_n_first_peak": None}).chance(0.01) == 0.0
@@ -133,9 +131,9 @@ def test_nothing_is_chosen_where_no_variant_is_accurate_enough(known: store.Fami
 
 
 def test_estimates_are_those_most_probably_right():
-    """About no mean, d/de [Phi(e / LOW s) - Phi(e / HIGH s)] = 0 has a closed form; s is CORE of the spread."""
+    """About no mean, d/de [Phi(e / LOW s) - Phi(e / HIGH s)] = 0 has a closed form."""
     c = math.sqrt(2.0 * math.log(HIGH / LOW) / (LOW**-2 - HIGH**-2))
-    assert Expected(0.0, 0.01).estimate(0.0) == pytest.approx(0.01 * CORE * c, rel=0.02)
+    assert Expected(0.0, 0.01).estimate(0.0) == pytest.approx(0.01 * c, rel=0.02)
     mean = Expected(0.04, 0.001).estimate(0.0)
     assert LOW * 0.043 < mean < HIGH * 0.037  # sure to be right
     assert mean == pytest.approx(0.04, rel=0.02)

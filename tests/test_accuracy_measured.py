@@ -168,3 +168,5 @@ def test_the_page_shows_what_was_measured():
     shown = render(page, data)
     assert "| `rod_on_wall` v=1.5 | 5% | none | +3.6 % (est. 4.0 %) | +0.0 % |" in shown
     assert render(shown, data) == shown
+    data["scenes"][0]["left"][1:], data["scenes"][0]["runs"][0]["errors"][1:] = [0.07, None], [None, None]
+    assert "| 5% | none | limit to 7.0 % | none |" in render(page, data)

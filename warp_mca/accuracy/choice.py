@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
 
 from warp_mca.accuracy.prediction import Expected, expected_errors, is_close
 from warp_mca.accuracy.request import Accuracy
@@ -13,9 +12,9 @@ from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
 from warp_mca.runs.rate_groups import StepCost
 
-# Measured with scenes of the store that are left out in turn (docs/accuracy.md):
-LEAST = 0.5  # probability that all errors are within what was asked, below which a variant is not chosen [-]
-REGRET = 0.2  # what it counts that a variant of less than half the cost would have done as well [-]
+# Probabilities that all errors of a choice are within what was asked, from measured scenes that are left out in turn:
+LEAST = 0.7  # below this none is made [-]
+WORTH = 0.2  # what twice the cost must add [-]
 
 
 @dataclass(frozen=True)
@@ -64,26 +63,9 @@ def choices(
 
 
 def best(found: Sequence[Choice], share: float) -> Choice | None:
-    """The choice whose errors are within a share most probably, less what it would be a pity to have paid for it.
-
-    Args:
-        found: choices, from the cheapest on.
-        share: that is asked for [-].
-
-    Returns:
-        None where none is probable enough.
-    """
-    chances = [item.chance(share) for item in found]
-    likely = [k for k, chance in enumerate(chances) if chance >= LEAST]
-    if not likely:
-        return None
-
-    def none_would_do(k: int) -> float:
-        """Probability that no variant of less than half the cost of one is within the share [-]."""
-        halves = takewhile(lambda pair: 2.0 * pair[0].cost < found[k].cost, zip(found, chances, strict=True))
-        return math.prod(1.0 - chance for _, chance in halves)
-
-    return found[max(likely, key=lambda k: chances[k] + REGRET * none_would_do(k))]
+    """The choice whose errors are within a share most probably, for its cost; None where that is hardly probable."""
+    likely = [item for item in found if item.chance(share) >= LEAST]
+    return max(likely, key=lambda item: item.chance(share) - WORTH * math.log2(item.cost), default=None)
 
 
 def keeps(variant: Variant, asked: Accuracy) -> bool:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +25,10 @@ Array = NDArray[np.float64]
 
 NOISE = 2e-3  # least noise of the limits [-]
 INTERVAL = 5e-3  # the same of durations, which are known to the output interval [-]
-DEVIATION = 0.3  # standard deviation of a limit over what may be left of it at most [-]
+DEVIATION = 0.4  # standard deviation of a limit over what may be left of it at most [-]
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
 NEAR = 0.02  # distance from the median within which it is none [-]
-CORE = 0.8  # spread of most errors over the standard deviation of all, which a few large ones widen [-]
 FEWEST = 4  # scenes from which anything is foreseen
 LOW, HIGH = 0.5, 3.0  # estimates over true errors between which they are right [-]
 SMALL = 0.2  # of what was asked: errors below it need not be told apart [-]
@@ -59,12 +58,11 @@ class Expected:
 
     def estimate(self, small: float) -> float:
         """The size that is most probably right [-]: LOW to HIGH times the true one, or both of them below `small`."""
-        most = replace(self, spread=CORE * self.spread)
 
         def right(size: float) -> float:
             if size < small:
-                return most.within(max(size / LOW, small))
-            return most.within(size / LOW) - most.within(size / HIGH)
+                return self.within(max(size / LOW, small))
+            return self.within(size / LOW) - self.within(size / HIGH)
 
         return max(SIZES, key=lambda size: (right(size), -abs(math.log(size / self.size))))
 
