@@ -5,12 +5,13 @@ python -m benchmarks.accuracy learn --device cuda:0 --families two_link --add 1 
 python -m benchmarks.accuracy learn --device cuda:0 --families two_link --lacking --workers 10 --deadline 300
 python -m benchmarks.accuracy validate --device cuda:0 --scenes 20 --workers 10 --deadline 350
 python -m benchmarks.accuracy render
+python -m benchmarks.accuracy fit
 
 `learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store,
 with `--add` beside the scenes that it has, which are not run again (seeds of other scenes); with `--lacking` it runs
 these with variants that they lack. `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with
 references, and writes docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into
-docs/accuracy.md.
+docs/accuracy.md; `fit` repeats the part of `learn` that runs nothing.
 """
 
 from __future__ import annotations
@@ -42,14 +43,15 @@ from benchmarks.accuracy_measure import (
     stored,
     truth_of,
 )
-from warp_mca.accuracy.store import OWN
+from warp_mca.accuracy.prediction import processes_of
+from warp_mca.accuracy.store import OWN, family_from
 from warp_mca.runs.sweep_job import check_device_after
 
 ROOT = Path(__file__).resolve().parents[1]
 JSON = ROOT / "docs" / "accuracy.json"
 PAGE = ROOT / "docs" / "accuracy.md"
 ASKED = (0.02, 0.05)
-LEARN, HELD_OUT = 1, 14  # seeds: choices are never tried on scenes that they were learnt from
+LEARN, HELD_OUT = 1, 15  # seeds: choices are never tried on scenes that they were learnt from
 LEARNING = 0.45  # share of the time of `both` that is spent on the store
 GALLERY = 6  # scenes of each other family to learn from; one of each is tried
 
@@ -57,7 +59,7 @@ GALLERY = 6  # scenes of each other family to learn from; one of each is tried
 def main() -> None:
     """Carry out the command."""
     parser = argparse.ArgumentParser(description="Measure the choices of --accuracy.")
-    parser.add_argument("command", choices=("learn", "validate", "both", "render"))
+    parser.add_argument("command", choices=("learn", "validate", "both", "render", "fit"))
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--scenes", type=int, default=20, help="of two_link")
     parser.add_argument("--gallery", type=int, help="scenes of each other family (default: 6 to learn from, 1 to try)")
@@ -77,6 +79,9 @@ def main() -> None:
         data["left_out"] = [left_out(name, item) for name, item in known.items()]
         JSON.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
         PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), data))
+        return
+    if args.command == "fit":
+        fit(args.output or OWN, json.loads((args.output or OWN).read_text(encoding="utf-8"))["families"])
         return
     until = time.monotonic() + args.deadline
     wanted = args.families.split(",") if args.families else [family.scene for family in FAMILIES]
@@ -114,7 +119,20 @@ def learn(args: argparse.Namespace, families: list[Family], until: float) -> Non
     for item in measured(args, families, before, until):
         found = item
         target.write_text(json.dumps({"families": {**before, **found}}) + "\n", encoding="utf-8")
+    fit(target, list(found))
     print({name: len(item["scenes"]) for name, item in found.items()})
+
+
+def fit(target: Path, names: Iterable[str]) -> None:
+    """Keep in a store what its scenes tell as a whole, so that no run has to find it out."""
+    known = json.loads(target.read_text(encoding="utf-8"))["families"]
+    for name in names:
+        family = family_from(name, {key: value for key, value in known[name].items() if key != "processes"})
+        known[name]["processes"] = {
+            figure: [None if item is None else [round(item.length, 4), round(item.core, 3)] for item in items]
+            for figure, items in processes_of(family).items()
+        }
+    target.write_text(json.dumps({"families": known}) + "\n", encoding="utf-8")
 
 
 def _sampled(

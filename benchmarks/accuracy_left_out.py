@@ -98,6 +98,6 @@ def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _trial(family: Family, k: int) -> Trial:
     left = family.scenes[k]
-    others = replace(family, scenes=family.scenes[:k] + family.scenes[k + 1 :])
+    others = replace(family, scenes=family.scenes[:k] + family.scenes[k + 1 :], processes={})  # fitted without it
     bound = [name for name in BOUND if name not in family.no_limit]
     return Trial(choices(others, left.parameters, Accuracy(share=FINE), bound, COSTS["H100"], False), left)

@@ -14,12 +14,22 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.accuracy import store
-from warp_mca.accuracy.choice import LEAST, WORTH, Choice, best, choices
+from warp_mca.accuracy.choice import LEAST, REGRET, WORTH, Choice, best, choices
 from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import LEVELS, run_pilots
 from warp_mca.accuracy.plan import Plan, carried_out, planned
-from warp_mca.accuracy.prediction import HIGH, LOW, NOISE, Expected, gaussian_process
+from warp_mca.accuracy.prediction import (
+    CORES,
+    HIGH,
+    LOW,
+    MANY,
+    NOISE,
+    Expected,
+    fitted,
+    gaussian_process,
+    processes_of,
+)
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
@@ -41,10 +51,11 @@ def test_a_process_keeps_to_what_was_measured_and_knows_nothing_far_away():
     points = np.linspace(-2.0, 2.0, 9)[:, None]
     errors = 0.03 * np.sin(points[:, 0])
     noise = np.full(len(points), NOISE)
-    between = gaussian_process(points, errors, np.array([0.25]), noise)
+    process = fitted(points, errors, noise)
+    between = gaussian_process(points, errors, np.array([0.25]), noise, process)
     assert between.mean == pytest.approx(0.03 * math.sin(0.25), abs=2.0 * NOISE)
     assert between.spread < 2.0 * NOISE
-    far = gaussian_process(points, errors, np.array([100.0]), noise)
+    far = gaussian_process(points, errors, np.array([100.0]), noise, process)
     assert far.mean == pytest.approx(errors.mean(), abs=1e-6)
     assert far.spread == pytest.approx(math.hypot(errors.std(), math.sqrt(2.0) * NOISE), rel=1e-3)
 
@@ -52,9 +63,33 @@ def test_a_process_keeps_to_what_was_measured_and_knows_nothing_far_away():
 def test_a_scene_whose_limits_are_not_sure_tells_less():
     points = np.linspace(-2.0, 2.0, 9)[:, None]
     errors, noise = np.where(points[:, 0] == 0.0, 0.05, 0.0), np.full(len(points), NOISE)
-    sure = gaussian_process(points, errors, np.zeros(1), noise)
+    sure = gaussian_process(points, errors, np.zeros(1), noise, fitted(points, errors, noise))
     noise[4] = 0.1
-    assert abs(gaussian_process(points, errors, np.zeros(1), noise).mean) < 0.5 * sure.mean
+    unsure = gaussian_process(points, errors, np.zeros(1), noise, fitted(points, errors, noise))
+    assert abs(unsure.mean) < 0.5 * sure.mean
+
+
+def test_a_few_large_errors_do_not_widen_estimates():
+    """Of scenes far apart, e_i / s are the errors as they are left out, with s^2 = mean(e^2) and twice the noise."""
+    rng = np.random.default_rng(2)
+    points, errors = 1e3 * rng.normal(size=(200, 3)), 0.01 * rng.normal(size=200)
+    errors[::10] = 0.04 * np.sign(errors[::10])
+    process = fitted(points, errors, np.full(200, NOISE))
+    about = errors - errors.mean()
+    spread = math.sqrt(np.mean(about**2) + 2.0 * NOISE**2)
+    assert process.core == pytest.approx(1.4826 * np.median(np.abs(about)) / spread, rel=1e-6)
+    assert CORES[0] < process.core < 0.8
+    wide = Expected(0.0, spread, process.core)
+    assert wide.estimate(0.0) == Expected(0.0, process.core * spread).estimate(0.0)
+    assert wide.within(0.02) == Expected(0.0, spread).within(0.02)  # the choice counts the large ones
+    assert fitted(points[: MANY - 1], errors[: MANY - 1], np.full(MANY - 1, NOISE)).core == 1.0
+
+
+def test_what_is_kept_with_a_store_foresees_the_same(known: store.Family):
+    kept = replace(known, processes={name: tuple(items) for name, items in processes_of(known).items()})
+    assert kept.processes["contact_duration"] == (None,) * len(REFINES)
+    asked = Accuracy(share=0.05), BOUND[:2], COSTS["cpu"], True
+    assert choices(kept, {"v": 1.5}, *asked) == choices(known, {"v": 1.5}, *asked)
 
 
 @pytest.fixture
@@ -115,11 +150,16 @@ def offer(chance: float, cost: float) -> Choice:
     return Choice(variant=Variant(), number=0, errors={"impulse": Expected(0.0, spread)}, cost=cost)
 
 
-def test_twice_the_cost_must_add_to_the_probability_of_errors_within_the_bound():
-    cheap, dear = offer(0.75, 1.0), offer(0.75 + 0.9 * WORTH, 2.0)
+def test_more_cost_must_add_to_the_probability_of_errors_within_the_bound():
+    cheap, least = offer(0.75, 1.0), 0.75 + WORTH
     assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
-    assert best([cheap, dear], 0.01) is cheap
-    assert best([cheap, offer(0.75 + 1.1 * WORTH, 2.0)], 0.01) is not cheap
+    assert best([cheap, offer(least - 0.01, 2.0)], 0.01) is cheap
+    dear = offer(least + 0.01, 2.0)
+    assert best([cheap, dear], 0.01) is dear
+    # More than twice the cost has to make up for what the cheap one would have done as well.
+    most = 0.75 + WORTH * math.log2(2.1) + 0.75 * REGRET
+    assert best([cheap, offer(most - 0.01, 2.1)], 0.01) is cheap
+    assert best([cheap, offer(most + 0.01, 2.1)], 0.01) is not cheap
     assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
     assert replace(dear, errors={**dear.errors, "F_n_first_peak": None}).chance(0.01) == 0.0

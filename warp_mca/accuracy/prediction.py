@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.accuracy.store import Family
+from warp_mca.accuracy.figures import BOUND
+from warp_mca.accuracy.store import Family, Process
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,9 @@ DEVIATION = 0.4  # standard deviation of a limit over what may be left of it at 
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
 NEAR = 0.02  # distance from the median within which it is none [-]
+NORMAL = 1.4826  # standard deviation of a normal distribution over the median distance from its mean
+CORES = (0.5, 1.2)  # least and greatest `Process.core` [-]
+MANY = 20  # scenes from which a median tells it
 FEWEST = 4  # scenes from which anything is foreseen
 LOW, HIGH = 0.5, 3.0  # estimates over true errors between which they are right [-]
 SMALL = 0.2  # of what was asked: errors below it need not be told apart [-]
@@ -42,10 +46,12 @@ class Expected:
     Attributes:
         mean: signed [-].
         spread: standard deviation [-].
+        core: as in `Process` [-].
     """
 
     mean: float
     spread: float
+    core: float = 1.0
 
     @property
     def size(self) -> float:
@@ -58,11 +64,12 @@ class Expected:
 
     def estimate(self, small: float) -> float:
         """The size that is most probably right [-]: LOW to HIGH times the true one, or both of them below `small`."""
+        most = replace(self, spread=self.core * self.spread)
 
         def right(size: float) -> float:
             if size < small:
-                return self.within(max(size / LOW, small))
-            return self.within(size / LOW) - self.within(size / HIGH)
+                return most.within(max(size / LOW, small))
+            return most.within(size / LOW) - most.within(size / HIGH)
 
         return max(SIZES, key=lambda size: (right(size), -abs(math.log(size / self.size))))
 
@@ -96,20 +103,39 @@ def _scale(points: Array) -> Array:
     return np.maximum(points.std(axis=0), 1e-12 + 1e-3 * np.abs(points).max(axis=0))
 
 
+def processes_of(family: Family) -> dict[str, list[Process | None]]:
+    """`Family.processes` of the scenes that a family has, to be kept with them."""
+    return {name: [_process(family, number, name) for number in range(len(family.variants))] for name in BOUND}
+
+
+def _process(family: Family, variant: int, figure: str) -> Process | None:
+    found = _measured(family, variant, figure)
+    return None if found is None else fitted(*found)
+
+
 def _expected(family: Family, parameters: Mapping[str, object], variant: int, figure: str) -> Expected | None:
+    found = _measured(family, variant, figure)
+    if found is None:
+        return None
+    points, errors, noise = found
+    process = family.processes[figure][variant] if figure in family.processes else None
+    here = np.array(family.coordinates(parameters)) / _scale(family.points)
+    return gaussian_process(points, errors, here, noise, process or fitted(points, errors, noise))
+
+
+def _measured(family: Family, variant: int, figure: str) -> tuple[Array, Array, Array] | None:
+    """Scaled features of the scenes that have a figure of a variant, its errors and their noise; None if too few do."""
     errors = [(scene.errors.get(variant) or {}).get(figure) for scene in family.scenes]
     known = [k for k, error in enumerate(errors) if error is not None]
     if len(known) < FEWEST:
         return None
-    points, here = family.points[known], np.array(family.coordinates(parameters))
-    scale = _scale(points)
     least = INTERVAL if figure == "contact_duration" else NOISE
     left = [family.scenes[k].left.get(figure) or 0.0 for k in known]
-    noise = np.maximum(least, DEVIATION * np.array(left))
-    return gaussian_process(points / scale, np.array([errors[k] for k in known]), here / scale, noise)
+    points = family.points[known] / _scale(family.points)
+    return points, np.array([errors[k] for k in known]), np.maximum(least, DEVIATION * np.array(left))
 
 
-def gaussian_process(points: Array, errors: Array, here: Array, noise: Array) -> Expected:
+def gaussian_process(points: Array, errors: Array, here: Array, noise: Array, process: Process) -> Expected:
     """What values at scaled points tell of another point.
 
     Args:
@@ -117,25 +143,51 @@ def gaussian_process(points: Array, errors: Array, here: Array, noise: Array) ->
         errors: measured there [-], shape (count,).
         here: features of the scene in question [-], shape (feature_count,).
         noise: standard deviations of the errors [-], shape (count,).
+        process: as `fitted` to these.
     """
+    about, middle, variance = _about(errors, noise)
+    K = _covariance(_squares(points), variance, process.length, noise)
+    k = variance * np.exp(-((points - here) ** 2).sum(axis=1) / (2.0 * process.length**2))
+    weights = np.linalg.solve(K, k)
+    left = max(variance - float(k @ weights), 0.0) + float(np.median(noise)) ** 2
+    return Expected(middle + float(weights @ about), math.sqrt(left), process.core)
+
+
+def fitted(points: Array, errors: Array, noise: Array) -> Process:
+    """The length under which each scene is foreseen best from the others, and how far most are off then.
+
+    Left out, scene i is off by (K^-1 e)_i / (K^-1)_ii, with the variance 1 / (K^-1)_ii (Rasmussen and Williams, 5.12).
+    Arguments are those of `gaussian_process`.
+    """
+    about, _, variance = _about(errors, noise)
+    squares = _squares(points)
+    lengths = [scale * math.sqrt(points.shape[1]) for scale in LENGTHS]
+    inverses = {length: _inverse(_covariance(squares, variance, length, noise)) for length in lengths}
+    length = max(lengths, key=lambda item: _likelihood(inverses[item], about))
+    if len(about) < MANY:
+        return Process(length, 1.0)
+    off = np.abs(inverses[length] @ about) / np.sqrt(np.diag(inverses[length]))
+    return Process(length, float(np.clip(NORMAL * np.median(off), *CORES)))
+
+
+def _about(errors: Array, noise: Array) -> tuple[Array, float, float]:
+    """Errors about their mean, outliers moved inwards, the mean, and the variance that is taken for them."""
     errors = _without_outliers(errors)
     middle = float(np.mean(errors))
     about = errors - middle
-    variance = float(np.mean(about**2) + np.min(noise) ** 2)
-    squares = ((points[:, None] - points[None]) ** 2).sum(axis=2)
-    lengths = [scale * math.sqrt(points.shape[1]) for scale in LENGTHS]
-    length = max(lengths, key=lambda item: _likelihood(_covariance(squares, variance, item, noise), about))
-    K = _covariance(squares, variance, length, noise)
-    k = variance * np.exp(-((points - here) ** 2).sum(axis=1) / (2.0 * length**2))
-    weights = np.linalg.solve(K, k)
-    left = max(variance - float(k @ weights), 0.0) + float(np.median(noise)) ** 2
-    return Expected(middle + float(weights @ about), math.sqrt(left))
+    return about, middle, float(np.mean(about**2) + np.min(noise) ** 2)
+
+
+def _squares(points: Array) -> Array:
+    """Squared distances of points from each other [-], shape (count, count)."""
+    own = (points**2).sum(axis=1)
+    return np.maximum(own[:, None] + own - 2.0 * points @ points.T, 0.0)
 
 
 def _without_outliers(errors: Array) -> Array:
     """Errors; those far off, where another peak was taken for the first, say, are moved to the edge of the others."""
     middle = float(np.median(errors))
-    reach = max(FAR * 1.4826 * float(np.median(np.abs(errors - middle))), NEAR)  # 1.4826: of a normal distribution
+    reach = max(FAR * NORMAL * float(np.median(np.abs(errors - middle))), NEAR)
     return np.clip(errors, middle - reach, middle + reach)
 
 
@@ -143,8 +195,11 @@ def _covariance(squares: Array, variance: float, length: float, noise: Array) ->
     return variance * np.exp(-squares / (2.0 * length**2)) + np.diag(noise**2)
 
 
-def _likelihood(covariance: Array, about: Array) -> float:
+def _inverse(matrix: Array) -> Array:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+
+
+def _likelihood(inverse: Array, about: Array) -> float:
     """Logarithm of the probability of each value, given all others, summed up (Rasmussen and Williams, 5.10)."""
-    inverse = np.linalg.inv(covariance)
     own = 1.0 / np.diag(inverse)
     return float(-0.5 * (np.log(own) + (inverse @ about) ** 2 * own).sum())
