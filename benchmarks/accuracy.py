@@ -76,7 +76,7 @@ def main() -> None:
     if args.command == "render":
         data = json.loads(JSON.read_text(encoding="utf-8"))
         known = json.loads(OWN.read_text(encoding="utf-8"))["families"]
-        data["left_out"] = [left_out(name, item) for name, item in known.items()]
+        data["left_out"] = [entry for name, item in known.items() for entry in left_out(name, item)]
         JSON.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
         PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), data))
         return

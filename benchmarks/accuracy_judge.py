@@ -16,6 +16,8 @@ from warp_mca.accuracy.store import Size, families
 from warp_mca.runs.rate_groups import COSTS, StepCost
 
 START, END = "<!-- accuracy: measured -->", "<!-- accuracy: end -->"  # around what is rendered
+# Counts of `accuracy_left_out`, each with what it is out of.
+COUNTS = (("chosen", "cases"), ("within", "chosen"), ("twice", "chosen"), ("right", "estimates"), ("cheap", "beside"))
 MARGIN = 1.5  # costs by the store, means over its scenes, over those of the run [-]
 
 
@@ -174,7 +176,7 @@ def _lines(data: Mapping[str, Any]) -> list[str]:
 def _left_out(families: Iterable[Mapping[str, Any]]) -> list[str]:
     """Table of choices for the scenes of the store, each foreseen from the others."""
     head = (
-        "family",
+        "family, costs of",
         "scenes",
         "chosen from the store",
         "within",
@@ -186,18 +188,20 @@ def _left_out(families: Iterable[Mapping[str, Any]]) -> list[str]:
     )
     lines = ["", "Each scene of the store, left out and foreseen from the others, at 2 % and 5 %:", ""]
     lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    for item in families:
-        pairs = [
-            ("chosen", "cases"),
-            ("within", "chosen"),
-            ("twice", "chosen"),
-            ("right", "estimates"),
-            ("cheap", "beside"),
-        ]
-        met = [f"{item[part]} of {item[whole]}" for part, whole in pairs]
-        costs = ["" if item[key] is None else f"{item[key]:.2f}" for key in ("median", "ratio")]
-        lines.append(f"| `{item['family']}` | {item['scenes']} | {' | '.join([*met, *costs])} |")
+    known = list(families)
+    for device in dict.fromkeys(item["device"] for item in known):
+        own = [item for item in known if item["device"] == device]
+        counts = {key: sum(item[key] for item in own) for pair in COUNTS for key in pair}
+        whole = {"scenes": sum(item["scenes"] for item in own), "median": None, "ratio": None, **counts}
+        lines += [_left_out_row(f"`{item['family']}`, {device}", item) for item in own]
+        lines.append(_left_out_row(f"all, {device}", whole))
     return lines
+
+
+def _left_out_row(name: str, item: Mapping[str, Any]) -> str:
+    met = [f"{item[part]} of {item[whole]}" for part, whole in COUNTS]
+    costs = ["" if item[key] is None else f"{item[key]:.2f}" for key in ("median", "ratio")]
+    return f"| {name} | {item['scenes']} | {' | '.join([*met, *costs])} |"
 
 
 def _row(scene: Mapping[str, Any], run: Row) -> str:

@@ -8,7 +8,7 @@ from statistics import fmean, median
 from typing import Any
 
 from benchmarks.accuracy_judge import right, told
-from warp_mca.accuracy.choice import Choice, best, choices
+from warp_mca.accuracy.choice import Choice, best, choices, cost_of
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.prediction import SMALL
 from warp_mca.accuracy.request import Accuracy
@@ -16,6 +16,7 @@ from warp_mca.accuracy.store import Family, Measured, family_from
 from warp_mca.runs.rate_groups import COSTS
 
 COARSE, FINE = 0.05, 0.02  # shares that are asked for
+DEVICES = ("H100", "cpu")  # whose costs choices are made by
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,12 @@ class Trial:
 
     found: Sequence[Choice]
     scene: Measured
+
+    def on(self, device: str, family: Family) -> Trial:
+        """The same with what steps cost on a device."""
+        costs = [cost_of(family.sizes[item.number], COSTS[device], device == "cpu") for item in self.found]
+        found = [replace(item, cost=cost) for item, cost in zip(self.found, costs, strict=True)]
+        return replace(self, found=sorted(found, key=lambda item: item.cost))
 
     def chosen(self, asked: float) -> Choice | None:
         """The variant that a run would take; None if none will do, or no figure of it is bound."""
@@ -61,8 +68,10 @@ class Trial:
         return [abs(error) for error in self._true(choice, asked).values()]
 
 
-def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
-    """How good choices of 2 % and 5 % are for each scene of a family of the store: numbers of cases.
+def left_out(name: str, data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """How good choices of 2 % and 5 % are for each scene of a family of the store, by what steps cost on each device.
+
+    Numbers of cases:
 
     `chosen` of `cases` found a variant; of these `within` what was asked, and `twice`, within twice that; `right` of
     `estimates`; `cheap` cost at most twice the cheapest variant within, where there is one (`beside`). `median` is the
@@ -70,6 +79,13 @@ def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
     """
     family = family_from(name, data)
     trials = [_trial(family, k) for k in range(len(family.scenes))]
+    return [
+        {"family": name, "device": word, **_counts([trial.on(word, family) for trial in trials])} for word in DEVICES
+    ]
+
+
+def _counts(trials: Sequence[Trial]) -> dict[str, Any]:
+    """As `left_out`, of one device."""
     pairs = [(trial, asked, trial.chosen(asked)) for trial in trials for asked in (FINE, COARSE)]
     made = [(trial, asked, choice) for trial, asked, choice in pairs if choice is not None]
     shares = [trial.worst(choice, asked) / asked for trial, asked, choice in made]
@@ -81,7 +97,6 @@ def left_out(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
         if fine and coarse
     ]
     return {
-        "family": name,
         "scenes": len(trials),
         "cases": len(pairs),
         "chosen": len(made),
@@ -100,4 +115,4 @@ def _trial(family: Family, k: int) -> Trial:
     left = family.scenes[k]
     others = replace(family, scenes=family.scenes[:k] + family.scenes[k + 1 :], processes={})  # fitted without it
     bound = [name for name in BOUND if name not in family.no_limit]
-    return Trial(choices(others, left.parameters, Accuracy(share=FINE), bound, COSTS["H100"], False), left)
+    return Trial(choices(others, left.parameters, Accuracy(share=FINE), bound, COSTS[DEVICES[0]], False), left)

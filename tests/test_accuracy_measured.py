@@ -131,9 +131,11 @@ def test_what_is_stored_can_be_chosen_from():
         [0.1 / (item.refine or 1.0) for item in ROD.variants], abs=1e-5
     )
     json.dumps(data)
-    found = left_out("rod_on_wall", data)
-    assert found["chosen"] == found["within"] == found["beside"] == 5
-    assert found["right"] == found["estimates"] == 10
+    entries = left_out("rod_on_wall", data)
+    assert [item["device"] for item in entries] == ["H100", "cpu"]
+    for found in entries:
+        assert found["chosen"] == found["within"] == found["beside"] == 5
+        assert found["right"] == found["estimates"] == 10
 
 
 def test_variants_that_scenes_lack_are_added_to_the_store():
@@ -165,7 +167,13 @@ def test_the_page_shows_what_was_measured():
         "device": "it",
         "scenes": [judged(ROD, {"v": 1.5}, TABLE, LIMITS, [run(2.8, 0.05, 0.04)], "cpu")],
     }
+    counts = dict.fromkeys(("scenes", "cases", "chosen", "within", "twice", "right", "estimates", "cheap", "beside"), 3)
+    data["left_out"] = [
+        {"family": name, "device": "cpu", **counts, "median": 1.5, "ratio": 0.4} for name in ("one", "other")
+    ]
     shown = render(page, data)
+    assert f"| `other`, cpu | 3 |{' 3 of 3 |' * 5} 1.50 | 0.40 |" in shown
+    assert f"| all, cpu | 6 |{' 6 of 6 |' * 5}  |  |" in shown
     assert "| `rod_on_wall` v=1.5 | 5% | none | +3.6 % (est. 4.0 %) | +0.0 % |" in shown
     assert render(shown, data) == shown
     data["scenes"][0]["left"][1:], data["scenes"][0]["runs"][0]["errors"][1:] = [0.07, None], [None, None]
