@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean, median
@@ -38,8 +39,9 @@ class Trial:
         return choice if choice is not None and self._sizes(choice, asked) else None
 
     def dearer(self, choice: Choice, asked: float) -> float | None:
-        """Cost of a choice over that of the cheapest variant within what is asked; None if none is."""
-        within = [item for item in self._tried() if self._sizes(item, asked) and self.worst(item, asked) <= asked]
+        """Cost of a choice over that of the cheapest variant within, as in `accuracy_judge`; None if none is."""
+        sizes = [(item, self._sizes(item, math.inf)) for item in self._tried()]
+        within = [item for item, errors in sizes if errors and max(errors) <= asked]
         return choice.cost / within[0].cost if within else None
 
     def worst(self, choice: Choice, asked: float) -> float:

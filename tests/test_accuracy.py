@@ -151,18 +151,22 @@ def offer(chance: float, cost: float) -> Choice:
 
 
 def test_more_cost_must_add_to_the_probability_of_errors_within_the_bound():
-    cheap, least = offer(0.75, 1.0), 0.75 + WORTH
-    assert cheap.chance(0.01) == pytest.approx(0.75, rel=1e-12)
-    assert best([cheap, offer(least - 0.01, 2.0)], 0.01) is cheap
-    dear = offer(least + 0.01, 2.0)
+    cheap, least = offer(LEAST, 1.0), LEAST + WORTH * math.log2(1.9)
+    assert cheap.chance(0.01) == pytest.approx(LEAST, rel=1e-12)
+    cheap = offer(LEAST + 1e-6, 1.0)
+    assert best([cheap, offer(least - 0.01, 1.9)], 0.01) is cheap
+    dear = offer(least + 0.01, 1.9)
     assert best([cheap, dear], 0.01) is dear
-    # More than twice the cost has to make up for what the cheap one would have done as well.
-    most = 0.75 + WORTH * math.log2(2.1) + 0.75 * REGRET
-    assert best([cheap, offer(most - 0.01, 2.1)], 0.01) is cheap
-    assert best([cheap, offer(most + 0.01, 2.1)], 0.01) is not cheap
     assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
     assert replace(dear, errors={**dear.errors, "F_n_first_peak": None}).chance(0.01) == 0.0
+
+
+def test_more_than_twice_the_cost_must_make_up_for_what_a_cheaper_one_would_have_done():
+    doubtful, middle = offer(0.4, 1.0), offer(LEAST + 0.01, 1.5)
+    least = LEAST + 0.01 + 0.4 * REGRET + WORTH * math.log2(2.1 / 1.5)
+    assert best([doubtful, middle, offer(least - 0.01, 2.1)], 0.01) is middle
+    assert best([doubtful, middle, offer(least + 0.01, 2.1)], 0.01) is not middle
 
 
 def test_nothing_is_chosen_where_no_variant_is_accurate_enough(known: store.Family):
