@@ -18,6 +18,7 @@ import warp_mca as mca
 from benchmarks.accuracy_families import FAMILIES, Family, Values
 from warp_mca.accuracy.convergence import STEADY, Limit, limit_of
 from warp_mca.accuracy.figures import BOUND, figures_of
+from warp_mca.accuracy.plan import lighter
 from warp_mca.accuracy.prediction import INTERVAL
 from warp_mca.accuracy.variant import Variant
 from warp_mca.runs.sweep_job import check_device_after
@@ -124,6 +125,10 @@ def _alone(scene: mca.Scene, variant: Variant, options: Mapping[str, Any]) -> mc
     try:
         return mca.run(scene, **{**options, **variant.options})
     except mca.McaError as error:
+        less = lighter(variant, error) if isinstance(error, mca.RequestError) else None
+        if less is not None:  # as runs with an accuracy do
+            impact = replace(scene.impact, mass_scaling=less.mass_scaling)
+            return _alone(replace(scene, impact=impact), less, options)
         print(f"left out: {scene.name}: {error}", flush=True)
         return None
 

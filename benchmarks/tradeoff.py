@@ -21,9 +21,9 @@ TEMPLATE = DOCS / "tradeoff.template.md"
 # Sections of the page in this order: name of the stored file, heading, command.
 CASES = (
     (
-        "h200",
-        "`two_link`, `standard`, on an H200",
-        "warp-mca tradeoff two_link --preset standard --device cuda:0 --budget 200 --out DIR",
+        "h100",
+        "`two_link`, `standard`, on an H100",
+        "warp-mca tradeoff two_link --preset standard --device cuda:0 --budget 150 --out DIR",
     ),
     (
         "quick",
@@ -54,7 +54,7 @@ CASES = (
 )
 
 NOTES = {
-    "h200": "The hinges are two pairs of nodes, which yield as under point loads: the finer the mesh, the slower "
+    "h100": "The hinges are two pairs of nodes, which yield as under point loads: the finer the mesh, the slower "
     "impulse and duration settle, and their limits are as uncertain as is written above. `--accuracy` binds neither "
     "behind such hinges; with `joint_nodes=pin` both have a limit.",
     "coarse": "Cells of this size resolve neither tip nor hinges: what is left of the first peak says so (on 977,616 "

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from warp_mca.runs.sweep_job import DeviceLost
 
 SCENE = '''
 """A block falls on a rough plane."""
@@ -61,3 +66,27 @@ TIMED = {"wall", "element_steps_per_s", "threads"}  # columns that differ from r
 def figures(rows: Iterable[Mapping[str, object]]) -> list[dict[str, str]]:
     """The rows without what clocks and cores decide, each value by the digits that give its bits."""
     return [{name: repr(value) for name, value in row.items() if name not in TIMED} for row in rows]
+
+
+@dataclass(frozen=True)
+class Losing:
+    """A job whose device takes no more work the first time; then it tells its process."""
+
+    flag: Path
+    device: str = "cpu"
+
+    def on(self, device: str) -> Losing:
+        """The same job on a device."""
+        return replace(self, device=device)
+
+
+def lose_device(job: Losing) -> tuple[str, int]:
+    """Device and number of the process.
+
+    Raises:
+        DeviceLost: `flag` does not exist; then it has the number of the process.
+    """
+    if not job.flag.exists():
+        job.flag.write_text(str(os.getpid()))
+        raise DeviceLost(f"{job.device} takes no more work of its process (a fault)")
+    return job.device, os.getpid()

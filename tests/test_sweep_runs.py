@@ -15,15 +15,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeping import SCENE, figures
+from sweeping import SCENE, Losing, figures, lose_device
 
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.runs.sweep import TRIES
-from warp_mca.runs.sweep_job import Job
+from warp_mca.runs.sweep_job import DeviceLost, Job, check_device_after
 from warp_mca.runs.sweep_job import figures as summary_figures
 from warp_mca.runs.sweep_plan import FULL, Plan, RunOptions, batches, differing
 from warp_mca.runs.sweep_table import read_rows
+from warp_mca.runs.sweep_workers import WorkerDied, Workers
 
 SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
 
@@ -268,3 +269,19 @@ def test_results_of_single_runs_are_not_overwritten(here: Path, capsys: pytest.C
     assert main(["sweep", "block.py", "--grid", "v=1,2", "--folders", "--out", "all"]) == 2
     assert "it holds results already" in capsys.readouterr().err
     assert not (here / "all/sweep.json").exists()
+
+
+def test_a_worker_whose_device_takes_no_more_work_is_replaced(tmp_path: Path):
+    with Workers(["cpu"]) as pool:
+        job = Losing(flag=tmp_path / "lost")
+        with pytest.raises(WorkerDied, match="cpu takes no more work"):
+            pool.submit(lose_device, job).result()
+        device, process = pool.submit(lose_device, job).result()
+        assert device == "cpu"
+        assert process not in (os.getpid(), int(job.flag.read_text()))
+
+
+def test_a_device_that_answers_is_not_lost():
+    check_device_after(ValueError("of the run"), "cpu")
+    with pytest.raises(DeviceLost, match=r"cuda:99 takes no more work .* \(a fault\)"):
+        check_device_after(ValueError("a fault"), "cuda:99")

@@ -172,12 +172,19 @@ def carried_out(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -
 
 def _lighter(plan: Plan, error: RequestError) -> Plan | None:
     """The plan with less mass, if too much is what was refused."""
-    asked = plan.variant.mass_scaling
-    if asked is None or "mass_scaling" in plan.asked.typed or not str(error).startswith("ImpactPhase.mass_scaling"):
+    variant = None if "mass_scaling" in plan.asked.typed else lighter(plan.variant, error)
+    if variant is None:
         return None
-    less = MODEST if isinstance(asked, float | int) and asked > MODEST else None
-    scene = replace(plan.scene, impact=replace(plan.scene.impact, mass_scaling=less))
-    return replace(plan, variant=replace(plan.variant, mass_scaling=less), scene=scene)
+    scene = replace(plan.scene, impact=replace(plan.scene.impact, mass_scaling=variant.mass_scaling))
+    return replace(plan, variant=variant, scene=scene)
+
+
+def lighter(variant: Variant, error: RequestError) -> Variant | None:
+    """The variant with less mass, if too much is what was refused."""
+    asked = variant.mass_scaling
+    if asked is None or not str(error).startswith("ImpactPhase.mass_scaling"):
+        return None
+    return replace(variant, mass_scaling=MODEST if isinstance(asked, float | int) and asked > MODEST else None)
 
 
 def _check(scene: Scene, asked: Accuracy, finished_meshes: bool) -> None:
