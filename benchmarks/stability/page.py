@@ -33,6 +33,14 @@ WORDS = (
     ("times shorter than half of the", "slivers", "few small elements set the time step"),
     ("faces of the slave", "coarse slave", "the slave's faces are wider than the master's"),
     ("took slender rods", "slender", "the swing took slender rods, as the paper does: momentum changes at hand-off"),
+    (
+        "nearly opened between",
+        "nearly open",
+        "a contact nearly opened between two compressions: compare with a finer mesh",
+    ),
+    ("went into each other", "into each other", "bodies went into each other where no contact keeps them apart"),
+    ("counts in millimetres", "units", "size, mass and step are those of a file in other units: give `scale`"),
+    ("across the axis", "across", "friction acts across the axis of `F_t_N`: read the vectors of forces.npz"),
     ("went over to a face", "edge", "nodes went over to another face around a sharp edge"),
 )
 
