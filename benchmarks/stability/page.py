@@ -41,6 +41,16 @@ WORDS = (
     ("went into each other", "into each other", "bodies went into each other where no contact keeps them apart"),
     ("counts in millimetres", "units", "size, mass and step are those of a file in other units: give `scale`"),
     ("across the axis", "across", "friction acts across the axis of `F_t_N`: read the vectors of forces.npz"),
+    (
+        "excite its cells (flutter)",
+        "flutter",
+        "friction makes the cells under the tip vibrate: a lower `penalty` lessens it",
+    ),
+    (
+        "a moment of inertia of its nodes",
+        "inertia",
+        "a rigid body turns with more inertia than its shape has: more cells",
+    ),
     ("went over to a face", "edge", "nodes went over to another face around a sharp edge"),
 )
 
