@@ -333,7 +333,8 @@ def completed(family: Family, before: Mapping[str, Any], tables: Mapping[int, Ta
         truth = [Limit(value) for value in item["truth"]]
         runs |= {number: _run(family, number, row, truth) for number, row in tables.get(k, {}).items()}
         scenes.append({**item, "runs": [runs[number] for number in sorted(runs)]})
-    return {**before, "variants": variants, "scenes": scenes}
+    kept = {key: value for key, value in before.items() if key != "processes"}  # fitted to fewer runs
+    return {**kept, "variants": variants, "scenes": scenes}
 
 
 def added(before: Mapping[str, Any] | None, found: Mapping[str, Any]) -> dict[str, Any]:

@@ -92,6 +92,15 @@ def test_what_is_kept_with_a_store_foresees_the_same(known: store.Family):
     assert choices(kept, {"v": 1.5}, *asked) == choices(known, {"v": 1.5}, *asked)
 
 
+def test_what_is_kept_must_be_that_of_all_variants(known: store.Family):
+    (file,) = store.user_folder().glob("*.json")
+    data = json.loads(file.read_text())
+    data["families"]["rod_on_wall"]["processes"] = {"impulse": [[1.0, 1.0]]}
+    file.write_text(json.dumps(data))
+    with pytest.raises(mca.RequestError, match=r"mine\.json.*correct or remove it"):
+        store.families()
+
+
 @pytest.fixture
 def known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> store.Family:
     """A family of `rod_on_wall` in the user's folder, with errors of 4 % v / R^2."""

@@ -146,6 +146,7 @@ def test_variants_that_scenes_lack_are_added_to_the_store():
     new = set(range(7, len(ROD.variants)))
     assert {(job.variant, job.scenes) for job in jobs} == {(number, (k,)) for number in new for k in range(3)}
     rows = {k: {number: TABLE[number] for number in new} for k in range(3)}
+    before["processes"] = {"impulse": [None] * 7}  # of fewer variants
     assert completed(ROD, before, rows) == stored(ROD, scenes, dict.fromkeys(range(3), TABLE))
     assert completed(ROD, before, {})["scenes"] == before["scenes"]
 

@@ -189,7 +189,7 @@ def family_from(name: str, data: Mapping[str, Any]) -> Family:
         sizes=_sizes(len(variants), data["scenes"]),
         scenes=scenes,
         processes={
-            figure: tuple(None if item is None else Process(*item) for item in items)
+            figure: tuple(None if item is None else Process(*item) for item, _ in zip(items, variants, strict=True))
             for figure, items in data.get("processes", {}).items()
         },
     )

@@ -30,7 +30,7 @@ def start_warnings(
         given = 0.5 * float((model.mass * (model.V**2).sum(axis=1)).sum())
     held = " and ".join([*(f"joint {joint.name}" for joint in scene.joints), *(tie.title for tie in scene.ties)])
     # what nodes are driven to is not what they were given
-    # from rest, kinetic energy at the first record is that of half a step before and after: below 0 by rounding or load
+    # of bodies let go at rest under a load, the first kinetic energy (v half a step before times v after) is below 0
     if held and given > 0.0 and not len(model.prescribed_node) and given - kinetic > LOST * given:
         yield (
             f"{given - kinetic:.3g} J of the {given:.3g} J of kinetic energy that bodies were given are lost at the "
