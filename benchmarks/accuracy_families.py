@@ -43,6 +43,7 @@ class Family:
         between: number of a variant whose mesh lies between these two.
         order: of the extrapolation [-].
         sample: parameters of a random scene.
+        exact: limits in closed form, None where a figure has none, for the parameters of a scene; None without any.
     """
 
     scene: str
@@ -57,6 +58,7 @@ class Family:
     between: int
     order: float
     sample: Callable[[random.Random], Values]
+    exact: Callable[[Values], tuple[float | None, ...]] | None = None
 
     def base(self) -> Values:
         """Values of the mesh parameters that variants start from: those of the scene's first preset."""
@@ -145,6 +147,17 @@ BETWEEN = (0.6, 0.85, 1.2, 1.7, 2.4)
 FLAT = (_plain(0.5, 1.0), *(_plain(refine, 3.0) for refine in (*REFINES, *BETWEEN)))
 # With more cells along rods than across them.
 FLAT += tuple(_axial(refine, axial, 3.0, None) for refine, axial in ALONG)
+
+
+def _coaxial(values: Values) -> tuple[float | None, ...]:
+    """Impulse [N s] and duration [s] of rods of equal section: all momentum of the short one, two transits of its wave.
+
+    Without Poisson effect waves are one-dimensional (Goldsmith, Impact, 2.2).
+    """
+    known = {**load_source("coaxial_rods").resolve(None), **values}
+    mass = known["rho"] * known["side"] ** 2 * known["length"]
+    return None, mass * known["v"], 2.0 * known["length"] / math.sqrt(known["E"] / known["rho"])
+
 
 FAMILIES = (
     Family(
@@ -283,7 +296,7 @@ FAMILIES = (
         mesh=("axial", "section"),
         fixed={},
         no_limit={"F_n_first_peak": PEAK_OF_FLAT_ENDS},
-        variants=FLAT,
+        variants=FLAT + tuple(_axial(1.0, axial, 3.0, None) for axial in (240, 360)),
         fine=_plain(4.0, 3.0),
         partner=4,
         between=6,
@@ -293,5 +306,6 @@ FAMILIES = (
             "length": _between(rng, 0.3, 0.8),
             "ratio": _between(rng, 1.5, 3.0),
         },
+        exact=_coaxial,
     ),
 )

@@ -27,8 +27,8 @@ def judged(
     """What came of the runs of one scene, and errors and cost of each variant that was measured in it.
 
     A reference that may be off by more than what was asked cannot tell whether a figure is within. The cheapest variant
-    is one with all figures within by the limits as they are known: without those that are not sure, luck in one figure
-    would do.
+    is one that has the figures of the run, all within by the limits as they are known: without those that are not sure,
+    or that it lacks, luck in one figure would do.
     """
 
     def bound(row: Row, asked: float) -> list[float | None]:
@@ -42,10 +42,12 @@ def judged(
             rows.append(dict(run))
             continue
         errors = bound(run, run["asked"])
+        needed = [k for k, error in enumerate(errors) if error is not None]
+        found = {number: bound(row, math.inf) for number, row in measured.items()} if needed else {}
         within = [
-            (cost(row, device), number)
-            for number, row in table.items()
-            if number != FINE and any(e is not None for e in errors) and _worst(bound(row, math.inf)) <= run["asked"]
+            (cost(measured[number], device), number)
+            for number, row in found.items()
+            if all(row[k] is not None for k in needed) and _worst(row) <= run["asked"]
         ]
         rows.append(
             {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean, median
 from typing import Any
@@ -36,17 +36,18 @@ class Trial:
     def chosen(self, asked: float) -> Choice | None:
         """The variant that a run would take; None if none will do, or no figure of it is bound."""
         choice = best(self._tried(), asked)
-        return choice if choice is not None and self._sizes(choice, asked) else None
+        return choice if choice is not None and self._true(choice, asked) else None
 
     def dearer(self, choice: Choice, asked: float) -> float | None:
         """Cost of a choice over that of the cheapest variant within, as in `accuracy_judge`; None if none is."""
-        sizes = [(item, self._sizes(item, math.inf)) for item in self._tried()]
-        within = [item for item, errors in sizes if errors and max(errors) <= asked]
+        needed = self._true(choice, asked).keys()
+        found = [(item, self._true(item, math.inf)) for item in self._tried()]
+        within = [item for item, errors in found if needed <= errors.keys() and _worst(errors.values()) <= asked]
         return choice.cost / within[0].cost if within else None
 
     def worst(self, choice: Choice, asked: float) -> float:
         """Greatest true error of a choice [-]."""
-        return max(self._sizes(choice, asked), default=0.0)
+        return _worst(self._true(choice, asked).values())
 
     def marks(self, choice: Choice, asked: float) -> list[bool]:
         """Whether its estimates are right, as in `accuracy_judge`."""
@@ -66,8 +67,9 @@ class Trial:
         pairs = [(name, errors[name]) for name in choice.errors if told(self.scene.left.get(name), asked)]
         return {name: error for name, error in pairs if error is not None}
 
-    def _sizes(self, choice: Choice, asked: float) -> list[float]:
-        return [abs(error) for error in self._true(choice, asked).values()]
+
+def _worst(errors: Iterable[float]) -> float:
+    return max(map(abs, errors), default=0.0)
 
 
 def left_out(name: str, data: Mapping[str, Any]) -> list[dict[str, Any]]:

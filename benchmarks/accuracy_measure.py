@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, replace
-from itertools import groupby, zip_longest
+from itertools import cycle, groupby, zip_longest
 from typing import Any
 
 import warp_mca as mca
@@ -152,7 +152,8 @@ def jobs_of(
     for family, part in (item for found in rounds for item in found if item is not None):
         always = (family.partner, family.between)
         others = [number for number in range(len(family.variants)) if number not in always]
-        pieces = [(FINE, [k]) for k in part] + [(number, part) for number in always]
+        references = [(FINE, [k]) for k in part] if family.exact is None else []
+        pieces = references + [(number, part) for number in always]
         pieces += [(number, [k for k in part if wanted(family.scene, k, number)]) for number in others]
         known = scenes[family.scene]
         jobs += [
@@ -203,7 +204,8 @@ def attempted(job: Job) -> list[tuple[str, int, int, Row]]:
 def carried_out(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int, until: float) -> Iterator[Any]:
     """Answers to jobs, which have `on(device)`, `device` and `name`, as they come.
 
-    Until all are there or the clock (`time.monotonic`) says `until`. A job whose worker dies is tried once more.
+    Until all are there or the clock (`time.monotonic`) says `until`. A job whose worker dies is tried once more. The
+    workers share out the devices of the jobs, which have commas between them.
     """
     if workers < 2:
         for job in jobs:
@@ -211,7 +213,8 @@ def carried_out(function: Callable[[Any], Any], jobs: Sequence[Any], workers: in
                 return
             yield function(job)
         return
-    with Workers([jobs[0].device] * workers) as pool:
+    devices = jobs[0].device.split(",") if jobs else []
+    with Workers([device for device, _ in zip(cycle(devices), range(workers))]) as pool:
         running = {pool.submit(function, job): job for job in jobs}
         again = set()
         while running:
@@ -229,13 +232,15 @@ def carried_out(function: Callable[[Any], Any], jobs: Sequence[Any], workers: in
                         running[pool.submit(function, job)] = job
 
 
-def truth_of(family: Family, table: Table) -> list[Limit] | None:
-    """Limits of the figures, extrapolated from the reference and its partner; None without one of the two.
+def truth_of(family: Family, values: Values, table: Table) -> list[Limit] | None:
+    """Limits of the figures of a scene, extrapolated from the reference and its partner; None without one of the two.
 
     f0 = f + (f - f_c) h^p / (h_c^p - h^p) with the order p of the family. Figures whose differences from mesh to mesh
     grow, by the mesh between, have no limit, nor, without that mesh, those that move by more than STEADY. What may be
-    left is that of the three meshes, or all that two of them differ by.
+    left is that of the three meshes, or all that two of them differ by. Limits in closed form need none of it.
     """
+    if family.exact is not None:
+        return [Limit(value, None if value is None else 0.0) for value in family.exact(values)] if table else None
     if FINE not in table or family.partner not in table:
         return None
     rows = [table[number] for number in (family.partner, family.between, FINE) if number in table]
@@ -279,7 +284,7 @@ def stored(family: Family, scenes: Sequence[Values], tables: Mapping[int, Table]
     entries = []
     for k, values in enumerate(scenes):
         table = tables.get(k, {})
-        truth = truth_of(family, table)
+        truth = truth_of(family, values, table)
         if truth is None:
             continue
         runs = [_run(family, number, row, truth) for number, row in sorted(table.items()) if number != FINE]

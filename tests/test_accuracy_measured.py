@@ -19,8 +19,10 @@ from benchmarks.accuracy_measure import (
     FINE,
     added,
     completed,
+    errors_of,
     jobs_of,
     lacking,
+    row_of,
     sampled,
     stored,
     truth_of,
@@ -55,12 +57,29 @@ def run(refine: float, asked: float, estimate: float, deciding: float = 0.1) -> 
 
 
 def test_references_are_extrapolated_with_the_order_of_the_family():
-    truth = truth_of(ROD, TABLE)
+    truth = truth_of(ROD, {}, TABLE)
     assert truth is not None
     assert truth[0].value is None
     assert [limit.value for limit in truth[1:]] == pytest.approx([2.0, 1e-3], rel=1e-12)
-    assert truth_of(ROD, {0: row(0.5)}) is None
-    assert truth_of(ROD, {FINE: row(5.0)}) is None
+    assert truth_of(ROD, {}, {0: row(0.5)}) is None
+    assert truth_of(ROD, {}, {FINE: row(5.0)}) is None
+
+
+def test_families_with_limits_in_closed_form_need_no_reference():
+    coaxial = FAMILY["coaxial_rods"]
+    values = {"v": 2.0, "length": 0.5, "ratio": 2.0}
+    truth = truth_of(coaxial, values, {0: row(0.5)})
+    assert truth is not None
+    assert truth[0].value is None
+    assert [limit.value for limit in truth[1:]] == pytest.approx([7800.0 * 1.6e-3, (7800.0 / 200e9) ** 0.5], rel=1e-12)
+    assert [limit.left for limit in truth[1:]] == [0.0, 0.0]
+    assert truth_of(coaxial, values, {}) is None
+    jobs = jobs_of([coaxial], {"coaxial_rods": [values]}, "cpu", 1.0)
+    assert {job.variant for job in jobs} == set(range(len(coaxial.variants)))
+    rods = mca.run(mca.make_scene("coaxial_rods", **values), refine=0.7, device="cpu")
+    _, impulse, duration = errors_of(coaxial, row_of(rods, None), truth)
+    assert impulse == pytest.approx(0.015, abs=0.01)
+    assert duration == pytest.approx(0.07, abs=0.03)
 
 
 def test_figures_whose_differences_grow_from_mesh_to_mesh_have_no_limit():
@@ -69,7 +88,7 @@ def test_figures_whose_differences_grow_from_mesh_to_mesh_have_no_limit():
         return rows if between is None else {**rows, ROD.between: row(2.8, between - 0.1 / 2.8)}
 
     def impulse(found: dict[int, dict[str, Any]]) -> float | None:
-        truth = truth_of(ROD, found)
+        truth = truth_of(ROD, {}, found)
         assert truth is not None
         assert truth[2].value == pytest.approx(1e-3)
         return truth[1].value
