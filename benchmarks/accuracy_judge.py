@@ -18,7 +18,7 @@ from warp_mca.runs.rate_groups import COSTS, StepCost
 START, END = "<!-- accuracy: measured -->", "<!-- accuracy: end -->"  # around what is rendered
 # Counts of `accuracy_left_out`, each with what it is out of.
 COUNTS = (("chosen", "cases"), ("within", "chosen"), ("twice", "chosen"), ("right", "estimates"), ("cheap", "beside"))
-MARGIN = 1.5  # costs by the store, means over its scenes, over those of the run [-]
+MARGIN = 1.5  # of costs by the store, means over its scenes, over those of one scene [-]
 
 
 def judged(
@@ -35,33 +35,29 @@ def judged(
         errors = bound_errors(errors_of(family, row, truth), family.no_limit).values()
         return [error if told(limit.left, asked) else None for error, limit in zip(errors, truth, strict=True)]
 
-    measured = {number: row for number, row in table.items() if number != FINE}
-    rows = []
-    for run in sorted(runs, key=lambda item: item["asked"]):
-        if "refused" in run:
-            rows.append(dict(run))
-            continue
-        errors = bound(run, run["asked"])
-        needed = [k for k, error in enumerate(errors) if error is not None]
-        found = {number: bound(row, math.inf) for number, row in measured.items()} if needed else {}
-        within = [
-            (cost(measured[number], device), number)
-            for number, row in found.items()
-            if all(row[k] is not None for k in needed) and _worst(row) <= run["asked"]
-        ]
-        rows.append(
-            {
-                **run,
-                "errors": errors,
-                "worst": _worst(errors),
-                "cost": cost(run, device),
-                "cheapest": min(within, default=(None, None)),
-            }
-        )
-    tried = {number: [*bound(row, math.inf), cost(row, device)] for number, row in measured.items()}
+    tried = {number: [*bound(row, math.inf), cost(row, device)] for number, row in table.items() if number != FINE}
+    rows = [
+        run if "refused" in run else _judged(run, bound(run, run["asked"]), cost(run, device), tried)
+        for run in sorted(runs, key=lambda item: item["asked"])
+    ]
     left = bound_errors([limit.left for limit in truth], family.no_limit)
     limits = {"truth": [limit.value for limit in truth], "left": list(left.values())}
     return {"scene": family.scene, "parameters": values, **limits, "runs": rows, "tried": tried}
+
+
+def _judged(run: Row, errors: list[float | None], own: float, tried: Mapping[int, list[Any]]) -> Row:
+    """A run with its errors, its cost and the cheapest variant within: cost and number, None where none is.
+
+    Variants have the errors of the figures and the cost.
+    """
+    needed = [k for k, error in enumerate(errors) if error is not None]
+    within = [
+        (row[-1], number)
+        for number, row in tried.items()
+        if needed and all(row[k] is not None for k in needed) and _worst(row[:-1]) <= run["asked"]
+    ]
+    best = min(within, default=(None, None))
+    return {**run, "errors": errors, "worst": _worst(errors), "cost": own, "cheapest": best}
 
 
 def is_judged(errors: Iterable[float | None]) -> bool:
@@ -82,22 +78,26 @@ def cost(row: Row, device: str) -> float:
 
 
 def no_dearer(runs: Iterable[Row], device: str) -> Callable[[str, int, int], bool]:
-    """Whether a variant may be the cheapest one within: by the store, it costs no more than the dearest run chosen.
+    """Whether a variant may be the cheapest one within: by the store, it costs no more than the dearest one chosen.
 
-    Of a family that is not in the store, and of a scene without runs, any may be.
+    Of a family that is not in the store, and of a scene for which something else was chosen, any may be.
     """
     known, most = families(), dict[tuple[str, int], float]()
-    for run in runs:
-        if "refused" not in run:
-            place = run["scene"], run["number"]
-            most[place] = max(most.get(place, 0.0), cost(run, device))
     word, cpu = ("cpu", True) if device == "cpu" else ("H100", False)
+    costs = {name: [cost_of(size, COSTS[word], cpu) for size in family.sizes] for name, family in known.items()}
+    for run in runs:
+        if "refused" not in run and run["scene"] in known:
+            place, chosen = (run["scene"], run["number"]), run["chosen"]
+            same = [
+                own
+                for own, variant in zip(costs[run["scene"]], known[run["scene"]].variants, strict=True)
+                if all(chosen.get(key) == value for key, value in variant.knobs.items() if key != "multi_rate")
+            ]
+            most[place] = max(most.get(place, 0.0), same[0] if same else math.inf)
 
     def wanted(family: str, scene: int, variant: int) -> bool:
-        sizes = known[family].sizes if family in known else ()
-        if variant >= len(sizes) or (family, scene) not in most:
-            return True
-        return cost_of(sizes[variant], COSTS[word], cpu) <= MARGIN * most[family, scene]
+        own = costs.get(family, [])
+        return variant >= len(own) or own[variant] <= MARGIN * most.get((family, scene), math.inf)
 
     return wanted
 

@@ -160,11 +160,11 @@ def offer(chance: float, cost: float) -> Choice:
 
 
 def test_more_cost_must_add_to_the_probability_of_errors_within_the_bound():
-    cheap, least = offer(LEAST, 1.0), LEAST + WORTH * math.log2(1.9)
+    cheap, least = offer(LEAST, 1.0), LEAST + WORTH * math.log2(1.3)
     assert cheap.chance(0.01) == pytest.approx(LEAST, rel=1e-12)
     cheap = offer(LEAST + 1e-6, 1.0)
-    assert best([cheap, offer(least - 0.01, 1.9)], 0.01) is cheap
-    dear = offer(least + 0.01, 1.9)
+    assert best([cheap, offer(least - 0.01, 1.3)], 0.01) is cheap
+    dear = offer(least + 0.01, 1.3)
     assert best([cheap, dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0), dear], 0.01) is dear
     assert best([offer(0.9 * LEAST, 1.0)], 0.01) is None
@@ -172,8 +172,8 @@ def test_more_cost_must_add_to_the_probability_of_errors_within_the_bound():
 
 
 def test_more_than_twice_the_cost_must_make_up_for_what_a_cheaper_one_would_have_done():
-    doubtful, middle = offer(0.4, 1.0), offer(LEAST + 0.01, 1.5)
-    least = LEAST + 0.01 + 0.4 * REGRET + WORTH * math.log2(2.1 / 1.5)
+    doubtful, middle = offer(0.2, 1.0), offer(LEAST + 0.01, 1.95)
+    least = LEAST + 0.01 + 0.2 * REGRET + WORTH * math.log2(2.1 / 1.95)
     assert best([doubtful, middle, offer(least - 0.01, 2.1)], 0.01) is middle
     assert best([doubtful, middle, offer(least + 0.01, 2.1)], 0.01) is not middle
 

@@ -12,7 +12,7 @@ import pytest
 import warp_mca as mca
 from benchmarks.accuracy import JSON, PAGE
 from benchmarks.accuracy_families import FAMILIES
-from benchmarks.accuracy_judge import cost_ratio, counts, judged, render
+from benchmarks.accuracy_judge import MARGIN, cost_ratio, counts, judged, no_dearer, render
 from benchmarks.accuracy_left_out import left_out
 from benchmarks.accuracy_measure import (
     FAMILY,
@@ -28,8 +28,11 @@ from benchmarks.accuracy_measure import (
     truth_of,
     variant_of,
 )
+from warp_mca.accuracy.choice import cost_of
 from warp_mca.accuracy.convergence import Limit
+from warp_mca.accuracy.store import families
 from warp_mca.geometry.refinement import refined
+from warp_mca.runs.rate_groups import COSTS
 
 ROD = FAMILY["rod_on_wall"]  # extrapolated with order 1, its first peak has no limit
 
@@ -114,6 +117,22 @@ def test_choices_are_judged_by_true_errors_estimates_and_cost():
     assert unsure["runs"][0]["errors"] == [None, None, None]  # the reference may be off by more than what was asked
     assert list(counts({"scenes": [unsure]}).values()) == [(0, 0)] * 5
     assert cost_ratio({"scenes": [other]}) > 1.0  # pyright: ignore[reportOptionalOperand]
+
+
+def test_variants_that_may_be_cheaper_than_those_chosen_are_measured():
+    family = families()["rod_on_wall"]
+    chosen = [
+        {"scene": "rod_on_wall", "number": 0, "chosen": {**family.variants[k].knobs, "precision": "mixed"}}
+        for k in (1, 4)
+    ]
+    wanted = no_dearer(chosen, "cpu")
+    costs = [cost_of(size, COSTS["cpu"], True) for size in family.sizes]
+    dearer = [k for k, own in enumerate(costs) if own > MARGIN * costs[4]]
+    assert 0 < len(dearer) < len(costs)
+    assert [k for k in range(len(costs)) if not wanted("rod_on_wall", 0, k)] == dearer
+    assert all(wanted("rod_on_wall", 1, k) for k in range(len(costs)))
+    other = no_dearer([{**chosen[0], "chosen": {"refine": 9.0}}], "cpu")
+    assert all(other("rod_on_wall", 0, k) for k in range(len(costs)))
 
 
 def test_scenes_of_all_families_are_measured_in_turn_references_and_what_they_need_first():
