@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, replace
-from itertools import cycle, groupby, zip_longest
+from itertools import groupby, zip_longest
 from typing import Any
 
 import warp_mca as mca
@@ -207,14 +207,14 @@ def carried_out(function: Callable[[Any], Any], jobs: Sequence[Any], workers: in
     Until all are there or the clock (`time.monotonic`) says `until`. A job whose worker dies is tried once more. The
     workers share out the devices of the jobs, which have commas between them.
     """
-    if workers < 2:
+    if workers < 2 or not jobs:
         for job in jobs:
             if time.monotonic() > until:
                 return
             yield function(job)
         return
-    devices = jobs[0].device.split(",") if jobs else []
-    with Workers([device for device, _ in zip(cycle(devices), range(workers))]) as pool:
+    devices = jobs[0].device.split(",")
+    with Workers([devices[k % len(devices)] for k in range(workers)]) as pool:
         running = {pool.submit(function, job): job for job in jobs}
         again = set()
         while running:

@@ -419,6 +419,20 @@ def test_a_model_that_is_too_large_is_refused(capsys: pytest.CaptureFixture[str]
     assert "memory" in refused(capsys, "run", "landing.py")
 
 
+def test_a_gpu_that_fails_is_told_in_one_sentence(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    reasons = ["a defect of the program", "Graph launch error: Warp CUDA error 719: unspecified launch failure"]
+
+    def run(*args: object, **options: object) -> None:
+        raise RuntimeError(reasons.pop())
+
+    monkeypatch.setattr(mca, "run", run)
+    assert cli.main(["run", "landing.py"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "the GPU failed (Graph launch error: Warp CUDA error 719" in line
+    with pytest.raises(RuntimeError, match="a defect"):
+        cli.main(["run", "landing.py"])
+
+
 def shell(command: str, **environment: str) -> tuple[int, str]:
     """Exit status and standard error of a shell command, in which `mca` is the program."""
     program = f'mca() {{ {sys.executable} -m warp_mca "$@"; }}; '
