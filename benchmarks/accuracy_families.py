@@ -27,6 +27,26 @@ SPANS = (0.3e-3, 0.6e-3, 1.0e-3, 1.6e-3, 2.1e-3)  # simulated [s]: scenes of equ
 
 
 @dataclass(frozen=True, kw_only=True)
+class Reference:
+    """From which runs of a scene the limits of its figures are extrapolated.
+
+    Attributes:
+        fine: variant of the finest mesh.
+        partner: number of the variant with which it is extrapolated.
+        between: number of a variant whose mesh lies between these two.
+        order: of the extrapolation [-].
+    """
+
+    fine: Variant
+    partner: int
+    between: int
+    order: float
+
+
+ClosedForm = Callable[[Values], tuple[float | None, ...]]  # limits of the figures of a scene, None where one has none
+
+
+@dataclass(frozen=True, kw_only=True)
 class Family:
     """Scenes of one kind.
 
@@ -38,12 +58,8 @@ class Family:
         fixed: parameters of all scenes that are measured.
         no_limit: figures that have no limit, with the reason.
         variants: from which to choose.
-        fine: variant of the reference.
-        partner: number of the variant with which the reference is extrapolated.
-        between: number of a variant whose mesh lies between these two.
-        order: of the extrapolation [-].
+        limits: how they are found.
         sample: parameters of a random scene.
-        exact: limits in closed form, None where a figure has none, for the parameters of a scene; None without any.
     """
 
     scene: str
@@ -53,12 +69,8 @@ class Family:
     fixed: Mapping[str, Any]
     no_limit: Mapping[str, str]
     variants: tuple[Variant, ...]
-    fine: Variant
-    partner: int
-    between: int
-    order: float
+    limits: Reference | ClosedForm
     sample: Callable[[random.Random], Values]
-    exact: Callable[[Values], tuple[float | None, ...]] | None = None
 
     def base(self) -> Values:
         """Values of the mesh parameters that variants start from: those of the scene's first preset."""
@@ -208,10 +220,7 @@ FAMILIES = (
             _links(4 / 3, 42, 2.0, 2.6, finer=1.25),
             _links(4 / 3, 42, 2.0, 2.6, finer=1.125),
         ),
-        fine=_links(3.0, 72, 3.0, None),
-        partner=10,
-        between=12,
-        order=2.0,
+        limits=Reference(fine=_links(3.0, 72, 3.0, None), partner=10, between=12, order=2.0),
         sample=_two_link,
     ),
     Family(
@@ -233,10 +242,7 @@ FAMILIES = (
             _axial(1.5, 42, 2.0, 2.2),
             _axial(2.0, 42, 2.0, 2.2),
         ),
-        fine=_axial(4.0, 72, 3.0, None),
-        partner=5,
-        between=6,
-        order=2.0,
+        limits=Reference(fine=_axial(4.0, 72, 3.0, None), partner=5, between=6, order=2.0),
         sample=lambda rng: {
             "mu": round(rng.uniform(0.1, 1.0), 3),
             "H": round(rng.uniform(0.12, 0.18), 4),
@@ -250,10 +256,7 @@ FAMILIES = (
         fixed={},
         no_limit={},
         variants=tuple(_plain(refine, 10.0) for refine in REFINES),
-        fine=_plain(4.0, 10.0),
-        partner=4,
-        between=5,
-        order=1.5,
+        limits=Reference(fine=_plain(4.0, 10.0), partner=4, between=5, order=1.5),
         sample=lambda rng: {
             "v": _between(rng, 0.5, 2.0),
             "E_ratio": _between(rng, 0.5, 2.0),
@@ -267,10 +270,7 @@ FAMILIES = (
         fixed={},
         no_limit={"F_n_first_peak": PEAK_OF_BOUNCES, "contact_duration": ROLLS_ON},
         variants=tuple(_plain(refine, 1.0) for refine in REFINES),
-        fine=_plain(4.0, 1.0),
-        partner=4,
-        between=5,
-        order=1.5,
+        limits=Reference(fine=_plain(4.0, 1.0), partner=4, between=5, order=1.5),
         sample=lambda rng: {"v": _between(rng, 7.0, 13.0), "mu": round(rng.uniform(0.2, 0.4), 3)},
     ),
     Family(
@@ -280,10 +280,7 @@ FAMILIES = (
         fixed={},
         no_limit={"F_n_first_peak": PEAK_OF_FLAT_ENDS},
         variants=FLAT,
-        fine=_plain(4.0, 3.0),
-        partner=4,
-        between=6,
-        order=1.0,
+        limits=Reference(fine=_plain(4.0, 3.0), partner=4, between=6, order=1.0),
         sample=lambda rng: {
             "v": _between(rng, 0.5, 4.0),
             "length": _between(rng, 1.2, 3.0),
@@ -297,15 +294,11 @@ FAMILIES = (
         fixed={},
         no_limit={"F_n_first_peak": PEAK_OF_FLAT_ENDS},
         variants=FLAT + tuple(_axial(1.0, axial, 3.0, None) for axial in (240, 360)),
-        fine=_plain(4.0, 3.0),
-        partner=4,
-        between=6,
-        order=1.0,
+        limits=_coaxial,
         sample=lambda rng: {
             "v": _between(rng, 1.0, 4.0),
             "length": _between(rng, 0.3, 0.8),
             "ratio": _between(rng, 1.5, 3.0),
         },
-        exact=_coaxial,
     ),
 )

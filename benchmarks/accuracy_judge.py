@@ -54,10 +54,10 @@ def _judged(run: Row, errors: list[float | None], own: float, tried: Mapping[int
     within = [
         (row[-1], number)
         for number, row in tried.items()
-        if needed and all(row[k] is not None for k in needed) and _worst(row[:-1]) <= run["asked"]
+        if needed and all(row[k] is not None for k in needed) and worst(row[:-1]) <= run["asked"]
     ]
     best = min(within, default=(None, None))
-    return {**run, "errors": errors, "worst": _worst(errors), "cost": own, "cheapest": best}
+    return {**run, "errors": errors, "worst": worst(errors), "cost": own, "cheapest": best}
 
 
 def is_judged(errors: Iterable[float | None]) -> bool:
@@ -88,12 +88,12 @@ def no_dearer(runs: Iterable[Row], device: str) -> Callable[[str, int, int], boo
     for run in runs:
         if "refused" not in run and run["scene"] in known:
             place, chosen = (run["scene"], run["number"]), run["chosen"]
-            same = [
+            same = (
                 own
                 for own, variant in zip(costs[run["scene"]], known[run["scene"]].variants, strict=True)
                 if all(chosen.get(key) == value for key, value in variant.knobs.items() if key != "multi_rate")
-            ]
-            most[place] = max(most.get(place, 0.0), same[0] if same else math.inf)
+            )
+            most[place] = max(most.get(place, 0.0), next(same, math.inf))
 
     def wanted(family: str, scene: int, variant: int) -> bool:
         own = costs.get(family, [])
@@ -102,7 +102,8 @@ def no_dearer(runs: Iterable[Row], device: str) -> Callable[[str, int, int], boo
     return wanted
 
 
-def _worst(errors: Iterable[float | None]) -> float:
+def worst(errors: Iterable[float | None]) -> float:
+    """Greatest size of the errors that are known [-]; 0 where none is."""
     return max((abs(error) for error in errors if error is not None), default=0.0)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean, median
 from typing import Any
 
-from benchmarks.accuracy_judge import right, told
+from benchmarks.accuracy_judge import right, told, worst
 from warp_mca.accuracy.choice import Choice, best, choices, cost_of
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.prediction import SMALL
@@ -42,12 +42,12 @@ class Trial:
         """Cost of a choice over that of the cheapest variant within, as in `accuracy_judge`; None if none is."""
         needed = self._true(choice, asked).keys()
         found = [(item, self._true(item, math.inf)) for item in self._tried()]
-        within = [item for item, errors in found if needed <= errors.keys() and _worst(errors.values()) <= asked]
+        within = [item for item, errors in found if needed <= errors.keys() and worst(errors.values()) <= asked]
         return choice.cost / within[0].cost if within else None
 
     def worst(self, choice: Choice, asked: float) -> float:
         """Greatest true error of a choice [-]."""
-        return _worst(self._true(choice, asked).values())
+        return worst(self._true(choice, asked).values())
 
     def marks(self, choice: Choice, asked: float) -> list[bool]:
         """Whether its estimates are right, as in `accuracy_judge`."""
@@ -66,10 +66,6 @@ class Trial:
         errors = self.scene.errors[choice.number]
         pairs = [(name, errors[name]) for name in choice.errors if told(self.scene.left.get(name), asked)]
         return {name: error for name, error in pairs if error is not None}
-
-
-def _worst(errors: Iterable[float]) -> float:
-    return max(map(abs, errors), default=0.0)
 
 
 def left_out(name: str, data: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from itertools import groupby, zip_longest
 from typing import Any
 
 import warp_mca as mca
-from benchmarks.accuracy_families import FAMILIES, Family, Values
+from benchmarks.accuracy_families import FAMILIES, Family, Reference, Values
 from warp_mca.accuracy.convergence import STEADY, Limit, limit_of
 from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.plan import lighter
@@ -66,12 +66,17 @@ class Job:
 
 def variant_of(family: Family, number: int, scale: float = 1.0) -> Variant:
     """A variant with all parameters of the mesh, as the store has them."""
-    found = family.fine if number == FINE else family.variants[number]
+    found = family.variants[number] if number != FINE else _reference(family).fine
     if number == FINE and scale != 1.0:
         assert found.refine is not None
         axial = {name: round(value / scale) for name, value in found.parameters.items() if name.startswith("axial")}
         found = replace(found, refine=found.refine * scale, parameters={**found.parameters, **axial})
     return replace(found, parameters={**family.base(), **found.parameters})
+
+
+def _reference(family: Family) -> Reference:
+    assert isinstance(family.limits, Reference), "limits in closed form need no runs"
+    return family.limits
 
 
 def sampled(family: Family, seed: int, count: int) -> list[Values]:
@@ -150,9 +155,10 @@ def jobs_of(
     rounds = zip_longest(*([(f, part) for part in _parts(f, scenes[f.scene], device)] for f in families))
     jobs = []
     for family, part in (item for found in rounds for item in found if item is not None):
-        always = (family.partner, family.between)
+        how = family.limits
+        always = (how.partner, how.between) if isinstance(how, Reference) else ()
         others = [number for number in range(len(family.variants)) if number not in always]
-        references = [(FINE, [k]) for k in part] if family.exact is None else []
+        references = [(FINE, [k]) for k in part if always]
         pieces = references + [(number, part) for number in always]
         pieces += [(number, [k for k in part if wanted(family.scene, k, number)]) for number in others]
         known = scenes[family.scene]
@@ -239,19 +245,21 @@ def truth_of(family: Family, values: Values, table: Table) -> list[Limit] | None
     grow, by the mesh between, have no limit, nor, without that mesh, those that move by more than STEADY. What may be
     left is that of the three meshes, or all that two of them differ by. Limits in closed form need none of it.
     """
-    if family.exact is not None:
-        return [Limit(value, None if value is None else 0.0) for value in family.exact(values)] if table else None
-    if FINE not in table or family.partner not in table:
+    how = family.limits
+    if not isinstance(how, Reference):
+        return [Limit(value, None if value is None else 0.0) for value in how(values)] if table else None
+    if FINE not in table or how.partner not in table:
         return None
-    rows = [table[number] for number in (family.partner, family.between, FINE) if number in table]
+    rows = [table[number] for number in (how.partner, how.between, FINE) if number in table]
     sizes = [1.0 / row["refine"] for row in rows]
     if sizes[0] <= 1.1 * sizes[-1]:
         return _so_far(family, table[FINE], [Limit(value) for value in table[FINE]["figures"]], Limit(None))
-    found = [extrapolated(family, sizes, values) for values in zip(*(row["figures"] for row in rows), strict=True)]
+    series = zip(*(row["figures"] for row in rows), strict=True)
+    found = [extrapolated(how.order, sizes, figures) for figures in series]
     return _so_far(family, table[FINE], found, Limit(None))
 
 
-def extrapolated(family: Family, sizes: Sequence[float], values: Sequence[float | None]) -> Limit:
+def extrapolated(order: float, sizes: Sequence[float], values: Sequence[float | None]) -> Limit:
     """The limit of a figure of two or three meshes, as in `truth_of`."""
     coarse, fine = values[0], values[-1]
     if not fine or coarse is None:
@@ -262,7 +270,7 @@ def extrapolated(family: Family, sizes: Sequence[float], values: Sequence[float 
     else:
         moved = abs(coarse / fine - 1.0)
         left = moved + INTERVAL if moved <= STEADY else None
-    factor = 1.0 / ((sizes[0] / sizes[-1]) ** family.order - 1.0)
+    factor = 1.0 / ((sizes[0] / sizes[-1]) ** order - 1.0)
     return Limit(None) if left is None else Limit(fine + factor * (fine - coarse), left)
 
 

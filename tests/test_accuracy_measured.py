@@ -11,7 +11,7 @@ import pytest
 
 import warp_mca as mca
 from benchmarks.accuracy import JSON, PAGE
-from benchmarks.accuracy_families import FAMILIES
+from benchmarks.accuracy_families import FAMILIES, Reference
 from benchmarks.accuracy_judge import MARGIN, cost_ratio, counts, judged, no_dearer, render
 from benchmarks.accuracy_left_out import left_out
 from benchmarks.accuracy_measure import (
@@ -34,7 +34,9 @@ from warp_mca.accuracy.store import families
 from warp_mca.geometry.refinement import refined
 from warp_mca.runs.rate_groups import COSTS
 
-ROD = FAMILY["rod_on_wall"]  # extrapolated with order 1, its first peak has no limit
+ROD = FAMILY["rod_on_wall"]  # its first peak has no limit
+HOW = ROD.limits
+assert isinstance(HOW, Reference) and HOW.order == 1.0
 
 
 def row(refine: float, error: float = 0.0, **more: Any) -> dict[str, Any]:
@@ -87,8 +89,8 @@ def test_families_with_limits_in_closed_form_need_no_reference():
 
 def test_figures_whose_differences_grow_from_mesh_to_mesh_have_no_limit():
     def table(coarse: float, between: float | None, ends: bool = True) -> dict[int, dict[str, Any]]:
-        rows = {ROD.partner: row(1.4, coarse - 0.1 / 1.4), FINE: row(4.0, -0.1 / 4.0, open=not ends)}
-        return rows if between is None else {**rows, ROD.between: row(2.8, between - 0.1 / 2.8)}
+        rows = {HOW.partner: row(1.4, coarse - 0.1 / 1.4), FINE: row(4.0, -0.1 / 4.0, open=not ends)}
+        return rows if between is None else {**rows, HOW.between: row(2.8, between - 0.1 / 2.8)}
 
     def impulse(found: dict[int, dict[str, Any]]) -> float | None:
         truth = truth_of(ROD, {}, found)
@@ -145,11 +147,11 @@ def test_scenes_of_all_families_are_measured_in_turn_references_and_what_they_ne
         measured = sorted((scene, job.variant) for job in own for scene in job.scenes)
         assert measured == [(k, n) for k in range(7) for n in range(FINE, len(family.variants))]
     alone = [job for job in jobs if job.family == "rod_on_wall"]
-    assert [job.variant for job in alone[:3]] == [FINE, rods.partner, rods.between]
+    assert [job.variant for job in alone[:3]] == [FINE, HOW.partner, HOW.between]
     assert {len({values["duration"] for values in job.values}) for job in jobs if job.family == "two_link"} == {1}
 
     few = jobs_of([rods], scenes, "cpu", 1.0, lambda family, scene, variant: scene == 3)
-    always = (FINE, rods.partner, rods.between)
+    always = (FINE, HOW.partner, HOW.between)
     assert sum(len(job.scenes) for job in few if job.variant not in always) == len(rods.variants) - 2
 
 
@@ -193,7 +195,8 @@ def test_variants_that_scenes_lack_are_added_to_the_store():
 def test_families_are_made_of_scenes_and_variants_that_exist(family: Any):
     values = {**family.fixed, **family.sample(random.Random(3))}
     scene = mca.make_scene(family.scene, **values)
-    for number in (FINE, 0, family.partner):
+    how = family.limits
+    for number in (0, FINE, how.partner, how.between) if isinstance(how, Reference) else (0,):
         made = variant_of(family, number).applied(scene)
         assert all(hasattr(refined(body.name, body.geometry, made.refine), "build") for body in made.bodies)
 

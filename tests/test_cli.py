@@ -255,6 +255,12 @@ def finished(**figures: object) -> mca.Result:
     [
         (mca.GuardError("the energy balance\nis off by 3 %"), 1, "balance is off by 3 %"),
         (KeyboardInterrupt(), 130, "interrupted before it was done"),
+        (MemoryError(), 2, "does not fit into this machine's memory"),
+        (
+            RuntimeError("Graph launch error: Warp CUDA error 719: failure"),
+            1,
+            "the GPU failed (Graph launch error: Warp",
+        ),
     ],
 )
 def test_exit_status_of_a_run_that_stops(
@@ -409,28 +415,6 @@ def test_a_name_that_is_too_long_is_refused(capsys: pytest.CaptureFixture[str], 
 
 def test_verify_looks_at_its_folder_first(capsys: pytest.CaptureFixture[str]):
     assert "out = 'landing.py'" in refused(capsys, "verify", "rod_on_wall", "--out", "landing.py")
-
-
-def test_a_model_that_is_too_large_is_refused(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
-    def run(*args: object, **options: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr(mca, "run", run)
-    assert "memory" in refused(capsys, "run", "landing.py")
-
-
-def test_a_gpu_that_fails_is_told_in_one_sentence(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
-    reasons = ["a defect of the program", "Graph launch error: Warp CUDA error 719: unspecified launch failure"]
-
-    def run(*args: object, **options: object) -> None:
-        raise RuntimeError(reasons.pop())
-
-    monkeypatch.setattr(mca, "run", run)
-    assert cli.main(["run", "landing.py"]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "the GPU failed (Graph launch error: Warp CUDA error 719" in line
-    with pytest.raises(RuntimeError, match="a defect"):
-        cli.main(["run", "landing.py"])
 
 
 def shell(command: str, **environment: str) -> tuple[int, str]:

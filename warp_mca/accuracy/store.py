@@ -107,6 +107,26 @@ class Family:
         """Features of the measured scenes [-], shape (scene_count, feature_count)."""
         return np.array([self.coordinates(scene.parameters) for scene in self.scenes])
 
+    @cached_property
+    def scale(self) -> NDArray[np.float64]:
+        """Standard deviations of the features [-], shape (feature_count,)."""
+        return np.maximum(self.points.std(axis=0), 1e-12 + 1e-3 * np.abs(self.points).max(axis=0))
+
+    @cached_property
+    def errors(self) -> dict[str, NDArray[np.float64]]:
+        """Errors by figure [-], shape (scene_count, variant_count); nan where no run has such a figure."""
+        found = {figure: np.full((len(self.scenes), len(self.variants)), np.nan) for figure in BOUND}
+        for k, scene in enumerate(self.scenes):
+            for number, errors in scene.errors.items():
+                for figure, error in errors.items():
+                    found[figure][k, number] = np.nan if error is None else error
+        return found
+
+    @cached_property
+    def left(self) -> dict[str, NDArray[np.float64]]:
+        """How far off the limits may be by figure [-], shape (scene_count,); 0 where nobody knows."""
+        return {figure: np.array([scene.left.get(figure) or 0.0 for scene in self.scenes]) for figure in BOUND}
+
     def coordinates(self, parameters: Mapping[str, Any]) -> list[float]:
         """Features of a scene of the family [-], logarithms of those that are "log"."""
         values = {name: float(parameters.get(name, self.defaults[name])) for name in self.features}
