@@ -310,6 +310,14 @@ def test_a_guard_that_stiff_springs_trip_leaves_the_scene_its_own():
     assert "penalty" not in found.variant.knobs
 
 
+def test_a_guard_that_stops_a_pilot_says_so():
+    def trips(scene: mca.Scene, **options: object) -> mca.Result:
+        raise mca.GuardError("contact gave way")
+
+    with pytest.raises(mca.GuardError, match=r"a coarse run \(refine 0\.45\) .* contact gave way"):
+        run_pilots(mca.make_scene("rod_on_wall"), Accuracy(share=0.02), BOUND, trips)
+
+
 def test_a_run_tells_its_error_and_can_be_repeated(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """Pilots of a coarse ball; then the command that the summary gives."""
     first, second = tmp_path / "first", tmp_path / "second"

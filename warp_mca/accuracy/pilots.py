@@ -90,6 +90,7 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
 
     Raises:
         RequestError: what is asked cannot be had, or contradicts what was typed.
+        GuardError: a guard stopped a coarse run.
     """
     typed = asked.typed.get("refine")
     base = float(typed) if isinstance(typed, int | float) else scene.refine
@@ -137,7 +138,15 @@ def _with_springs(scene: Scene, asked: Accuracy, start: Variant, run: Callable[.
 
 
 def _pilot(scene: Scene, variant: Variant, run: Callable[..., Result]) -> Result:
-    return run(variant.applied(scene), **variant.options)
+    """A coarse run.
+
+    Raises:
+        GuardError: a guard stopped it; the words say that it was not yet the run that was asked for.
+    """
+    try:
+        return run(variant.applied(scene), **variant.options)
+    except GuardError as error:
+        raise GuardError(f"a coarse run (refine {variant.refine:.3g}) by which --accuracy chooses: {error}") from error
 
 
 @dataclass(frozen=True)

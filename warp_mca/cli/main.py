@@ -78,7 +78,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except RuntimeError as error:
         if "CUDA error" not in str(error):  # Warp's words for what a GPU or its driver answers
             raise
-        return _fail(f"the GPU failed ({error}): try again, with fewer processes on the device or on a CPU", 1)
+        remedy = "where processes share the device, take fewer, or start NVIDIA's Multi-Process Service before them"
+        return _fail(f"the GPU failed ({error}): try again; {remedy}", 1)
     except KeyboardInterrupt as stop:
         what, number = ("terminated", stop.args[0]) if isinstance(stop, _Terminated) else ("interrupted", signal.SIGINT)
         print("; ".join([f"warp-mca: {what} before it was done", *getattr(stop, "__notes__", ())]), file=sys.stderr)

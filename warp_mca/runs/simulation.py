@@ -11,6 +11,7 @@ from warp_mca.accuracy.plan import Plan, carried_out, planned
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.base import validate
 from warp_mca.base.errors import GuardError, bad_value
+from warp_mca.base.garbage import few_collections
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.result import Result
@@ -36,6 +37,7 @@ __all__ = ["mesh", "run"]
 
 @one_at_a_time
 @shows_progress
+@few_collections()
 def run(
     scene: Scene,
     *,
