@@ -11,20 +11,21 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from fake_run import fake
 
 import warp_mca as mca
 from warp_mca.accuracy import store
 from warp_mca.accuracy.choice import LEAST, REGRET, WORTH, Choice, best, choices
 from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
-from warp_mca.accuracy.pilots import LEVELS, run_pilots
-from warp_mca.accuracy.plan import Plan, carried_out, planned
+from warp_mca.accuracy.plan import Plan, carried_out, command, planned
 from warp_mca.accuracy.prediction import Expected, processes_of
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.cli.main import main
 from warp_mca.runs.rate_groups import COSTS
+from warp_mca.scene.options import with_options
 
 BOUND = ("F_n_first_peak", "impulse", "contact_duration")
 REFINES = (0.5, 0.7, 1.0, 1.4)
@@ -215,6 +216,37 @@ def test_what_was_typed_stays(known: store.Family):
     assert offered(penalty=0.1) == []
 
 
+def test_mass_that_was_typed_is_neither_dropped_nor_foreseen_without_it(known: store.Family):
+    """By the family's runs without it nothing is known; pilots have it."""
+    scene = mca.make_scene("rod_on_wall", v=1.5)
+    given = with_options(scene, None, 1.5, None)
+    for typed in ({"mass_scaling": 1.5}, {}):
+        plan = planned(given, 0.09, typed, "cpu", None, fake)
+        assert plan is not None and plan.pilots is not None
+        assert plan.scene.impact.mass_scaling == 1.5
+
+
+def test_a_command_has_what_options_changed(known: store.Family):
+    scene = mca.make_scene("rod_on_wall")
+    bodies = tuple(replace(body, element="tet4") for body in scene.bodies)
+    changed = replace(scene, bodies=bodies, impact=replace(scene.impact, time_step_scale=0.3))
+    words = command(changed, "mixed", None, fake(scene).summary)
+    assert words is not None
+    assert "--element tet4" in words
+    assert "--time-step-scale 0.3" in words
+    assert "tet4" not in (command(scene, "mixed", None, fake(scene).summary) or "")
+
+
+def test_a_figure_that_is_worse_than_asked_or_unknown_is_a_warning(known: store.Family):
+    plan = planned(mca.make_scene("rod_on_wall", rho=7000.0), 0.04, {}, "cpu", None, fake)
+    assert plan is not None and plan.pilots is not None
+    good = plan.judged(fake(plan.scene))
+    assert good.warnings == ()
+    worse = plan.judged(fake(plan.scene, order=1.5, size=1.0))
+    assert len(worse.warnings) == 1
+    assert "first peak of F_n" in worse.warnings[0]
+
+
 def test_scenes_that_differ_in_more_than_the_family_does_are_none_of_it(known: store.Family):
     scene = mca.make_scene("rod_on_wall", v=3.0)
     assert store.family_of(scene) == known
@@ -242,80 +274,6 @@ def test_point_and_line_loads_have_no_limit():
     for nodes in ("ends", "axis"):
         found = without_limit(mca.make_scene("two_link", joint_nodes=nodes))
         assert set(found) == {"impulse", "contact_duration", "max_plastic_strain"}
-
-
-def fake(scene: mca.Scene, order: float = 1.5, share: float = 0.0, **options: object) -> mca.Result:
-    """A run whose first peak is 100 N (1 + 0.02 / R^order), whose other figures are exact, with a share of springs."""
-    peak = 100.0 * (1.0 + 0.02 * scene.refine**-order)
-    summary = {
-        "F_n_peaks": [[1e-4, peak]],
-        "contact_duration": 1e-3,
-        "contact_open_at_end": False,
-        "max_plastic_strain": 0.0,
-        "contact_spring_share": {"it": share},
-        "n_elements": 100,
-        "n_steps": 100,
-        "precision": "mixed",
-        "device": "cpu",
-        "simulated_time": scene.impact.duration,
-    }
-    return mca.Result(summary, {"time_s": np.array([1e-3]), "F_n_N": np.array([50.0])})
-
-
-@pytest.mark.parametrize("asked", [0.005, 0.01, 0.02])
-def test_pilots_find_the_mesh_and_the_error(asked: float):
-    scene = mca.make_scene("rod_on_wall")
-    found = run_pilots(scene, Accuracy(share=asked), BOUND, fake)
-    refine = found.variant.refine
-    assert refine is not None
-    true = 0.02 * refine**-1.5
-    assert 0.25 * asked < true < asked
-    estimate = found.estimate(fake(found.variant.applied(scene)))
-    assert estimate["F_n_first_peak"] == pytest.approx(true, rel=0.05)
-    assert estimate["impulse"] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_second_pilot_is_the_run_where_it_is_accurate_enough():
-    found = run_pilots(mca.make_scene("rod_on_wall"), Accuracy(share=0.2), BOUND, fake)
-    assert found.variant.refine == LEVELS[1]
-    assert found.result is not None
-
-
-def test_what_cannot_be_had_is_refused_with_what_can():
-    scene = mca.make_scene("rod_on_wall")
-    with pytest.raises(mca.RequestError, match=r"about 0\.3% can be had"):
-        run_pilots(scene, Accuracy(share=0.001), BOUND, fake)
-    with pytest.raises(mca.RequestError, match=r"refine = 0\.5"):
-        run_pilots(scene, Accuracy(share=0.01, typed={"refine": 0.5}), BOUND, fake)
-    soft = Accuracy(share=0.02, typed={"penalty": 0.1})
-    with pytest.raises(mca.RequestError, match=r"penalty = 0\.1"):
-        run_pilots(scene, soft, BOUND, lambda scene, **options: fake(scene, share=0.5))
-
-
-def test_springs_are_made_stiffer_than_the_accuracy_needs():
-    def springs(scene: mca.Scene, **options: object) -> mca.Result:
-        return fake(scene, share=0.1 / float(scene.contacts[0].penalty or 1.0))  # pyright: ignore[reportArgumentType]
-
-    found = run_pilots(mca.make_scene("rod_on_wall", penalty=1.0), Accuracy(share=0.02), BOUND, springs)
-    assert found.variant.parameters["penalty"] == pytest.approx(0.3 * 0.1 / (0.3 * 0.02), rel=0.02)
-
-
-def test_a_guard_that_stiff_springs_trip_leaves_the_scene_its_own():
-    def trips(scene: mca.Scene, **options: object) -> mca.Result:
-        if scene.contacts[0].penalty != 1.0:
-            raise mca.GuardError("too stiff")
-        return fake(scene, share=0.01)
-
-    found = run_pilots(mca.make_scene("rod_on_wall", penalty=1.0), Accuracy(share=0.005), BOUND, trips)
-    assert "penalty" not in found.variant.knobs
-
-
-def test_a_guard_that_stops_a_pilot_says_so():
-    def trips(scene: mca.Scene, **options: object) -> mca.Result:
-        raise mca.GuardError("contact gave way")
-
-    with pytest.raises(mca.GuardError, match=r"a coarse run \(refine 0\.45\) .* contact gave way"):
-        run_pilots(mca.make_scene("rod_on_wall"), Accuracy(share=0.02), BOUND, trips)
 
 
 def test_a_run_tells_its_error_and_can_be_repeated(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

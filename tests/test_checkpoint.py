@@ -129,3 +129,17 @@ def test_a_run_in_turn_and_a_run_without_a_folder_store_nothing(tmp_path: Path):
     with pytest.raises(mca.RequestError, match="leave t_end out"):
         mca.run(cycle, checkpoint="7", out=tmp_path / "out")
     assert main(["run", "single_link", "--sweep", "mu=0.1,0.2", "--checkpoint", "7", "--out", str(tmp_path / "a")]) == 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (0.05, "accuracy = 0.05: it is for runs of one impact that store nothing"),
+        (mca.Accuracy(share=0.05), "accuracy = '5%': it is for runs of one impact that store nothing"),
+        ({"share": 0.05}, "accuracy = {'share': 0.05}: give a share from 0.1% to 50%"),
+        ([0.05], "accuracy = [0.05]: give a share from 0.1% to 50%"),
+    ],
+)
+def test_an_accuracy_beside_a_checkpoint_is_refused_by_its_value(asked: Any, words: str, tmp_path: Path):
+    with pytest.raises(mca.RequestError, match=re.escape(words)):
+        mca.run(LANDING, accuracy=asked, checkpoint="7", out=tmp_path)

@@ -285,6 +285,13 @@ def test_the_command_line_says_what_groups_it_took(tmp_path: Path, capsys: pytes
     assert mca.load(tmp_path / "sweep" / "1").summary["rate_groups"] == groups
 
 
+@pytest.mark.parametrize("groups", ["auto", 2])
+def test_rigid_bodies_alone_have_no_groups(groups: int | str):
+    """They have no elements to sort, as models have that are too small for groups: all takes one step."""
+    scene = mca.make_scene("hertz_sphere", rigid_sphere=True)
+    assert rates_of(scene, groups) is None
+
+
 @pytest.mark.gpu
 @pytest.mark.parametrize(("precision", "tolerance"), [("mixed", 1e-4), ("float64", 1e-7)])
 def test_device_gives_the_figures_of_the_cpu(precision: str, tolerance: float):

@@ -216,3 +216,32 @@ def test_odd_values_are_refused_in_a_sentence_or_run(kind: type, name: str, monk
             assert "\n" not in str(error)
             assert len(str(error)) < 1000
             assert isinstance(error, RequestError) or "sank deeper" in str(error)  # of planes inside a body
+
+
+@pytest.mark.parametrize(
+    "name", ["refine", "penalty", "mass_scaling", "multi_rate", "precision", "time_step_scale", "element"]
+)
+@pytest.mark.filterwarnings("error")
+def test_odd_values_of_an_accuracy_are_refused(name: str):
+    """Values that must stay, and shares; None stands for no added mass, the default springs and one rate."""
+    with pytest.raises(RequestError, match=rf"{name}.* = 'y': "):
+        mca.Accuracy(share=0.02, typed={name: "y"})
+    for value in ODD:
+        for asked in ({"share": value}, {"share": 0.02, "typed": {name: value}}, {"share": 0.02, "typed": value}):
+            try:
+                mca.Accuracy(**asked)
+            except RequestError as error:
+                assert "\n" not in str(error)
+                assert len(str(error)) < 1000
+
+
+def test_an_accuracy_keeps_options_and_parameters_of_its_scene():
+    """Other names are refused; with those of options and parameters the request goes on to the next check."""
+    scene = mca.make_scene("hertz_sphere")
+    typed = {"penalty": 3.0, "refine": 1.0, "mass_scaling": "2e-8s", "multi_rate": "auto", "element": "hex8r", "v": 2.0}
+    with pytest.raises(RequestError, match="store nothing on the way"):
+        mca.run(scene, accuracy=mca.Accuracy(share=0.02, typed=typed), method="pure-fem")
+    with pytest.raises(
+        RequestError, match=r"^Accuracy\.typed\['nonsense'\] = 1\.0: .* choose among refine, .*, radius"
+    ):
+        mca.run(scene, accuracy=mca.Accuracy(share=0.02, typed={"nonsense": 1.0}))

@@ -12,6 +12,7 @@ import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.geometry.quality import edge_lengths, scaled_jacobian
 from warp_mca.geometry.refinement import refined_count
+from warp_mca.runs.meshing import mesh
 from warp_mca.scene import catalogue, model_file
 
 FACTORS = (0.5, 0.7, 1.3, 2.0)
@@ -114,6 +115,30 @@ def test_recipes_of_ones_own():
     assert mca.mesh(replace(scene_of(Graded()), refine=1.5))["part"].cell_count == 27
     with pytest.raises(mca.RequestError, match=r"refine = 1\.5: body part is a Brick, whose cells cannot"):
         mca.mesh(replace(scene_of(Brick()), refine=1.5))
+
+
+@dataclass
+class Changeable:
+    """A recipe of one's own that can be changed, and so not be hashed."""
+
+    cells: int
+
+    def build(self) -> mca.Mesh:
+        """A cube."""
+        return Brick(self.cells).build()
+
+    def refined(self, factor: float) -> Changeable:
+        """So many times the cells."""
+        return Changeable(refined_count(self.cells, factor))
+
+
+def test_recipes_that_cannot_be_hashed_are_told_apart():
+    """Refined recipes are let go, and new ones may lie where they were: the meshes of a cache are not theirs."""
+    made: dict[object, mca.Mesh] = {}
+    scene = scene_of(Changeable(2))
+    factors = [k / 2 for k in range(1, 11) if k != 2] * 3
+    counts = [mesh(replace(scene, refine=factor), made)["part"].cell_count for factor in factors]
+    assert counts == [refined_count(2, factor) ** 3 for factor in factors]
 
 
 @pytest.mark.parametrize("geometry", [Brick().build(), mca.MeshFile("none.vtu")])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -12,11 +12,13 @@ import warp_mca as mca
 from warp_mca.accuracy.combine import combinations, merged, spread
 from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import NAMES
+from warp_mca.accuracy.files import as_json
 from warp_mca.accuracy.findings import TradeOff
 from warp_mca.accuracy.knobs import BASE, Trial, one_at_a_time
 from warp_mca.accuracy.measure import Bench, Measured, element_steps
-from warp_mca.accuracy.reference import Reference, choose_penalty
+from warp_mca.accuracy.reference import Reference, choose_penalty, find_reference
 from warp_mca.accuracy.variant import Variant
+from warp_mca.accuracy.worth import print_tradeoff
 from warp_mca.cli.main import main
 from warp_mca.results.result import Result
 
@@ -231,6 +233,74 @@ def test_a_scene_from_end_to_end(here: Path, capsys: pytest.CaptureFixture[str])
     assert "it holds a trade-off already" in capsys.readouterr().err
 
 
+def coarse(cells: int) -> mca.Scene:
+    """The block with few cells along each edge."""
+    box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(cells, cells, cells))
+    return replace(block(), bodies=(replace(block().bodies[0], geometry=box),))
+
+
+def test_a_mesh_is_measured_once(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """Boxes of 6 cells have 4 with refine 0.7 and 0.5, 6 with 0.85 and 1.02, 8 with 1.4 and 1.2."""
+
+    def run(bench: Bench, trial: Trial) -> Measured:
+        cells = next(iter(mca.mesh(trial.variant.applied(bench.scene)).values())).cell_count
+        peak = 100.0 * (1.0 - 0.5 * cells ** (-2 / 3))
+        figures = dict.fromkeys(NAMES) | {"F_n_first_peak": peak}
+        found = measured(trial.knob, trial.variant, 1e-3 * cells, peak)
+        found = replace(found, trial=trial, elements=cells, figures=figures)
+        bench.base, bench.beside = bench.base or found, 0.0
+        return found
+
+    monkeypatch.setattr(Bench, "run", run)
+    found = mca.tradeoff(coarse(6))
+    rows = [row.trial.variant for row in found.variants if row.trial.knob == "mesh"]
+    assert [variant.knobs for variant in rows] == [{"refine": 0.7}, {"refine": 1.4}]
+    same = [(one.variant.refine, other.variant.knobs) for one, other in found.same]
+    assert same == [(0.5, {"refine": 0.7}), (1.2, {"refine": 1.4}), (0.85, {})]
+    assert not [row for row in found.variants if row.trial.knob == "combined" and len(row.trial.variant.knobs) < 2]
+    print_tradeoff(as_json(found))
+    assert "refine=0.5 (that of refine=0.7)" in " ".join(capsys.readouterr().out.split())
+    assert as_json(found)["same_mesh"][2] == {"knobs": {"refine": 0.85}, "as": {}}
+
+
+@pytest.mark.parametrize(("cells", "elements"), [(6, [216, 512, 1728]), (2, [8, 64])])
+def test_the_reference_takes_each_mesh_once_at_its_true_size(cells: int, elements: list[int]):
+    """First peaks of 100 (1 - h^2) N with h by the number of cells: their limit is found, by three meshes the order."""
+    bench = Bench(scene=coarse(cells), device="cpu", threads=1, duration=None)
+    bench.base, bench.beside = measured("as written", Variant(), 1.0, 1.0), 0.0
+    asked: list[int] = []
+
+    def note(trial: Trial) -> Measured:
+        asked.append(next(iter(mca.mesh(trial.variant.applied(bench.scene)).values())).cell_count)
+        return replace(
+            measured("reference", trial.variant, 1.0, 100.0 - 100.0 * asked[-1] ** (-2 / 3)), elements=asked[-1]
+        )
+
+    found = find_reference(bench, 1.0, {}, float("inf"), note)
+    assert asked == [level.elements for level in found.levels] == elements
+    if len(elements) == 3:
+        limit = found.limits["F_n_first_peak"]
+        assert (limit.value, limit.order) == (pytest.approx(100.0), pytest.approx(2.0))
+
+
+def test_a_scene_of_one_mesh_has_no_reference():
+    """One cell stays one at every density that is tried."""
+
+    @dataclass(frozen=True)
+    class Cell:
+        def build(self) -> mca.Mesh:
+            return mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1)).build()
+
+        def refined(self, factor: float) -> Cell:
+            return self
+
+    scene = replace(block(), bodies=(replace(block().bodies[0], geometry=Cell()),))
+    bench = Bench(scene=scene, device="cpu", threads=1, duration=None)
+    bench.base = measured("as written", Variant(), 1.0, 1.0)
+    with pytest.raises(mca.RequestError, match="its cells are so few that other values of refine mesh it alike"):
+        find_reference(bench, 1.0, {}, 1.0, lambda trial: measured("reference", trial.variant, 1.0, 1.0))
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -238,6 +308,7 @@ def test_a_scene_from_end_to_end(here: Path, capsys: pytest.CaptureFixture[str])
         (["block.py", "--budget", "nan"], "budget = nan: give a finite time above 0 s"),
         (["block.py", "--set", "apart=true"], "a run of it has none of the figures"),
         (["two_link", "--set", "t_end=0.5"], "variants are compared by one impact"),
+        (["hertz_sphere", "--set", "rigid_sphere=true"], "scene = 'hertz_sphere': all its bodies are rigid"),
         (["block.mca"], "a built model holds finished meshes"),
         (["block.py", "--threads", "0"], "threads"),
     ],

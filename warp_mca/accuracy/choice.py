@@ -86,8 +86,9 @@ def best(found: Sequence[Choice], share: float) -> Choice | None:
 
 
 def keeps(variant: Variant, asked: Accuracy) -> bool:
-    """Whether a variant leaves everything that was typed as it is."""
-    return all(variant.knobs[name] == value for name, value in asked.typed.items() if name in variant.knobs)
+    """Whether a variant leaves everything that was typed as it is; without mass added it tells nothing of some."""
+    knobs = {"mass_scaling": None, **variant.knobs}
+    return all(knobs[name] == value for name, value in asked.typed.items() if name in knobs)
 
 
 def cost_of(size: Size, step: StepCost, cpu: bool) -> float:

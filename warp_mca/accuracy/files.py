@@ -99,6 +99,7 @@ def as_json(found: TradeOff) -> dict[str, Any]:
         "bound": list(BOUND),
         "variants": [_variant(found, run, fronts) for run in found.variants],
         "left_out": [{"knobs": trial.variant.knobs, "foreseen": cost} for trial, cost in found.left_out],
+        "same_mesh": [{"knobs": one.variant.knobs, "as": other.variant.knobs} for one, other in found.same],
     }
 
 

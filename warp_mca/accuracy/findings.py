@@ -24,6 +24,7 @@ class TradeOff:
         reference: what they are compared with.
         variants: as measured, in the order of the runs; the first is the scene as written.
         left_out: variants that the budget had no time for, and the time foreseen for each [s].
+        same: variants that were not run because their meshes are those of another one, and that one.
         spent: by all runs [s].
     """
 
@@ -36,6 +37,7 @@ class TradeOff:
     reference: Reference
     variants: Sequence[Measured]
     left_out: Sequence[tuple[Trial, float]] = ()
+    same: Sequence[tuple[Trial, Trial]] = ()
     spent: float = 0.0
 
     @property

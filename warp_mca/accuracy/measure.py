@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from warp_mca.accuracy.figures import Figures, figures_of
 from warp_mca.accuracy.knobs import BASE, Trial
+from warp_mca.accuracy.same_mesh import Meshes
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import McaError
 from warp_mca.geometry.mesh import Mesh
@@ -66,6 +67,7 @@ class Bench:
         self.name = device
         self.beside = math.inf
         self._made: dict[object, Mesh] = {}
+        self._meshes = Meshes(scene)
 
     @property
     def clock(self) -> str:
@@ -75,6 +77,11 @@ class Bench:
         nothing else.
         """
         return "cpu" if self.device == "cpu" and self.threads == 1 else "fe"
+
+    def key(self, variant: Variant) -> Hashable:
+        """Equal for variants that are the same model: the same meshes, and all else changed alike."""
+        with quiet():
+            return self._meshes.key(variant)
 
     def run(self, trial: Trial) -> Measured:
         """Run a variant; what it refuses and what guards stop is part of the measurement.

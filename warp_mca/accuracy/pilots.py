@@ -1,7 +1,8 @@
 """Owns pilots: coarse runs of a scene itself, from which the mesh for an accuracy, and the error after it, follow.
 
 With cells of size h = 1 / refine, a figure f errs by C h^p. Two pilots give C with the usual p of low-order elements at
-edges of contacts; the run itself is the third value, which gives the order that is really there (`convergence`).
+edges of contacts; the run itself is the third value, which gives the order that is really there (`convergence`). Two
+cannot tell a series that goes nowhere: the second pilot is the run only where much less is left than was asked.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.accuracy.catalogued import source_of
-from warp_mca.accuracy.convergence import limit_of
+from warp_mca.accuracy.convergence import STEADY, limit_of
 from warp_mca.accuracy.figures import Figures, figures_of
+from warp_mca.accuracy.levels import Levels
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import GuardError, bad_value
@@ -25,11 +27,14 @@ from warp_mca.scene import Scene
 if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
-LEVELS = (0.45, 0.64)  # of the pilots' refine over that of the scene; both take a sixth of a run that is as fine [-]
-LEAST = 0.9  # of a run that is finer than its pilots; below, these would take more than a fifth of the time [-]
+COARSE = 0.45, 0.3, 1.0  # refine of the first pilot over that of the scene: wanted, least, most [-]
+NEXT = 1.42, 1.3, 2.2  # of the second over that of the first; the first takes a fourth of its time [-]
+BELOW = 0.8  # of the second over that of a scene whose refine was typed, at most [-]
 STEP = 2.0**0.25  # between meshes that are considered [-]: a factor of two in time
+TRIES = 3  # levels at which the first pilot is tried, where guards stop it
 MOST = 4.0  # greatest refine over that of the scene [-]
 ORDER = 1.5  # assumed before the run [-]
+SURE = 0.4  # of what was asked that may be left of the second pilot, for it to be the run [-]
 MARGIN = 0.8  # of what was asked that an error foreseen may reach [-]
 SPRINGS = 0.3  # of what was asked that contact springs may give away [-]
 STIFFEST = 30.0  # penalty [-]
@@ -44,17 +49,19 @@ class Pilots:
     Attributes:
         variant: chosen.
         why: in one sentence.
-        sizes: of the pilots' cells over those of the scene [-].
+        levels: meshes of the scene, with refine 1 as their base.
+        sizes: of the pilots' cells over those of the scene, as meshed [-].
         figures: of each pilot.
         resolution: of the contact duration: the output interval [s].
         bound: figures that must be accurate.
         auto: penalties are chosen by the mesh, so that what springs give away does not shrink with the cells.
-        result: of the last pilot, where that is chosen.
+        result: of the last pilot, where that is the run.
         wall: that this pilot took [s].
     """
 
     variant: Variant
     why: str
+    levels: Levels
     sizes: tuple[float, ...]
     figures: tuple[Figures, ...]
     resolution: float
@@ -69,20 +76,24 @@ class Pilots:
         sizes, runs = self.sizes, self.figures
         if self.result is None:
             assert self.variant.refine is not None
-            sizes, runs = (*sizes, 1.0 / self.variant.refine), (*runs, found)
+            sizes, runs = (*sizes, 1.0 / self.levels.meshed(self.variant.refine)), (*runs, found)
         lost = _spring_loss(result)
-        shares: dict[str, float | str] = {}
-        for name in self.bound:
-            resolution = self.resolution if name == "contact_duration" else 0.0
-            limit = limit_of(sizes, [run[name] for run in runs], resolution)
-            value = found[name]
-            if limit.value is None or value is None:
-                shares[name] = f"it does not converge: {limit.why}"
-            else:
-                error = max(abs(value / limit.value - 1.0), 0.5 * (limit.left or 0.0))
-                own = lost * (IMPULSE if name == "impulse" else 1.0)
-                shares[name] = error + own if self.auto else max(error, own)
-        return shares
+        return {
+            name: self._error([run[name] for run in runs], sizes, name, lost * (IMPULSE if name == "impulse" else 1.0))
+            for name in self.bound
+        }
+
+    def _error(self, values: Sequence[float | None], sizes: Sequence[float], name: str, lost: float) -> float | str:
+        """Error of the last value [-], or why none can be told; `lost` is what springs take of it [-]."""
+        resolution = self.resolution if name == "contact_duration" else 0.0
+        limit, value = limit_of(sizes, values, resolution), values[-1]
+        if limit.value is None or value is None:
+            return f"it does not converge: {limit.why}"
+        left = limit.left or 0.0
+        if len(values) > 2 and limit.order is None and left - resolution / abs(limit.value) > STEADY:
+            return f"it does not converge: its changes with the mesh, {left:.1%}, show no order"
+        error = max(abs(value / limit.value - 1.0), left if limit.order is None else 0.5 * left)
+        return error + lost if self.auto else max(error, lost)
 
 
 def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callable[..., Result]) -> Pilots:
@@ -93,38 +104,67 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
         GuardError: a guard stopped a coarse run.
     """
     typed = asked.typed.get("refine")
-    base = float(typed) if isinstance(typed, int | float) else scene.refine
-    start = Variant(refine=LEVELS[0] * base, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
-    start, first = _with_springs(scene, asked, start, run)
+    base = scene.refine if typed is None else float(typed)  # pyright: ignore[reportArgumentType]
+    levels, plain = Levels(scene, base), Levels(scene, 1.0)
+    coarse, start, first = _first(scene, asked, levels, typed is not None, run)
+    ratio, least, most = NEXT
+    level = levels.near(ratio * coarse, least * coarse, BELOW if typed is not None else most * coarse)
     begin = time.perf_counter()
-    second = _pilot(scene, replace(start, refine=LEVELS[1] * base), run)
+    second = _pilot(scene, replace(start, refine=level * base), run)
     wall = time.perf_counter() - begin
     known = figures_of(first), figures_of(second)
     if all(known[1][name] is None for name in bound):
-        raise bad_value("accuracy", asked.share, "a coarse run of the scene has no contact force that it could bind")
+        remedy = "it binds figures of contacts, and in a coarse run of the scene none has a force; leave it out"
+        raise bad_value("accuracy", asked.share, remedy)
     auto = any(contact.penalty == "auto" for contact in start.applied(scene).contacts)
-    springs = Springs(_spring_loss(second), auto)
-    errors = {name: error for name in bound if (error := _foreseen(known[0][name], known[1][name])) is not None}
-    level = _level(asked, errors, springs, typed is not None, second)
+    springs = Springs(_spring_loss(second), auto, level)
+    sizes = tuple(1.0 / plain.meshed(found * base) for found in (coarse, level))
+    foreseen = {name: _foreseen(known[0][name], known[1][name], sizes[0] / sizes[1]) for name in bound}
+    errors = {name: error for name, error in foreseen.items() if error is not None}
     worst = max(errors, key=lambda name: errors[name], default="")
+    chosen = _level(asked, (worst, errors.get(worst, 0.0)), springs, levels, typed is not None, second)
     at = f" after coarse runs that leave {errors[worst]:.1%} in {worst}" if worst else ""
-    variant = replace(start, refine=level * base)
+    variant = replace(start, refine=chosen * base)
     stiff = f", penalty {start.knobs['penalty']:g}" if "penalty" in start.knobs else ""
     return Pilots(
         variant=variant,
-        why=f"refine {level * base:.3g}{stiff}{at}",
-        sizes=tuple(1.0 / (level * base) for level in LEVELS),
+        why=f"refine {chosen * base:.3g}{stiff}{at}",
+        levels=plain,
+        sizes=sizes,
         figures=known,
         resolution=scene.impact.output_interval,
         bound=tuple(bound),
         auto=auto,
-        result=second if level == LEVELS[1] else None,
+        result=second if chosen == level else None,
         wall=wall,
     )
 
 
+def _first(
+    scene: Scene, asked: Accuracy, levels: Levels, fixed: bool, run: Callable[..., Result]
+) -> tuple[float, Variant, Result]:
+    """Level, model and result of the first pilot: the coarsest that no guard stops.
+
+    Raises:
+        GuardError: guards stop all that are tried.
+    """
+    wanted, least, most = COARSE
+    most = BELOW / NEXT[1] if fixed else most
+    left = 1 if fixed else TRIES
+    while True:
+        level = levels.near(wanted, least, most)
+        start = Variant(refine=level * levels.base, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
+        left -= 1
+        try:
+            return level, *_with_springs(scene, asked, start, run)
+        except GuardError:
+            if not left:
+                raise
+        wanted, least, most = (ratio * level for ratio in NEXT)
+
+
 def _with_springs(scene: Scene, asked: Accuracy, start: Variant, run: Callable[..., Result]) -> tuple[Variant, Result]:
-    """The first pilot, and the model that it had: with contact springs as stiff as the accuracy needs.
+    """The model and the result of the first pilot: with contact springs as stiff as the accuracy needs.
 
     Where a guard stops it with these, the scene keeps its own; what they give away then asks for a finer mesh.
     """
@@ -156,14 +196,16 @@ class Springs:
     Attributes:
         lost: of the greatest force [-], by estimate.
         auto: the mesh chooses their penalty, so that the loss stays; otherwise they are softer in larger cells.
+        level: of the second pilot, its refine over that of the scene [-].
     """
 
     lost: float
     auto: bool
+    level: float
 
     def left(self, level: float) -> float:
         """What is lost with another refine over that of the scene [-]."""
-        return self.lost if self.auto else self.lost * (LEVELS[1] / level) ** SHRINKS
+        return self.lost if self.auto else self.lost * (self.level / level) ** SHRINKS
 
 
 def _spring_loss(result: Result) -> float:
@@ -181,51 +223,66 @@ def _stiffer(scene: Scene, asked: Accuracy, first: Result) -> Mapping[str, Any] 
     wanted = float(f"{min(penalty * lost / allowed, max(STIFFEST, penalty)):.2g}")
     if wanted <= penalty:
         return None
-    source = source_of(scene)
+    source = source_of(scene, options=True)
     by_name = source is not None and "penalty" in source.parameters
     return {"parameters": {"penalty": wanted}} if by_name else {"penalty": wanted}
 
 
-def _foreseen(first: float | None, second: float | None) -> float | None:
-    """Error of a figure of the second pilot [-]; None where either has none."""
+def _foreseen(first: float | None, second: float | None, ratio: float) -> float | None:
+    """Error of a figure of the second pilot [-], whose cells are smaller by a ratio; None where either has none."""
     if first is None or not second:
         return None
-    return abs(first / second - 1.0) / ((LEVELS[1] / LEVELS[0]) ** ORDER - 1.0)
+    return abs(first / second - 1.0) / (max(ratio, NEXT[1]) ** ORDER - 1.0)
 
 
-def _level(asked: Accuracy, errors: Mapping[str, float], springs: Springs, fixed: bool, second: Result) -> float:
+def _level(
+    asked: Accuracy, worst: tuple[str, float], springs: Springs, levels: Levels, fixed: bool, second: Result
+) -> float:
     """Refine of the run over that of the scene [-]: the first level whose error stays within what was asked.
 
     Args:
         asked: accuracy.
-        errors: foreseen of the second pilot's figures [-].
+        worst: figure of the second pilot, and the error that is foreseen of it [-].
         springs: of its contacts.
+        levels: meshes of the scene.
         fixed: the user typed the scene's refine.
         second: that pilot.
 
     Raises:
         RequestError: no mesh is fine enough.
     """
-    coarse, error = LEVELS[1], max(errors.values(), default=0.0)
+    coarse, (figure, error) = springs.level, worst
 
     def left(level: float) -> float:
-        return error * (coarse / level) ** ORDER + springs.left(level)
+        return (error * (coarse / level) ** ORDER + springs.left(level)) / MARGIN
 
     if fixed:
-        if left(1.0) <= MARGIN * asked.share:
+        if left(1.0) <= asked.share:
             return 1.0
-        had = f"{left(1.0) / MARGIN:.1%}"
-        remedy = f"this mesh leaves about {had} by coarse runs of the scene; leave it out, or ask for that"
+        remedy = (
+            f"this mesh leaves about {_above(left(1.0))} by coarse runs of the scene; leave it out, or ask for that"
+        )
         raise bad_value("refine", asked.typed["refine"], remedy)
-    count = math.floor(math.log(MOST / LEAST, STEP) + 1e-9)
-    levels = [coarse, *(LEAST * STEP**k for k in range(count + 1))]
-    for level in levels:
-        if left(level) <= MARGIN * asked.share:
+    if left(coarse) <= SURE * asked.share:
+        return coarse
+    found = levels.finer(coarse, STEP, max(MOST, NEXT[2] * coarse))
+    for level in found:
+        if left(level) <= asked.share:
             return level
-    if "penalty" in asked.typed and springs.left(MOST) > 0.5 * left(MOST):
+    finest = found[-1]
+    if "penalty" in asked.typed and springs.left(finest) > 0.5 * MARGIN * left(finest):
         remedy = f"springs of this penalty give away about {springs.left(1.0):.1%}; leave it out, or give a larger one"
         raise bad_value("penalty", asked.typed["penalty"], remedy)
-    steps = second.summary["n_elements"] * second.summary["n_steps"] * (MOST / coarse) ** 4
-    remedy = f"about {left(MOST) / MARGIN:.1%} can be had, with refine {MOST:g} times the scene's in some {steps:.1e}"
+    steps = second.summary["n_elements"] * second.summary["n_steps"] * (finest / coarse) ** 4
+    # An accuracy that is easier to have leaves contact springs softer.
+    had = max(left(finest), (left(finest) * MARGIN - springs.left(finest)) / (MARGIN - SPRINGS))
+    where = f" in {figure}" if figure else ""
+    remedy = f"about {_above(had)} can be had{where}, with refine {finest * levels.base:.3g} in some {steps:.1e}"
     remedy += " element-steps; ask for no less, or refine the scene where bodies touch"
     raise bad_value("accuracy", asked.share, remedy)
+
+
+def _above(share: float) -> str:
+    """A share in percent that is not below it, in two digits."""
+    size = 10.0 ** (math.floor(math.log10(share)) - 1)
+    return f"{100.0 * size * math.ceil(share / size - 1e-9):.3g}%"

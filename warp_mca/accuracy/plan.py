@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import shlex
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from warp_mca.accuracy.hinges import without_limit
 from warp_mca.accuracy.pilots import Pilots, run_pilots
 from warp_mca.accuracy.prediction import SMALL
 from warp_mca.accuracy.request import Accuracy, accuracy_of
-from warp_mca.accuracy.store import Family, family_of
+from warp_mca.accuracy.store import Family, family_of, no_limit_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.runs.advice import LOGGER
@@ -72,11 +72,6 @@ class Plan:
         """The result, if the finest pilot is accurate enough."""
         return self.pilots.result if self.pilots else None
 
-    @property
-    def _catalogued(self) -> Scene:
-        """The scene as modelled, but for elements, which are no parameter of a scene."""
-        return replace(self.variant, element=None).applied(self.scene) if self.variant.element else self.scene
-
     def judged(self, result: Result) -> Result:
         """The result with `accuracy` in its summary: estimated errors, what was chosen, and how to run it again."""
         found = figures_of(result)
@@ -104,9 +99,22 @@ class Plan:
             "chosen": {**self.variant.knobs, "multi_rate": groups, "precision": precision},
             "why": self.why,
             "deciding": self.wall,
-            "command": command(self._catalogued, precision, groups, result.summary, self.variant.element),
+            "command": command(self.scene, precision, groups, result.summary),
         }
-        return replace(result, summary={**result.summary, "accuracy": accuracy})
+        warnings = (*result.warnings, *self._missed(share, reasons))
+        return replace(result, summary={**result.summary, "accuracy": accuracy}, warnings=warnings)
+
+    def _missed(self, share: Mapping[str, float | None], reasons: Mapping[str, str]) -> Iterator[str]:
+        """Warnings of figures that the accuracy binds, and whose error is larger by estimate, or that have none."""
+        for name in (name for name in BOUND if name not in self.reasons):
+            error, asked = share[name], f"accuracy {self.asked.share:.3g}"
+            if error is None:
+                yield f"{asked}: no error of the {NAMES[name]} is known, which may be larger: {reasons[name]}"
+            elif error > self.asked.share:
+                yield (
+                    f"{asked}: the {NAMES[name]} is within {error:.1%} only, by estimate; ask for a smaller error "
+                    "to have a finer mesh"
+                )
 
 
 def planned(
@@ -132,11 +140,12 @@ def planned(
     """
     if accuracy is None:
         return None
-    begin, asked = time.perf_counter(), accuracy_of(accuracy).keeping(**typed)
+    begin, added = time.perf_counter(), scene.impact.mass_scaling
+    asked = accuracy_of(accuracy).keeping(**typed).keeping(mass_scaling=added)
     _check(scene, asked, meshes is not None)
     reasons = {**without_limit(scene), **_without_strain(scene)}
     family = family_of(scene)
-    reasons = {**(family.no_limit if family else {}), **reasons}
+    reasons = {**no_limit_of(scene), **reasons}
     bound = [name for name in BOUND if name not in reasons]
     found = _from_family(family, scene, asked, reasons, bound, device) if family else None
     found = found or _from_pilots(scene, asked, reasons, bound, run)
@@ -194,6 +203,9 @@ def _check(scene: Scene, asked: Accuracy, finished_meshes: bool) -> None:
     if fixed or finished_meshes:
         what = f"cells of {', '.join(fixed) or 'finished meshes'} cannot be made smaller or larger"
         raise bad_value("accuracy", asked.share, f"{what}; give recipes such as warp_mca.Rod, or leave accuracy out")
+    if all(body.rigid for body in scene.bodies):
+        what = "all bodies are rigid, whose forces have no limit as contact springs stiffen"
+        raise bad_value("accuracy", asked.share, f"{what}; make one deformable, or leave it out")
     if not scene.contacts:
         raise bad_value("accuracy", asked.share, "it binds figures of contacts, and the scene has none; leave it out")
 
@@ -250,13 +262,12 @@ def _from_pilots(scene: Scene, asked: Accuracy, reasons: Mapping[str, str], boun
     return Plan(scene=made, variant=found.variant, asked=asked, why=found.why, reasons=reasons, pilots=found)
 
 
-def command(
-    scene: Scene, precision: str, groups: int | None, summary: Mapping[str, Any], element: str | None = None
-) -> str | None:
+def command(scene: Scene, precision: str, groups: int | None, summary: Mapping[str, Any]) -> str | None:
     """The command that gives the run again without `--accuracy`; None for scenes that the catalogue does not have."""
-    source = source_of(scene)
+    source = source_of(scene, options=True)
     if source is None:
         return None
+    made, element, scale = source.build(scene.parameters), scene.bodies[0].element, scene.impact.time_step_scale
     words = ["warp-mca", "run", scene.name]
     plain = source.resolve(None)
     for name, value in scene.parameters.items():
@@ -267,7 +278,8 @@ def command(
         "mass-scaling": scene.impact.mass_scaling,
         "multi-rate": groups,
         "precision": precision,
-        "element": element,
+        "element": element if any(body.element != element for body in made.bodies) else None,
+        "time-step-scale": scale if scale != made.impact.time_step_scale else None,
         "device": str(summary["device"]).split(" ")[0],
     }
     words += [word for name, value in more.items() if value is not None for word in (f"--{name}", str(value))]

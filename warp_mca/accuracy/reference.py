@@ -7,7 +7,7 @@ they do not hide the order of the mesh.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from warp_mca.accuracy.convergence import NO_RUN, Limit, limits
@@ -110,32 +110,39 @@ def find_reference(
     Raises:
         RequestError: fewer than two meshes gave a result, or the runs have none of the figures.
     """
-    trials: list[Trial] = []
+    name, trials = bench.scene.name, list[Trial]()
     for finest in FINEST:
-        trials = list(_levels(bench, finest, penalty))
-        if sum(bench.foreseen(trial.variant) for trial in trials) <= allowed:
+        found = list(_levels(bench, finest, penalty))
+        trials = found if len(found) > 1 or not trials else trials
+        if len(trials) > 1 and sum(bench.foreseen(trial.variant) for trial in trials) <= allowed:
             break
+    if len(trials) < 2:
+        remedy = "it has no reference, for its cells are so few that other values of refine mesh it alike; make more"
+        raise bad_value("scene", name, remedy)
     runs = [note(trial) for trial in trials]
     levels = [found for found in runs if not found.stopped]
     if len(levels) < 2:
         why = next(found.stopped for found in runs if found.stopped)
-        raise bad_value("scene", bench.scene.name, f"it has no reference, for other meshes of it do not run: {why}")
-    sizes = [level.elements ** (-1.0 / 3.0) for level in levels]
-    different = [k for k, size in enumerate(sizes) if k == 0 or size < sizes[k - 1]]  # counts of cells are rounded
+        raise bad_value("scene", name, f"it has no reference, for other meshes of it do not run: {why}")
+    sizes = [level.elements ** (-1.0 / 3.0) for level in levels]  # as meshed: counts of cells are rounded
+    different = [k for k, size in enumerate(sizes) if k == 0 or size < sizes[k - 1]]
     levels, sizes = [levels[k] for k in different], [sizes[k] for k in different]
     found = limits(sizes, [level.figures for level in levels], _resolution(bench.scene))
     if all(limit.why == NO_RUN for limit in found.values()):
         remedy = f"a run of it has none of the figures {', '.join(NAMES)}; give a scene with a contact, paths or yield"
-        raise bad_value("scene", bench.scene.name, remedy)
+        raise bad_value("scene", name, remedy)
     return Reference(limits=found, levels=levels, penalty=penalty, springs=springs)
 
 
 def _levels(bench: Bench, finest: float, penalty: float | str | None) -> Iterator[Trial]:
-    """Meshes of the reference, from the coarsest."""
-    own = None if penalty == penalty_of(bench.scene) else penalty
+    """Meshes of the reference, from the coarsest; each once."""
+    own, seen = None if penalty == penalty_of(bench.scene) else penalty, set[Hashable]()
     for factor in (finest / STEP**2, finest / STEP, finest):
         refine = bench.scene.refine * round(factor, 3)
-        yield Trial("reference", Variant(refine=refine, penalty=own, precision="float64", multi_rate="auto"))
+        variant = Variant(refine=refine, penalty=own, precision="float64", multi_rate="auto")
+        if bench.key(variant) not in seen:
+            seen.add(bench.key(variant))
+            yield Trial("reference", variant)
 
 
 def _resolution(scene: Scene) -> dict[str, float]:

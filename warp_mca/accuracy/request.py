@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from warp_mca.accuracy.typed import check_names, check_values
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.scene import Scene
 
 LEAST, MOST = 1e-3, 0.5  # shares that can be asked for [-]
 REMEDY = f"give a share from {LEAST:.1%} to {MOST:.0%}, as 2% or 0.02"
@@ -18,8 +20,8 @@ class Accuracy:
 
     Attributes:
         share: greatest error of each figure that has a limit, against that limit [-].
-        typed: values by name that must stay: parameters of the scene, and `refine`, `mass_scaling`, `multi_rate`,
-            `precision` and `time_step_scale`.
+        typed: values by name that must stay: parameters of the scene, and `refine`, `penalty`, `mass_scaling`,
+            `multi_rate`, `precision`, `time_step_scale` and `element`.
         full: all bodies keep their masses; only the mesh, the step, springs and the precision are chosen.
     """
 
@@ -29,7 +31,14 @@ class Accuracy:
 
     def __post_init__(self) -> None:
         if not (validate.is_number(self.share) and LEAST <= self.share <= MOST):
-            raise bad_value("accuracy", validate.brief(self.share), REMEDY)
+            raise bad_value("accuracy", self.share, REMEDY)
+        validate.kinds("Accuracy", Mapping, "give a mapping of values by name", typed=self.typed)
+        check_values(self.typed)
+
+    @property
+    def percent(self) -> str:
+        """The share as a user may type it, as "2%"."""
+        return f"{100.0 * self.share:.6g}%"
 
     def keeping(self, **values: object) -> Accuracy:
         """The same, with more values that must stay; those that are None are left out."""
@@ -52,3 +61,13 @@ def accuracy_of(asked: float | str | Accuracy) -> Accuracy:
         except ValueError:
             raise bad_value("accuracy", asked, REMEDY) from None
     return Accuracy(share=asked)
+
+
+def check_accuracy(scene: Scene, asked: float | str | Accuracy | None) -> None:
+    """Refuse what is no accuracy, and names in `Accuracy.typed` that a scene does not have.
+
+    Raises:
+        RequestError: so it is.
+    """
+    if asked is not None:
+        check_names(scene, accuracy_of(asked).typed)

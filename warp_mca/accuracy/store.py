@@ -165,6 +165,12 @@ def family_of(scene: Scene) -> Family | None:
     return family if plain else None
 
 
+def no_limit_of(scene: Scene) -> Mapping[str, str]:
+    """Figures without a limit of a scene of the catalogue, whatever its parameters, with the reason."""
+    family = families().get(scene.name)
+    return family.no_limit if family is not None and source_of(scene, options=True) is not None else {}
+
+
 @lru_cache(maxsize=1)
 def _own() -> dict[str, Family]:
     return _read(OWN)

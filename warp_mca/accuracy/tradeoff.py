@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from warp_mca.accuracy.combine import combinations, spread
 from warp_mca.accuracy.figures import BOUND
@@ -61,6 +60,9 @@ def tradeoff(
     span_of(scene, duration)
     if scene.t_end is not None:
         raise bad_value("Scene.t_end", scene.t_end, "variants are compared by one impact; leave t_end out")
+    if all(body.rigid for body in scene.bodies):
+        remedy = "all its bodies are rigid, whose forces have no limit as contact springs stiffen; make one deformable"
+        raise bad_value("scene", scene.name, remedy)
     if budget is not None and not (validate.is_number(budget) and budget > 0.0):
         raise bad_value("budget", validate.brief(budget), "give a finite time above 0 s, or leave it out")
     settings_of(device, "mixed", threads)
@@ -78,16 +80,18 @@ class _Study:
     Attributes:
         bench, budget, progress: see `tradeoff`.
         begun: when it began [s].
-        runs: variants measured, by their knobs.
+        runs: variants measured, by `Bench.key`.
         left_out: variants that there was no time for.
+        same: variants whose meshes are those of one that was measured, and that one.
     """
 
     bench: Bench
     budget: float | None
     progress: Progress | None
     begun: float = field(default_factory=time.perf_counter)
-    runs: dict[tuple[tuple[str, Any], ...], Measured] = field(default_factory=dict)
+    runs: dict[Hashable, Measured] = field(default_factory=dict)
     left_out: list[tuple[Trial, float]] = field(default_factory=list)
+    same: list[tuple[Trial, Trial]] = field(default_factory=list)
 
     def run(self) -> TradeOff:
         """All of it, in order."""
@@ -109,15 +113,17 @@ class _Study:
             reference=reference,
             variants=list(self.runs.values()),
             left_out=self.left_out,
+            same=self.same,
             spent=time.perf_counter() - self.begun,
         )
 
     def combine(self, single: Sequence[Trial], reference: Reference) -> None:
         """Run promising combinations."""
-        runs = [self.runs[_key(trial)] for trial in single[1:] if _key(trial) in self.runs]
+        keys = dict.fromkeys(self.bench.key(trial.variant) for trial in single)
+        runs = [self.runs[key] for key in keys if key in self.runs and self.runs[key].trial is not BASE]
         known = [reference.limits[name].left for name in BOUND]
         floor = min((left for left in known if left is not None), default=0.0)
-        base = self.runs[_key(BASE)]
+        base = self.runs[self.bench.key(BASE.variant)]
         found = combinations(self.bench, runs, reference.figures, floor)
         done = 0
         for k in spread(len(found), COMBINED)[: 2 * COMBINED]:
@@ -126,9 +132,13 @@ class _Study:
                 done += 1
 
     def note(self, trial: Trial) -> Measured:
-        """What a variant gave; each is run once."""
-        key = _key(trial)
-        if key not in self.runs:
+        """What a variant gave; each is run once, and those that are the same model together."""
+        key = self.bench.key(trial.variant)
+        if key in self.runs:
+            first = self.runs[key].trial
+            if first.variant != trial.variant and (trial, first) not in self.same:
+                self.same.append((trial, first))
+        else:
             self.runs[key] = self.bench.run(trial)
             if self.progress:
                 self.progress(self.runs[key], f"{len(self.runs)} runs, {time.perf_counter() - self.begun:.0f} s")
@@ -140,7 +150,7 @@ class _Study:
         Returns:
             Whether it gave figures.
         """
-        if _key(trial) in self.runs or foreseen <= self.left - reserve:
+        if self.bench.key(trial.variant) in self.runs or foreseen <= self.left - reserve:
             return not self.note(trial).stopped
         self.left_out.append((trial, foreseen))
         return False
@@ -153,7 +163,3 @@ class _Study:
     def left(self) -> float:
         """Time that is left [s]."""
         return float("inf") if self.budget is None else self.budget - (time.perf_counter() - self.begun)
-
-
-def _key(trial: Trial) -> tuple[tuple[str, Any], ...]:
-    return tuple(sorted(trial.variant.knobs.items()))

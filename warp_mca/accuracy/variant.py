@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from warp_mca.accuracy.catalogued import like
 from warp_mca.scene import Scene
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.options import with_options
@@ -55,7 +56,7 @@ class Variant:
         """
         if self.parameters:
             built = load_source(scene.name).build({**scene.parameters, **self.parameters})
-            scene = replace(built, refine=scene.refine)
+            scene = like(built, scene, scale="time_step_scale" not in self.parameters)
         scene = with_options(scene, self.refine, self.mass_scaling, None)
         if self.penalty is not None:
             scene = replace(scene, contacts=tuple(replace(item, penalty=self.penalty) for item in scene.contacts))

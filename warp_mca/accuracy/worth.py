@@ -117,6 +117,9 @@ def print_tradeoff(contents: Mapping[str, Any]) -> None:
     out.print(_table(knob_rows(contents)))
     out.print(f"\nFrontier: no other variant is both faster and closer to the reference in {bound}; errors")
     out.print(_table(frontier_rows(contents)))
+    if contents["same_mesh"]:
+        names = "; ".join(f"{words(row['knobs'])} (that of {words(row['as'])})" for row in contents["same_mesh"])
+        out.print(f"\nleft out, for the mesh is that of another variant: {names}")
     if contents["left_out"]:
         names = "; ".join(words(row["knobs"]) for row in contents["left_out"])
         out.print(f"\nleft out, for the budget: {names}")

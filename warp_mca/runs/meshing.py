@@ -79,8 +79,21 @@ def _key(geometry: object) -> object:
     try:
         hash(geometry)
     except TypeError:
-        return id(geometry)
+        return _Itself(geometry)
     return geometry
+
+
+class _Itself:
+    """Equal for one object alone, which it keeps: the id of one that is gone may be that of the next."""
+
+    def __init__(self, item: object) -> None:
+        self.item = item
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and other.item is self.item
+
+    def __hash__(self) -> int:
+        return id(self.item)
 
 
 def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:

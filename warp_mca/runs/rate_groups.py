@@ -67,7 +67,7 @@ def check_multi_rate(value: object) -> MultiRate:
     """
     if value is None:
         return None
-    if value == "auto":
+    if isinstance(value, str) and value == "auto":
         return "auto"
     if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= MOST:
         remedy = f'give "auto" or a number of groups from 1 to {MOST}, or leave it out'
@@ -99,7 +99,7 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
     most = MOST if multi_rate == "auto" else int(multi_rate)
 
     def choose(model: Model, own: OwnSteps) -> Model:
-        if multi_rate == "auto" and model.element_count < cost_of(device).least:
+        if not model.element_count or (multi_rate == "auto" and model.element_count < cost_of(device).least):
             return model
         choices = list(_choices(scene, span, model, own, most))
         if not choices:

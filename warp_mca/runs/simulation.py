@@ -8,8 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from warp_mca.accuracy.plan import Plan, carried_out, planned
-from warp_mca.accuracy.request import Accuracy
-from warp_mca.base import validate
+from warp_mca.accuracy.request import Accuracy, check_accuracy
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.base.garbage import few_collections
 from warp_mca.geometry.mesh import Mesh
@@ -126,12 +125,13 @@ def _every(
     """How often the run stores its state, None for never; arguments as in `run`.
 
     Raises:
-        RequestError: the run cannot store it, or `accuracy` is asked of one that would.
+        RequestError: the run cannot store it, or `accuracy` is asked of one that would, or is none of this scene.
     """
+    check_accuracy(scene, accuracy)
     every = every_of(method, checkpoint, out, scene, recorders)
     if accuracy is not None and (every or method == METHOD):
         remedy = "it is for runs of one impact that store nothing on the way; leave it out, or method and checkpoint"
-        raise bad_value("accuracy", validate.brief(accuracy), remedy)
+        raise bad_value("accuracy", accuracy.percent if isinstance(accuracy, Accuracy) else accuracy, remedy)
     return every
 
 

@@ -206,24 +206,18 @@ class ImpactPhase:
             raise bad_value(
                 "ImpactPhase.output_interval", self.output_interval, f"at most duration = {self.duration:g}"
             )
-        self._check_mass_scaling()
+        if self.mass_scaling is not None and not is_mass_scaling(self.mass_scaling):
+            remedy = "give a factor of 1 or above for the stable step, or a step in seconds as 2e-8s"
+            raise bad_value("ImpactPhase.mass_scaling", validate.brief(self.mass_scaling), remedy)
         if self.open_time is not None:
             validate.positive("ImpactPhase", open_time=self.open_time)
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
 
-    def _check_mass_scaling(self) -> None:
-        """Refuse what is neither a factor nor a step.
 
-        Raises:
-            RequestError: so it is.
-        """
-        asked = self.mass_scaling
-        if asked is None or (validate.is_number(asked) and asked >= 1.0):  # pyright: ignore[reportOperatorIssue]
-            return
-        if isinstance(asked, str) and asked.endswith("s"):
-            with suppress(ValueError):
-                if 0.0 < float(asked[:-1]) < math.inf:
-                    return
-        remedy = "give a factor of 1 or above for the stable step, or a step in seconds as 2e-8s"
-        raise bad_value("ImpactPhase.mass_scaling", validate.brief(asked), remedy)
+def is_mass_scaling(value: object) -> bool:
+    """Whether it is a factor for the stable step, or a step as "2e-8s"."""
+    if isinstance(value, str) and value.endswith("s"):
+        with suppress(ValueError):
+            return 0.0 < float(value[:-1]) < math.inf
+    return validate.is_number(value) and value >= 1.0  # pyright: ignore[reportOperatorIssue]
