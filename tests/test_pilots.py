@@ -67,6 +67,15 @@ def test_meshes_are_those_whose_counts_are_multiples():
     assert Levels(mca.make_scene("coaxial_rods"), 2.0).unlike(1.5) == 0.0
 
 
+def test_meshes_that_are_the_same_tell_nothing():
+    few = mca.make_scene("rod_on_wall", section=2, axial=2)
+    with pytest.raises(mca.RequestError, match="nearly the same"):
+        run_pilots(few, Accuracy(share=0.3, typed={"refine": 1.0}), BOUND, fake)
+    found = run_pilots(few, Accuracy(share=0.05), BOUND, fake)
+    told = replace(found, sizes=(1.0, 0.9)).estimate(fake(found.variant.applied(few)))
+    assert "nearly the same" in str(told["impulse"])
+
+
 def test_a_recipe_without_counts_has_all_levels():
     scene = mca.make_scene("coaxial_rods")
     bodies = tuple(replace(body, geometry=Plain()) for body in scene.bodies)

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.accuracy.catalogued import source_of
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
 COARSE = 0.45, 0.3, 1.0  # refine of the first pilot over that of the scene: wanted, least, most [-]
+APART = 1.15  # least ratio of sizes of cells, as meshed, that tells how figures go with them [-]
 NEXT = 1.42, 1.3, 2.2  # of the second over that of the first; the first takes a fourth of its time [-]
 BELOW = 0.8  # of the second over that of a scene whose refine was typed, at most [-]
 STEP = 2.0**0.25  # between meshes that are considered [-]: a factor of two in time
@@ -85,6 +87,8 @@ class Pilots:
 
     def _error(self, values: Sequence[float | None], sizes: Sequence[float], name: str, lost: float) -> float | str:
         """Error of the last value [-], or why none can be told; `lost` is what springs take of it [-]."""
+        if any(coarse < APART * fine for coarse, fine in pairwise(sizes)):
+            return "meshes of other density are nearly the same, for bodies have few cells; make more"
         resolution = self.resolution if name == "contact_duration" else 0.0
         limit, value = limit_of(sizes, values, resolution), values[-1]
         if limit.value is None or value is None:
@@ -109,6 +113,10 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     coarse, start, first = _first(scene, asked, levels, typed is not None, run)
     ratio, least, most = NEXT
     level = levels.near(ratio * coarse, least * coarse, BELOW if typed is not None else most * coarse)
+    sizes = tuple(1.0 / plain.meshed(found * base) for found in (coarse, level))
+    if sizes[0] < APART * sizes[1]:
+        remedy = "two meshes coarser than that are nearly the same, for bodies have few cells; make more"
+        raise bad_value("accuracy", asked.share, remedy) if typed is None else bad_value("refine", typed, remedy)
     begin = time.perf_counter()
     second = _pilot(scene, replace(start, refine=level * base), run)
     wall = time.perf_counter() - begin
@@ -118,7 +126,6 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
         raise bad_value("accuracy", asked.share, remedy)
     auto = any(contact.penalty == "auto" for contact in start.applied(scene).contacts)
     springs = Springs(_spring_loss(second), auto, level)
-    sizes = tuple(1.0 / plain.meshed(found * base) for found in (coarse, level))
     foreseen = {name: _foreseen(known[0][name], known[1][name], sizes[0] / sizes[1]) for name in bound}
     errors = {name: error for name, error in foreseen.items() if error is not None}
     worst = max(errors, key=lambda name: errors[name], default="")

@@ -267,7 +267,8 @@ def command(scene: Scene, precision: str, groups: int | None, summary: Mapping[s
     source = source_of(scene, options=True)
     if source is None:
         return None
-    made, element, scale = source.build(scene.parameters), scene.bodies[0].element, scene.impact.time_step_scale
+    made, scale = source.build(scene.parameters), scene.impact.time_step_scale
+    same = [body.element for body in scene.bodies] == [body.element for body in made.bodies]
     words = ["warp-mca", "run", scene.name]
     plain = source.resolve(None)
     for name, value in scene.parameters.items():
@@ -278,7 +279,7 @@ def command(scene: Scene, precision: str, groups: int | None, summary: Mapping[s
         "mass-scaling": scene.impact.mass_scaling,
         "multi-rate": groups,
         "precision": precision,
-        "element": element if any(body.element != element for body in made.bodies) else None,
+        "element": None if same else scene.bodies[0].element,
         "time-step-scale": scale if scale != made.impact.time_step_scale else None,
         "device": str(summary["device"]).split(" ")[0],
     }
