@@ -67,6 +67,15 @@ def test_meshes_are_those_whose_counts_are_multiples():
     assert Levels(mca.make_scene("coaxial_rods"), 2.0).unlike(1.5) == 0.0
 
 
+def test_levels_have_meshes_of_their_own():
+    """Few cells of a ball may be those of other values of refine."""
+    levels = Levels(mca.make_scene("hertz_sphere", section=4), 1.0)
+    assert levels.meshed(levels.near(0.64, 0.58, 0.99)) < 1.15 * levels.meshed(0.45)
+    second = levels.near(0.64, 0.58, 0.99, coarser=0.45)
+    assert levels.meshed(second) >= 1.15 * levels.meshed(0.45)
+    assert all(levels.meshed(level) >= 1.15 * levels.meshed(second) for level in levels.finer(second, STEP, 4.0))
+
+
 def test_meshes_that_are_the_same_tell_nothing():
     few = mca.make_scene("rod_on_wall", section=2, axial=2)
     with pytest.raises(mca.RequestError, match="nearly the same"):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,7 @@ from warp_mca.scene import Scene
 FEW = 16  # counts above it are nearly multiples at every level [-]
 APART = 1.4  # least ratio of two levels of a series [-]
 FAR = 0.5  # what a level may be from where it is wanted, over what counts may be from multiples, in logarithms [-]
+ANOTHER = 1.15  # least ratio of two levels as meshed, for their meshes to tell how figures go [-]
 ALIKE = 0.12  # by which counts of a mesh like the scene's differ from multiples, in logarithms [-]
 FINEST = 8.0  # level at which counts are told from other whole numbers of a recipe [-]
 
@@ -35,17 +36,25 @@ class Levels:
 
     scene: Scene
     base: float
+    _known: dict[float, list[int]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def near(self, wanted: float, least: float, most: float) -> float:
-        """The level from `least` to `most` that is like the base and near a wanted one; both weigh."""
-        found = [level for level in (wanted, *self._whole) if least <= level <= most] or [wanted]
+    def near(self, wanted: float, least: float, most: float, coarser: float | None = None) -> float:
+        """The level from `least` to `most` that is like the base and near a wanted one; both weigh.
+
+        Its mesh is another one than that of the level `coarser`; where all are the same, it is the first above.
+        """
+        beyond = 0.0 if coarser is None else ANOTHER * self.meshed(coarser)
+        levels = (wanted, *self._whole)
+        found = [level for level in levels if least <= level <= most and self.meshed(level) >= beyond]
+        if not found:
+            found = [next((level for level in self._whole if level > most and self.meshed(level) >= beyond), wanted)]
         return min(found, key=lambda level: self.unlike(level) + FAR * abs(math.log(level / wanted)))
 
     def finer(self, than: float, step: float, most: float) -> list[float]:
         """Levels above one, from one to the next about a step, up to the greatest; those like the base, if any are."""
         found, wanted = list[float](), APART * than
         while wanted <= most * (1.0 + 1e-9):
-            found.append(self.near(wanted, wanted, min(step * wanted, most)))
+            found.append(self.near(wanted, wanted, min(step * wanted, most), coarser=than))
             wanted = step * found[-1]
         return [level for level in found if self.unlike(level) <= ALIKE] or found
 
@@ -71,7 +80,9 @@ class Levels:
         return (base, finest) if len(base) == len(finest) else ([], [])
 
     def _ratios(self, level: float) -> list[float]:
-        (base, finest), found = self._ends, self._numbers(level)
+        if level not in self._known:
+            self._known[level] = self._numbers(level)
+        (base, finest), found = self._ends, self._known[level]
         if len(found) != len(base):  # a recipe whose numbers come and go
             return []
         return [n / b for b, f, n in zip(base, finest, found, strict=True) if 0 < b != f and n > 0]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from warp_mca.accuracy.catalogued import source_of
 from warp_mca.accuracy.convergence import STEADY, limit_of
 from warp_mca.accuracy.figures import Figures, figures_of
-from warp_mca.accuracy.levels import Levels
+from warp_mca.accuracy.levels import ANOTHER, Levels
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import GuardError, bad_value
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
 COARSE = 0.45, 0.3, 1.0  # refine of the first pilot over that of the scene: wanted, least, most [-]
-APART = 1.15  # least ratio of sizes of cells, as meshed, that tells how figures go with them [-]
 NEXT = 1.42, 1.3, 2.2  # of the second over that of the first; the first takes a fourth of its time [-]
 BELOW = 0.8  # of the second over that of a scene whose refine was typed, at most [-]
 STEP = 2.0**0.25  # between meshes that are considered [-]: a factor of two in time
@@ -87,7 +86,7 @@ class Pilots:
 
     def _error(self, values: Sequence[float | None], sizes: Sequence[float], name: str, lost: float) -> float | str:
         """Error of the last value [-], or why none can be told; `lost` is what springs take of it [-]."""
-        if any(coarse < APART * fine for coarse, fine in pairwise(sizes)):
+        if any(coarse < ANOTHER * fine for coarse, fine in pairwise(sizes)):
             return "meshes of other density are nearly the same, for bodies have few cells; make more"
         resolution = self.resolution if name == "contact_duration" else 0.0
         limit, value = limit_of(sizes, values, resolution), values[-1]
@@ -112,11 +111,14 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     levels, plain = Levels(scene, base), Levels(scene, 1.0)
     coarse, start, first = _first(scene, asked, levels, typed is not None, run)
     ratio, least, most = NEXT
-    level = levels.near(ratio * coarse, least * coarse, BELOW if typed is not None else most * coarse)
+    most = BELOW if typed is not None else most * coarse
+    level = levels.near(ratio * coarse, least * coarse, most, None if typed is not None else coarse)
     sizes = tuple(1.0 / plain.meshed(found * base) for found in (coarse, level))
-    if sizes[0] < APART * sizes[1]:
+    if sizes[0] < ANOTHER * sizes[1]:
         remedy = "two meshes coarser than that are nearly the same, for bodies have few cells; make more"
-        raise bad_value("accuracy", asked.share, remedy) if typed is None else bad_value("refine", typed, remedy)
+        if typed is not None:
+            raise bad_value("refine", typed, f"{remedy}, or leave it out")
+        raise bad_value("accuracy", asked.share, remedy)
     begin = time.perf_counter()
     second = _pilot(scene, replace(start, refine=level * base), run)
     wall = time.perf_counter() - begin
