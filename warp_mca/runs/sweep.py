@@ -19,6 +19,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.results.storage import check_output, folder_path
 from warp_mca.runs.arguments import Progress, check_scene, span_of, teller
 from warp_mca.runs.rate_groups import check_multi_rate
+from warp_mca.runs.sweep_columns import parameter_column
 from warp_mca.runs.sweep_job import Job, Row, failure, run_job
 from warp_mca.runs.sweep_plan import Plan, RunOptions, batches, differing
 from warp_mca.runs.sweep_table import IDENTITY, SweepTable, check_identity, remove_sweep, write_identity
@@ -39,7 +40,6 @@ from warp_mca.solve.threads import thread_count
 TRIES = 5  # of a run whose worker ends before it
 LATE = "not begun before the deadline; the same call goes on with it"
 GO_ON = "if out names a folder, the others can be run by the same call"
-OWN = ("index", "status", "reason", "warnings", "wall")  # columns that no parameter may take
 
 
 def sweep(
@@ -82,8 +82,9 @@ def sweep(
         progress: called with a stage and the share of runs that have ended.
 
     Returns:
-        A row for each scene: index, the parameters that differ, status (done, stopped, failed), reason, all single
-        values of its summary, warnings, wall time [s]. Stopped and failed runs have no figures.
+        A row for each scene: index, the parameters that differ (`parameter.NAME` where an entry of the summary has
+        this name, or it has dots), status (done, stopped, failed), reason, all single values of its summary, warnings,
+        wall time [s]. Stopped and failed runs have no figures.
 
     Raises:
         RequestError: the request cannot be carried out; nothing was written.
@@ -192,7 +193,7 @@ def _opened(plan: Plan, force: bool) -> Iterator[SweepTable]:
         if force:
             remove_sweep(plan.out)
         check_identity(plan.out, identity)
-        table = SweepTable(plan.out)
+        table = SweepTable(plan.out, plan.parameters[0])
         for k in range(len(plan.scenes)):
             if plan.folders and not (plan.out / IDENTITY).exists():
                 check_output(plan.run_folder(k) or plan.out, force=force)
@@ -293,6 +294,5 @@ class _Driver:
         for number, outcome in zip(job.numbers, outcomes, strict=True):
             if number not in self.table.rows:
                 parameters = self.plan.parameters[number].items()
-                own = {"index": number, **{f"parameters.{key}" if key in OWN else key: v for key, v in parameters}}
-                rows.append(own | {key: value for key, value in outcome.items() if key not in own})
+                rows.append({"index": number, **{parameter_column(key): v for key, v in parameters}, **outcome})
         self.table.add(rows)

@@ -14,6 +14,7 @@ from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.files import write_atomically
 from warp_mca.results.storage import ALL_FILES
 from warp_mca.runs.advice import warn
+from warp_mca.runs.sweep_columns import stored_row
 from warp_mca.runs.sweep_job import FAILED, Row
 from warp_mca.runs.sweep_plan import run_name
 
@@ -34,8 +35,11 @@ class SweepTable:
         rows: by number of the run.
     """
 
-    def __init__(self, folder: Path | None) -> None:
-        """Read the rows that `folder` has, if any; those of failed runs are dropped, since these are run again.
+    def __init__(self, folder: Path | None, parameters: Iterable[str] = ()) -> None:
+        """Read the rows that `folder` has, if any, of a sweep with these parameters.
+
+        Rows of failed runs are dropped, since these are run again, and so are rows of earlier versions in which a
+        parameter has taken the place of a figure.
 
         Raises:
             RequestError: `sweep.csv` there is not of this form.
@@ -46,11 +50,11 @@ class SweepTable:
         self._stored = 0.0
         if folder and (folder / CSV).exists():
             try:
-                found = read_rows(folder / CSV)
+                found = [stored_row(row, parameters) for row in read_rows(folder / CSV)]
             except (ValueError, KeyError) as error:
                 remedy = f"{CSV} there was changed by others; name another folder, or use --force (force=True)"
                 raise bad_value("out", str(folder), remedy) from error
-            self.rows = {row["index"]: row for row in found if row["status"] != FAILED}
+            self.rows = {row["index"]: row for row in found if row and row["status"] != FAILED}
             self._columns = _columns(self.rows.values())
             self._rewrite()
 
