@@ -169,7 +169,11 @@ def test_parts_of_all_formats_fall_alike(folder: Path):
         ({}, STEEL, None),
         ({"scale": 1.0}, STEEL, r"body part is 40 m long and weighs 1.88e\+08 kg, .*stable step is .*give scale=1e-3"),
         ({"scale": 1e-6}, STEEL, "check it"),
-        ({}, dataclasses.replace(STEEL, E=210e3, rho=7.85e-9), r"at 7.85e-09 kg/m\^3: give density in kg/m\^3"),
+        (
+            {},
+            dataclasses.replace(STEEL, E=210e3, rho=7.85e-9),
+            r"if E is in MPa and rho in tonne/mm\^3, give them in Pa and kg/m\^3",
+        ),
     ],
 )
 def test_units_that_cannot_be_are_told(folder: Path, changes: dict, material: mca.Elastic, words: str | None):

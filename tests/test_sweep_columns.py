@@ -18,7 +18,7 @@ OUTPUTS = Path(__file__).parents[1] / "docs" / "outputs.md"
 
 def drop(**parameters: object) -> mca.Scene:
     steel = mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
-    box = mca.Box(size=(0.01,) * 3, divisions=(1, 1, 1))
+    box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1))
     cube = mca.Body(name="b", geometry=box, material=steel, position=(0.0, 1e-6, 0.0), velocity=(0.0, -1.0, 0.0))
     contact = mca.Contact(slave=mca.Surface(body="b", nodes="ymin"), master=mca.RigidPlane())
     impact = mca.ImpactPhase(duration=6e-5, output_interval=1e-6, energy_tolerance=0.5)
@@ -63,7 +63,9 @@ def test_every_entry_of_a_summary_is_known_before_a_run(summary: dict[str, objec
 def test_a_sweep_of_an_earlier_version_goes_on(tmp_path: Path, name: str, old: str, kept: bool):
     """Rows in which a parameter took a figure's place are run again; the others stay."""
     table = SweepTable(tmp_path)
-    table.add([{"index": k, old: 0.5 * k, "mu": 0.1, "status": "done", "F_n_max": 1.0 + k, "wall": 2.0} for k in (0, 1)])
+    table.add(
+        [{"index": k, old: 0.5 * k, "mu": 0.1, "status": "done", "F_n_max": 1.0 + k, "wall": 2.0} for k in (0, 1)]
+    )
     found = SweepTable(tmp_path, [name, "mu"]).rows
     column = parameter_column(name)
     assert [(row[column], row["mu"], row["F_n_max"]) for row in found.values()] == (
