@@ -210,8 +210,14 @@ def drive(nodes, axis="x"):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"fixed": (mca.Fixed(body="a", nodes="xmax"),)}, "joint is also fixed"),
-        ({"prescribed": (drive("xmax"),)}, "joint is also fixed or driven"),
+        (
+            {"fixed": (mca.Fixed(body="a", nodes="xmax"),)},
+            r"joint is also fixed or driven, that of a at .*, by Revolute A and Fixed nodes xmax; bind",
+        ),
+        (
+            {"prescribed": (drive("xmax"),)},
+            r"fixed or driven, that of a at \(0\.1, .*, by Revolute A and Prescribed nodes xmax",
+        ),
         ({"prescribed": (drive("xmin"), drive("ymin"))}, "bound twice"),
         ({"prescribed": (drive("xmin"),), "fixed": (mca.Fixed(body="a", nodes="xmin", axes="xy"),)}, "bound twice"),
         (
@@ -221,7 +227,7 @@ def drive(nodes, axis="x"):
                     mca.Revolute(name="B", body="b", at=(0.0, 0.0, 0.0), other="c"),
                 )
             },
-            "tied twice",
+            r"a node is tied twice, that of b at \(0\.1, .*\) m, by Revolute A and Revolute B; let one joint take it",
         ),
     ],
 )

@@ -199,6 +199,12 @@ class Assembly:
             elif kept.any():
                 yield Cells(part.element, part.finite, part.conn[kept], part.index[kept]), mass[kept]
 
+    def where(self, node: int) -> str:
+        """Body and place of a node, for errors."""
+        body = max((start, name) for name, start in self.node_start.items() if start <= node)[1]
+        x, y, z = self.X[node]
+        return f"{body} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
+
     def nodes(self, body: str, name: str) -> Index:
         """Nodes of a set of a body's mesh."""
         return self.meshes[body].nodes(name) + self.node_start[body]

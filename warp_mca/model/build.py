@@ -89,7 +89,7 @@ def build_model(
         pairs["joint_tied"][base.start : base.end] = 0.0
     bodies = _bodies(parts, watched)
     held = constraints(parts, velocity)
-    check_bindings(held, pairs)
+    check_bindings(parts, joints, held, pairs)
     passes, axes, added, penalties = _contacts(parts, velocity)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -170,10 +171,31 @@ def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, 
         "joint_tied": np.concatenate([np.zeros((0, 3, 3)), *(item.tied for item in found)]),
         "joint_slides": np.concatenate(slides).astype(np.int32),
     }
-    nodes = nodes_of(pairs)
-    if len(np.unique(nodes)) < len(nodes):
-        raise RequestError("Scene.joints: a node is tied twice; give each joint, of two bodies, nodes of its own")
+    _check_shared(parts, joints, pairs)
     return pairs, tuple(joints), tuple(item.coupling for item in found if item.coupling is not None)
+
+
+def _check_shared(parts: Assembly, joints: Sequence[JointPairs], pairs: dict[str, NDArray]) -> None:
+    """Refuse nodes that are in two pairs: of two corrections at once neither would hold.
+
+    Raises:
+        RequestError: there is such a node.
+    """
+    nodes = nodes_of(pairs)
+    found, count = np.unique(nodes, return_counts=True)
+    if (count == 1).all():
+        return
+    node = int(found[count > 1][0])
+    by = " and ".join(dict.fromkeys(_joints_of(parts, joints, pairs, node)))
+    remedy = "let one joint take it, and the other one other nodes"
+    raise RequestError(f"Scene.joints: a node is tied twice, that of {parts.where(node)}, by {by}; {remedy}")
+
+
+def _joints_of(parts: Assembly, joints: Sequence[JointPairs], pairs: dict[str, NDArray], node: int) -> Iterator[str]:
+    """Kind and name of the joints that have a node."""
+    for joint, item in zip(parts.scene.joints, joints, strict=True):
+        if any(node in pairs[key][item.start : item.end] for key in ("joint_first", "joint_second")):
+            yield joint.title
 
 
 def nodes_of(pairs: dict[str, NDArray]) -> Index:
@@ -192,7 +214,9 @@ def free_nodes(held: dict[str, NDArray], pairs: dict[str, NDArray], ties: TiedNo
     return free
 
 
-def check_bindings(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> None:
+def check_bindings(
+    parts: Assembly, joints: Sequence[JointPairs], held: dict[str, NDArray], pairs: dict[str, NDArray]
+) -> None:
     """Refuse nodes of joints that are fixed or driven too: each stage would undo what the other set.
 
     Raises:
@@ -200,5 +224,11 @@ def check_bindings(held: dict[str, NDArray], pairs: dict[str, NDArray]) -> None:
     """
     bound = held["fixed_axes"] != 0
     bound[held["prescribed_node"]] = True
-    if bound[nodes_of(pairs)].any():
-        raise RequestError("Scene.joints: a node of a joint is also fixed or driven; bind other nodes of that body")
+    nodes = nodes_of(pairs)
+    if bound[nodes].any():
+        node = int(nodes[bound[nodes]][0])
+        others = (*parts.scene.fixed, *parts.scene.prescribed)
+        other = next(item for item in others if node in parts.nodes(item.body, item.nodes))
+        by = f"by {next(_joints_of(parts, joints, pairs, node))} and {type(other).__name__} nodes {other.nodes}"
+        what = f"a node of a joint is also fixed or driven, that of {parts.where(node)}, {by}"
+        raise RequestError(f"Scene.joints: {what}; bind other nodes of that body")

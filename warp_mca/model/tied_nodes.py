@@ -110,6 +110,12 @@ class TiedNodes:
         found[self.slave] = np.where(self.weight != 0.0, found[self.master], 0.0).max(axis=1)
         return found
 
+    def title(self, which: NDArray[np.bool_]) -> str:
+        """The tie that has the first of `which` slaves, for errors; shape (slave_count,)."""
+        ends = np.cumsum([fact["nodes"] for fact in self.facts])  # pyright: ignore
+        fact = self.facts[int(np.searchsorted(ends, int(which.argmax()), side="right"))]
+        return f"Tie {fact['slave']}–{fact['master']}"
+
     def moved(self, start: int) -> TiedNodes:
         """The same with nodes that are counted from `start` on."""
         return TiedNodes(
@@ -140,12 +146,17 @@ def tied_nodes(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     for body in scene.bodies:
         first[body.name] = start
         start += len(meshes[body.name].points)
-    found = joined([_tied(tie, meshes, X, first) for tie in scene.ties])
-    if len(np.unique(found.slave)) < len(found):
-        raise RequestError("Scene.ties: a slave node is tied twice; give each tie slave nodes of its own")
-    if np.isin(found.slave, found.carriers).any():
-        raise RequestError("Scene.ties: a slave node carries another tie's slaves; tie these to the same master")
-    return found
+    items = [_tied(tie, meshes, X, first) for tie in scene.ties]
+    for k, item in enumerate(items):
+        for other, own in zip(scene.ties[:k], items[:k], strict=True):
+            if np.isin(item.slave, own.slave).any():
+                what = f"some of these nodes are tied twice, by {other.title} too; give each tie slave nodes of its own"
+                raise bad_value(f"{scene.ties[k].title}.slave", scene.ties[k].slave.nodes, what)
+        for other, own in zip(scene.ties, items, strict=True):
+            if np.isin(item.slave, own.carriers).any():
+                what = f"slaves of {other.title} are tied to some of these nodes; tie both to the same master"
+                raise bad_value(f"{scene.ties[k].title}.slave", scene.ties[k].slave.nodes, what)
+    return joined(items)
 
 
 def _tied(tie: Tie, meshes: Mapping[str, Mesh], X: Mapping[str, Array], first: Mapping[str, int]) -> TiedNodes:
@@ -226,13 +237,15 @@ def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Ind
     if not len(ties):
         return
     driven = np.concatenate([held["prescribed_node"], *moved])
-    if np.isin(np.concatenate([ties.slave, ties.carriers]), driven).any():
+    bad = np.isin(ties.slave, driven) | (np.isin(ties.master, driven) & (ties.weight != 0.0)).any(axis=1)
+    if bad.any():
         what = "a tied node is also in a joint or driven, absorbing or of a rigid body"
-        raise RequestError(f"Scene.ties: {what}; bind other nodes, off the tie")
+        raise RequestError(f"{ties.title(bad)}: {what}; bind other nodes, off the tie")
     fixed = held["fixed_axes"]
     shared = np.bitwise_and.reduce(np.where(ties.weight != 0.0, fixed[ties.master], 7), axis=1)
-    if (fixed[ties.slave] & ~shared).any():
-        raise RequestError("Scene.ties: a slave node is fixed where its masters are free; fix the masters, too")
+    bad = (fixed[ties.slave] & ~shared) != 0
+    if bad.any():
+        raise RequestError(f"{ties.title(bad)}: a slave node is fixed where its masters are free; fix the masters, too")
     speed = float(np.abs(V).max())
     if np.abs(V[ties.slave] - ties.place(V)).max() > MOVING * speed:
         raise RequestError("Scene.ties: a slave moves against its master at the start; give tied bodies one motion")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from warp_mca.base import validate
-from warp_mca.base.errors import bad_value
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.elements import ELEMENTS
 from warp_mca.geometry.degenerate import cut_to
 from warp_mca.geometry.mesh import Mesh
@@ -50,7 +50,21 @@ def mesh(
     for name, item in cut.items():
         if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
             check(item, name)
+    for field, body, name, covers in scene.named_sets():
+        _check_set(field, body, name, cut[body], covers)
     return cut
+
+
+def _check_set(field: str, body: str, name: str, mesh: Mesh, covers: bool) -> None:
+    """Refuse a node set that the mesh of a body does not have, or that does not cover faces where it must.
+
+    Raises:
+        RequestError: so it is.
+    """
+    try:
+        mesh.surface(name) if covers else mesh.nodes(name)
+    except RequestError as error:
+        raise RequestError(f"{field} of body {body}, {error}") from error
 
 
 def _geometry(scene: Scene, body: Body) -> object:

@@ -26,7 +26,7 @@ class Fixed:
         validate.plain(self)
         validate.texts("Fixed", body=self.body, nodes=self.nodes)
         if not isinstance(self.axes, str) or not self.axes or set(self.axes) - set("xyz"):
-            raise bad_value("Fixed.axes", self.axes, "use letters out of x, y and z")
+            raise bad_value(f"Fixed of {self.body}.axes", self.axes, "use letters out of x, y and z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,12 +50,13 @@ class Prescribed:
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.texts("Prescribed", body=self.body, nodes=self.nodes)
+        owner = f"Prescribed of {self.body}"
         if self.axis not in ("x", "y", "z"):
-            raise bad_value("Prescribed.axis", self.axis, "use one of x, y and z")
+            raise bad_value(f"{owner}.axis", self.axis, "use one of x, y and z")
         for name, values in (("times", self.times), ("velocities", self.velocities)):
             if not validate.is_list(values):
-                raise bad_value(f"Prescribed.{name}", values, "give finite numbers")
+                raise bad_value(f"{owner}.{name}", values, "give finite numbers")
         if len(self.times) != len(self.velocities) or not len(self.times):
-            raise bad_value("Prescribed.velocities", self.velocities, "give one velocity for each time")
+            raise bad_value(f"{owner}.velocities", self.velocities, "give one velocity for each time")
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise bad_value("Prescribed.times", self.times, "list them in increasing order")
+            raise bad_value(f"{owner}.times", self.times, "list them in increasing order")

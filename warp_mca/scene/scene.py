@@ -12,7 +12,7 @@ from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
-from warp_mca.scene.joints import JOINTS, Joint
+from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
 from warp_mca.scene.sensors import Probe, Section, check_class
@@ -171,6 +171,24 @@ class Scene:
             if isinstance(self.rigid.target, Surface):
                 named.append(("RigidPhase.target.body", self.rigid.target.body))
         return named
+
+    def named_sets(self) -> list[tuple[str, str, str, bool]]:
+        """Node sets that the scene names: the field, the body, the set, and whether it must cover faces."""
+        named = [("Fixed.nodes", item.body, item.nodes, False) for item in self.fixed]
+        named += [("Prescribed.nodes", item.body, item.nodes, False) for item in self.prescribed]
+        named += [("Absorbing.nodes", item.body, item.nodes, True) for item in self.absorbing]
+        for joint in self.joints:
+            if isinstance(joint, Weld | Prismatic):
+                named.append((f"{joint.title}.nodes", joint.body, joint.nodes, False))
+                if joint.other is not None and joint.other_nodes is not None:
+                    named.append((f"{joint.title}.other_nodes", joint.other, joint.other_nodes, False))
+        surfaces = [("Contact.slave.nodes", contact.slave) for contact in self.contacts]
+        surfaces += [("Contact.master.nodes", m) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
+        surfaces += [(f"{t.title}.{name}.nodes", getattr(t, name)) for t in self.ties for name in ("slave", "master")]
+        if self.rigid and isinstance(self.rigid.target, Surface):
+            surfaces.append(("RigidPhase.target.nodes", self.rigid.target))
+        named += [(field, surface.body, surface.nodes, True) for field, surface in surfaces]
+        return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in self.probes if p.nodes is not None]
 
     @property
     def rigid_names(self) -> list[str]:

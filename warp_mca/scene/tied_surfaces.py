@@ -32,8 +32,8 @@ class Tie:
         validate.plain(self)
         validate.kinds("Tie", Surface, "give a Surface", slave=self.slave, master=self.master)
         if self.slave == self.master:
-            raise bad_value("Tie.master", self.master.nodes, "name a surface other than the slave's")
-        validate.positive("Tie", gap=self.gap)
+            raise bad_value(f"{self.title}.master", self.master.nodes, "name a surface other than the slave's")
+        validate.positive(self.title, gap=self.gap)
 
     @property
     def title(self) -> str:
