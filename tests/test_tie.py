@@ -232,7 +232,7 @@ def test_bodies_that_move_apart_and_slaves_tied_twice_are_refused():
     with pytest.raises(mca.RequestError, match="give tied bodies one motion"):
         prepared(dataclasses.replace(scene, bodies=(moving, scene.bodies[1])))
     with pytest.raises(
-        mca.RequestError, match="^Tie fine:xmax–coarse:xmin.slave = 'xmax': some of these nodes are tied twice, by Tie"
+        mca.RequestError, match=r"^Tie fine:xmax–coarse:xmin.slave = 'xmax': some of these nodes are tied twice, by Tie"
     ):
         prepared(dataclasses.replace(scene, ties=scene.ties * 2))
 
