@@ -235,9 +235,10 @@ class SceneRun:
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(
-                f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.kept.exchanged:.3g} J that the bodies "
-                f"exchanged, though only {ledger.kept.energy_error:.2g} of all they have: {ledger.remedy}, if that is "
-                f"above what energy_tolerance = {tolerance:g} should allow"
+                f"energy imbalance is {ledger.kept.imbalance:.3g} J: {ledger.exchange_error:.3g} of the "
+                f"{ledger.kept.exchanged:.3g} J that the bodies exchanged, {ledger.kept.energy_error:.2g} of all that "
+                f"they have, where energy_tolerance is {tolerance:g}: {ledger.remedy}, or take what they exchange as "
+                "no more exact than that"
             )
         if ledger.kept.turned:
             found.append(
