@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,3 +45,28 @@ def test_a_set_that_is_not_there_is_named_with_its_body_and_field(change: dict[s
     scene = mca.Scene(name="sets", bodies=bodies, impact=mca.ImpactPhase(duration=1e-6), **change)
     with pytest.raises(mca.RequestError, match=f"^{re.escape(said)}"):
         mca.mesh(scene)
+
+
+def test_points_outside_a_body_name_it():
+    body = mca.Body(name="a", geometry=MESH, material=STEEL)
+    line = mca.Line(body="a", start=(0.0, 0.0, 0.0), end=(0.02, 0.0, 0.0))
+    for change, said in (
+        ({"paths": (mca.Path(name="p", lines=(line,), spacing=0.01),)}, "0.01 m outside the body a; give points of it"),
+        (
+            {"probes": (mca.Probe(name="p", body="a", at=(0.0, 0.0, 0.02)),)},
+            "0.01 m outside the body a; give one of it",
+        ),
+        (
+            {"sections": (mca.Section(name="p", body="a", at=(1.0, 0.0, 0.0), normal=(1.0, 0.0, 0.0)),)},
+            "leaves all of body a on one side",
+        ),
+    ):
+        with pytest.raises(mca.RequestError, match=said):
+            mca.run(mca.Scene(name="sets", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6), **change))
+
+
+def test_a_scene_file_that_fails_names_its_line(tmp_path: Path):
+    file = tmp_path / "broken.py"
+    file.write_text("import warp_mca\n\nx = 1 / 0\n", encoding="utf-8")
+    with pytest.raises(mca.RequestError, match=r"reading the file failed: ZeroDivisionError: .* \(line 3\)$"):
+        mca.make_scene(file)

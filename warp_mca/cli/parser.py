@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import warp_mca as mca
 from warp_mca.cli import commands, paper, run, sweep, tradeoff
@@ -33,6 +34,11 @@ warp-mca COMMAND --help lists the options; README.md has an example in Python.""
 class Parser(argparse.ArgumentParser):
     """Reports a bad command in one line."""
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.register("type", int, partial(_number, int, "give a whole number"))
+        self.register("type", float, partial(_number, float, "give a number without a unit, as 0.002 or 2e-3"))
+
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
@@ -53,6 +59,14 @@ def make_parser() -> argparse.ArgumentParser:
     _paper(add("paper", help="run the published study again, and put its claims beside ours"))
     _verify(add("verify", help="measure the engine against known answers"))
     return parser
+
+
+def _number(kind: Callable[[str], float], remedy: str, text: str) -> float:
+    """The value of an option that takes a number."""
+    try:
+        return kind(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: {remedy}") from None
 
 
 def _group(parser: argparse.ArgumentParser, title: str, example: str) -> argparse._ArgumentGroup:

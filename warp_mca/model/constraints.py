@@ -112,7 +112,9 @@ def _tied_pairs(parts: Assembly, joint: Joint, start: int) -> _Tied:
         apart = float(np.linalg.norm(parts.X[a] - parts.X[b], axis=1).max()) if alike else np.inf
         if apart > side.tolerance:
             what = f"{len(a)} nodes of {joint.body} and {len(b)} of {joint.other}, up to {apart:.3g} m apart"
-            remedy = f"they do not coincide ({what}); mesh both alike at the joint"
+            remedy = (
+                f"they do not coincide ({what}); let the joint's places in both bodies meet, and mesh both alike there"
+            )
             raise bad_value(f"{joint.title}.{joint.place}", getattr(joint, joint.place), remedy)
         parts.X[b] = parts.X[a]
     tied = np.eye(3) if ties.tied is None else ties.tied

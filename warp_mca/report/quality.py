@@ -64,9 +64,9 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     from warp_mca.model.cells import nodal_masses
     from warp_mca.rigid.handoff import hand_off
     from warp_mca.runs.advice import mesh_warnings
-    from warp_mca.runs.arguments import check_scene
+    from warp_mca.runs.meshing import mesh
 
-    check_scene("scene", scene)
+    meshes = mesh(scene, given=meshes)
     bodies = tuple(
         BodyQuality(
             body=name,

@@ -101,7 +101,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
                 at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
                 if line.body not in boxes:
                     boxes[line.body] = {name: cell_boxes(mesh.points, cells) for name, cells in mesh.cells.items()}
-                found[key] = _elements_around(at, mesh, boxes[line.body], path)
+                found[key] = _elements_around(at, mesh, boxes[line.body], path, line.body)
             nodes, weights = found[key]
             along.append(line.position + share * line.length)
             corner.append((nodes + model.node_start[line.body]).astype(np.int32))
@@ -110,7 +110,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
     return Probes(position, np.concatenate(corner), np.concatenate(weight))
 
 
-def _elements_around(at: Array, mesh: Mesh, boxes: Mapping[str, Boxes], path: Path) -> Place:
+def _elements_around(at: Array, mesh: Mesh, boxes: Mapping[str, Boxes], path: Path, body: str) -> Place:
     """Corners of the cell around each point, shape (point_count, MAX_CORNERS), and their weights there.
 
     Raises:
@@ -124,7 +124,8 @@ def _elements_around(at: Array, mesh: Mesh, boxes: Mapping[str, Boxes], path: Pa
     far = int(np.argmax(apart - allowed))
     if apart[far] > allowed[far]:
         place = ", ".join(f"{x:.6g}" for x in at[far])
-        raise bad_value(f"Path {path.name}.lines", f"({place})", f"this point lies {apart[far]:.3g} m outside the body")
+        remedy = f"this point lies {apart[far]:.3g} m outside the body {body}; give points of it, in its own frame"
+        raise bad_value(f"Path {path.name}.lines", f"({place})", remedy)
     return corners[best, rows], weights[best, rows]
 
 

@@ -117,7 +117,7 @@ def _around(probe: Probe, mesh: Mesh) -> Spot:
     ]
     corner, weight, apart, allowed = min(found, key=lambda cell: float(cell[2][0] - cell[3][0]))
     if apart[0] > allowed[0]:
-        remedy = f"this point lies {apart[0]:.3g} m outside the body; give one of it, in its own frame"
+        remedy = f"this point lies {apart[0]:.3g} m outside the body {probe.body}; give one of it, in its own frame"
         raise bad_value(f"{probe.title}.at", probe.at, remedy)
     kept = weight[0] != 0.0
     return Spot(probe.body, corner[0][kept].astype(np.int32), weight[0][kept])
@@ -136,7 +136,7 @@ def _cut(section: Section, mesh: Mesh) -> Cut:
     normal = np.array(section.normal) / np.linalg.norm(section.normal)
     cut = Cut(section.body, 0, (mesh.points - np.array(section.at)) @ normal)
     if not len(cut.interface(list(mesh.cells.values()))[1]):
-        remedy = "the plane leaves all of the body on one side; give a point inside it, in the body's frame"
+        remedy = f"the plane leaves all of body {section.body} on one side; give a point inside it, in its own frame"
         raise bad_value(f"{section.title}.at", section.at, remedy)
     return cut
 

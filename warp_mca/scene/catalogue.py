@@ -12,6 +12,7 @@ import inspect
 import os
 import pkgutil
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -118,6 +119,9 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
         return _source(_imported(Path(name)), Path(name).stem, builtin=False)
     names = scene_names()
     if name not in names:
+        if isinstance(name, str) and (Path(name).suffix or os.path.exists(name)):  # noqa: PTH110, a name may be too long
+            remedy = "give a Python file (.py), a model file (.mca) or a name that warp-mca scenes lists"
+            raise bad_value("scene", name, f"{remedy}; a part needs the suffix of its format, as .step or .inp")
         known = _known(name, names, "none")
         raise bad_value(
             "scene", validate.brief(name), f"the scenes are {known}; or give a Python file (.py) or a model file (.mca)"
@@ -179,8 +183,10 @@ def _imported(path: Path) -> ModuleType:
     except McaError:
         raise
     except (Exception, SystemExit) as error:
-        words = " ".join(str(error).split())
-        raise bad_value("scene", str(path), f"reading the file failed: {type(error).__name__}: {words}") from error
+        lines = [row.lineno for row in traceback.extract_tb(error.__traceback__) if row.filename == spec.origin]
+        where = f" (line {lines[-1]})" if lines else ""
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        raise bad_value("scene", str(path), f"reading the file failed: {words}{where}") from error
     _STAMPS[name] = stamp
     return module
 
