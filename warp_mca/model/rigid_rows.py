@@ -173,10 +173,8 @@ def fixed_rows(parts: Assembly, place: int, name: str, centre: Array, radius: fl
             for letter in item.axes:
                 k = "xyz".index(letter)
                 if (velocity[nodes, k] != 0.0).any():
-                    remedy = (
-                        f"nodes {item.nodes} of this rigid body move along {letter} at the start; start at rest there"
-                    )
-                    raise bad_value(f"Fixed of {name}.axes", item.axes, remedy)
+                    remedy = f"nodes of rigid body {name} move along {letter} at the start; start at rest there"
+                    raise bad_value("Fixed.axes", item.axes, remedy)
                 node.append(nodes)
                 axis.append(np.full(len(nodes), k))
     nodes, axes = np.concatenate(node), np.concatenate(axis)

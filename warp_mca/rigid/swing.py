@@ -83,7 +83,7 @@ def swing(
     start = gap(0.0, y[: chain.coordinate_count])
     if start < -round_off(chain):
         remedy = f"the tip overlaps the target at the start by {-start:.6g} m; move the target away or change"
-        raise bad_value("gap to RigidPhase.target at t = 0 [m]", float(start), f"{remedy} RigidPhase.theta")
+        raise bad_value("gap to RigidPhase.target at t = 0 [m]", float(start), f"{remedy} RigidPhase.theta, in radians")
     run = swing_until(chain, theta0, theta_dot0, (gap,), t_end=t_max if t_end is None else t_end)
     if run.ended_by == "touch" or t_end is not None:
         return run
