@@ -90,7 +90,7 @@ def test_bodies_of_a_material_are_named_together_and_a_rigid_one_may_be_light():
         ({"size": (200.0, 10.0, 10.0)}, "body a is 200 m long and weighs 1.57e+08 kg: if its sizes are in millimetres"),
         ({"size": (2000.0, 1.0, 1e-3)}, "body a is 2e+03 m long"),
         ({"size": (2e-8, 1e-8, 1e-8)}, "smaller than a tenth of a micrometre"),
-        ({"size": mca.Box(size=(40.0, 2.0, 2.0), divisions=(4, 1, 1)).build()}, "its points are in millimetres"),
+        ({"size": mca.Box(size=(40.0, 2.0, 2.0), divisions=(4, 1, 1)).build()}, "if its sizes are in millimetres"),
         ({"rotation": (0.0, 0.0, 90.0)}, r"Body a.rotation = (0, 0, 90) rad is more than a full turn: if it is in "
          "degrees, give (0, 0, 1.571)"),
         ({"rotation": (45.0, -30.0, 0.0)}, "give (0.7854, -0.5236, 0)"),
@@ -110,6 +110,7 @@ def test_other_values_that_say_another_unit(options: dict[str, Any], said: str):
         {"rotation": (0.0, 0.0, 6.2831853071795864)},
         {"gravity": (0.0, -9806.65, 0.0)},  # a shock of 1000 g
         {"size": (30.0, 0.1, 0.1)},  # a long bar
+        {"size": mca.Box(size=(12.0, 1.0, 1.0), divisions=(4, 1, 1)).build()},  # whose mesh comes from no file
         {"size": (2e-6, 1e-6, 1e-6)},
         {"contacts": (ON_PLANE,), "velocity": (20e3, -10.0, 0.0)},  # along the plane
         {"contacts": (replace(ON_PLANE, penalty=1000.0),), "velocity": (0.0, -4000.0, 0.0)},

@@ -94,7 +94,7 @@ def _likely(E: float, rho: float) -> str:
 
 
 def _sizes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> Iterator[str]:
-    """What extents and masses say. Parts from files name no unit; other bodies may well be long."""
+    """What extents and masses say. Parts from files name no unit; others may well be bars of 10 m."""
     slow = model.stable.dt > LONGEST_STEP
     absorbing = {item.body for item in scene.absorbing}
     for body in scene.bodies:
@@ -103,13 +103,11 @@ def _sizes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> Iterator[s
             continue
         size, mass = _extent(meshes[body.name]), _mass(model, body.name)
         what = f"body {body.name} is {size:.3g} m long and weighs {mass:.3g} kg"
-        if isinstance(body.geometry, Cad | MeshFile | Mesh):
+        if isinstance(body.geometry, Cad | MeshFile):
             explained = any(_strange(material, body.rigid) for material in materials)
             if size > LONGEST or (not explained and (mass > HEAVIEST or (slow and size > 1.0))):
-                where = "its points are" if isinstance(body.geometry, Mesh) else "its file counts"
-                remedy = "give them in metres" if isinstance(body.geometry, Mesh) else "give scale=1e-3"
                 step = f"the stable step is {model.stable.dt:.2g} s"
-                yield f"{what}, and {step}: if {where} in millimetres, {remedy}"
+                yield f"{what}, and {step}: if its file counts in millimetres, give scale=1e-3"
             elif size < SHORTEST:
                 yield f"{what}: its scale makes it smaller than a tenth of a millimetre; check it"
         elif size > LARGEST or (mass > MOST_MASS and body.name not in absorbing):
