@@ -92,7 +92,7 @@ def test_elements_other_than_solids_are_left_out_with_a_word(tmp_path: Path, cap
     (tmp_path / "it.k").write_text(deck("columns").replace("*ELEMENT_SOLID", f"{shell}*ELEMENT_SOLID"))
     assert len(mca.MeshFile(tmp_path / "it.k").build().hexahedra) == 3
     (record,) = caplog.records
-    assert "elements of *ELEMENT_SHELL_THICKNESS are left out" in record.getMessage()
+    assert record.getMessage().endswith("left out are 1 cards of *ELEMENT_SHELL_THICKNESS")
 
 
 @pytest.mark.parametrize(
@@ -103,8 +103,8 @@ def test_elements_other_than_solids_are_left_out_with_a_word(tmp_path: Path, cap
         ("*KEYWORD", "*KEYWORD LONG=Y", "long fields"),
         ("*NODE\n", "*NODE+\n", "long fields"),
         ("      31      31\n", "      31      14\n", "is of no known type"),
-        ("       1       2       3       4", "       1       2       3       8", "node 8 is used but not in"),
-        ("       1       2       3       4", "       1       2       x       4", "invalid literal"),
+        ("       1       2       3       4", "       1       2       3       8", "has node 8, which is not given"),
+        ("       1       2       3       4", "       1       2       x       4", "line 20: 'x' is no whole number"),
     ],
 )
 def test_what_is_not_read_is_refused(tmp_path: Path, old: str, new: str, words: str):
@@ -126,7 +126,7 @@ def test_wedges_of_gmsh_are_those_of_ls_dyna(tmp_path: Path):
     ):
         file = tmp_path / "wedge.k"
         file.write_text(f"{title}\n*KEYWORD\n*NODE\n{nodes}*ELEMENT_SOLID\n{solid}\n*END\n")
-        (block,) = read_keywords(file).cells
+        (block,) = read_keywords(file)[0].cells
         assert block.type == "wedge"
         found.append(block.data.tolist())
     assert found[0] == found[1] == [[0, 1, 2, 3, 4, 5]]

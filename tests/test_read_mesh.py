@@ -90,28 +90,6 @@ def test_mesh_file_point_and_cell_sets(tmp_path: Path):
     assert mesh.cell_sets["left"].tolist() == [0]
 
 
-@pytest.mark.parametrize(
-    ("lines", "words"),
-    [
-        ("*Part, name=a\n{}*End Part\n*PART, name=b\n{}", r"more than one \*PART"),
-        ("{}*Instance, name=a-1\n*End Instance\n *x\n* instance, name=a-2", r"more than one \*INSTANCE"),
-        ("{}*INSTANCE, name=a-1, part=a\n** moved\n0.1, 0., 0.\n*END INSTANCE\n", r"\*INSTANCE is moved"),
-        ("{}*node\n99, 0., 0., 0.\n", r"more than one \*NODE"),
-    ],
-)
-def test_abaqus_files_that_meshio_misreads_are_refused(tmp_path: Path, lines: str, words: str):
-    """It numbers nodes from the start in each part, and leaves instances where their parts are."""
-    file = tmp_path / "it.inp"
-    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
-    read_back(file, as_meshio(box))
-    part = "".join(file.read_text().partition("*NODE")[1:])
-    file.write_text(f"*Part, name=a\n{part}*End Part\n*Instance, name=a-1, part=a\n\n** *Part\n*End Instance\n")
-    assert np.array_equal(MeshFile(file).build().points, box.points)
-    file.write_text(lines.format(part, part))
-    with pytest.raises(RequestError, match=rf"it\.inp.*{words}.*NO PARTS ASSEMBLIES"):
-        MeshFile(file).build()
-
-
 def test_a_refusal_gives_the_reason_of_meshio(tmp_path: Path):
     """Files of gmsh were told to become what they were; some readers print their reason and exit, others raise it."""
     for line, reason in (("9.9 0 8", "Need mesh format in"), ("4.1 0 8\n$EndMeshFormat", "Element section not found")):

@@ -1,7 +1,8 @@
-"""Owns the reading of mesh files by gmsh: Ideas universal files and Nastran bulk data."""
+"""Owns the reading of Ideas universal files by gmsh."""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -9,25 +10,77 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC
+from warp_mca.geometry.deck import ELEMENTS, integer, left_out_notes, quadratic_notes, real
 from warp_mca.geometry.gmsh_session import gmsh_session
+from warp_mca.geometry.meshio_file import linear, stray_notes
 
 if TYPE_CHECKING:
     import meshio
 
-GMSH_SUFFIXES = (".unv", ".bdf", ".nas")
+GMSH_SUFFIXES = (".unv",)
+_CURVES = {1: ("line", 2), 8: ("line", 2)}
 _SURFACES = {2: ("triangle", 3), 3: ("quad", 4), 9: ("triangle", 3), 16: ("quad", 4), 10: ("quad", 4)}
 _VOLUMES = {cell.gmsh: (cell.meshio, cell.corners) for cell in CELL_TYPES.values()}
 _QUADRATIC = {code: (name, 0) for name, (code, *_) in QUADRATIC.items()}
-_TYPES = _SURFACES | _VOLUMES | _QUADRATIC  # by gmsh's code: meshio's name, nodes that are kept (0: all)
+_TYPES = _CURVES | _SURFACES | _VOLUMES | _QUADRATIC  # by gmsh's code: meshio's name, nodes that are kept (0: all)
+# Types of elements by their number in universal files: solids, beams, and what gmsh reads besides.
+_SOLIDS = (111, 112, 113, 114, 115, 116, 117, 118)
+_BEAMS = (11, 21, 22, 23, 24)
+_READ = (*_SOLIDS, *_BEAMS, *range(41, 100))
 
 
-def read_by_gmsh(path: Path) -> meshio.Mesh:
-    """The faces and cells of a file with its groups as cell sets; without groups, properties are called "part_N".
+def read_by_gmsh(path: Path) -> tuple[meshio.Mesh, list[str]]:
+    """The edges, faces and cells of a file with its groups as cell sets, and sentences about what is left out.
+
+    Without groups, properties are called "part_N".
 
     Raises:
         RequestError: gmsh is missing.
-        Exception: it cannot read the file.
+        ValueError: a number is given twice, or gmsh finds other solids than the file has.
+        Exception: gmsh cannot read the file.
     """
+    kinds = _kinds(path)
+    read = _read(path)
+    quadratic = linear(read)
+    solids = sum(len(block.data) for block in read.cells if block.dim == 3)
+    if solids != (count := sum(kinds[kind] for kind in _SOLIDS)):
+        raise ValueError(f"gmsh finds {solids} of its {count} solids")
+    left = Counter({(ELEMENTS, f"of the type {kind}"): n for kind, n in kinds.items() if kind not in _READ})
+    return read, quadratic_notes(path, quadratic) + stray_notes(path, read) + left_out_notes(path, left)
+
+
+def _kinds(path: Path) -> Counter[int]:
+    """Number of elements of each type, by its number in the format."""
+    found: Counter[int] = Counter()
+    places: dict[int, tuple[float, ...]] = {}
+    elements: set[int] = set()
+    with path.open(errors="replace") as file:
+        lines = iter(file)
+        for line in lines:
+            if line.strip() != "-1":
+                continue
+            dataset = next(lines, "").strip()
+            for record in lines:
+                fields = record.split()
+                if fields == ["-1"]:
+                    break
+                if dataset in ("2411", "781"):
+                    place = tuple(map(real, next(lines, "").split()))
+                    if places.setdefault(integer(fields[0]), place) != place:
+                        raise ValueError(f"node {fields[0]} is given twice")
+                elif dataset == "2412":
+                    number, kind, *_, count = map(integer, fields)
+                    if number in elements:
+                        raise ValueError(f"element {number} is given twice")
+                    elements.add(number)
+                    found[kind] += 1
+                    for _ in range((count + 7) // 8 + (kind in _BEAMS)):
+                        next(lines, "")
+    return found
+
+
+def _read(path: Path) -> meshio.Mesh:
+    """What gmsh finds in a file."""
     import meshio
 
     with gmsh_session() as gmsh:
@@ -37,7 +90,7 @@ def read_by_gmsh(path: Path) -> meshio.Mesh:
         order = np.argsort(tags)
         owners: list[tuple[int, int]] = []
         cells: list[Any] = []
-        for entity in [*model.getEntities(2), *model.getEntities(3)]:
+        for entity in [*model.getEntities(1), *model.getEntities(2), *model.getEntities(3)]:
             for kind, nodes in _cells(model, entity):
                 if not np.isin(nodes, tags).all():
                     raise ValueError("its cells have nodes that it does not give")

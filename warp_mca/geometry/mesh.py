@@ -24,6 +24,7 @@ class Mesh:
         node_sets: named node indices, each shape (count,), int32.
         cell_sets: named cell indices, each shape (count,), int32.
         tetrahedra: node indices in VTK order, shape (tetrahedron_count, 4), int32.
+        notes: what the reader of its file left out, a sentence each; a run has them among its warnings.
     """
 
     points: NDArray[np.float64]
@@ -31,6 +32,7 @@ class Mesh:
     node_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     cell_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     tetrahedra: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+    notes: tuple[str, ...] = ()
 
     @property
     def cells(self) -> dict[str, NDArray[np.int32]]:
