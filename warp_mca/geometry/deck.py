@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import meshio
 
 _CORNERS = {cell.meshio: cell.corners for cell in CELL_TYPES.values()}
+SHOWN = 12  # keywords that no table has, in a warning
 _LOWER = {2: "line", 3: "triangle", 4: "quad"}  # meshio's names of cells that are no solids, by their corners
 _EXPONENT = re.compile(r"(?<=[\d.])(?:[dD]|(?=[+-]))([+-]?\d+)$")  # Fortran's 1.5D3, 1.5D+3 and 1.5+3
 
@@ -131,7 +132,9 @@ def left_out_notes(path: str | Path, left: Mapping[tuple[str, str], int]) -> lis
     parts = [f"{count} {name}" for name, count in kinds.pop(ELEMENTS, Counter()).items()]
     other = kinds.pop(OTHER, None)
     parts += [f"{sum(c.values())} {kind}" + (f" ({', '.join(c)})" if any(c) else "") for kind, c in kinds.items()]
-    parts += [f"{OTHER} ({', '.join(other)})"] if other else []
+    if other:
+        more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
+        parts.append(f"{OTHER} ({', '.join(list(other)[:SHOWN])}{more})")
     if not parts:
         return []
     return [f"{path}: nodes, solid cells and sets are read; left out are {', '.join(parts)}"]

@@ -111,7 +111,14 @@ ABAQUS_RULES = Rules(
     },
 )
 NASTRAN_RULES = Rules(
-    refused={"INCLUDE": _PUTS_IN, "=*": "it makes cards from those before", "/*": "it removes cards"},
+    refused={
+        "INCLUDE": _PUTS_IN,
+        "=*": "it makes cards from those before",
+        "/*": "it removes cards",
+        "GRIDG": _ADDS_NODES,
+        "EGRID": _ADDS_NODES,
+        "CGEN": _ADDS_ELEMENTS,
+    },
     read=("GRID", "GRDSET", "CHEXA", "CPENTA", "CPYRA", "CPYRAM", "CTETRA", "CORD*", "ENDDATA", "BEGIN*"),
     silent=(
         *("", "PARAM", "PSOLID", "PLSOLID", "PSHELL", "PCOMP*", "PBAR*", "PBEAM*", "PROD", "PTUBE", "PSHEAR", "PVISC"),

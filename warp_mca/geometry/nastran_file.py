@@ -33,6 +33,7 @@ class _Card:
     line: int
     fields: list[str]
     goes_on: str = ""  # the mark in its last field
+    fault: str = ""  # why it cannot be read
 
     def __getitem__(self, index: int) -> str:
         return self.fields[index] if index < len(self.fields) else ""
@@ -52,6 +53,8 @@ def read_nastran(path: Path) -> tuple[meshio.Mesh, list[str]]:
     for card in _cards(path):
         try:
             kind = NASTRAN_RULES.kind(card.name)
+            if kind == "read" and card.fault:
+                raise ValueError(card.fault)
             if card.name == "GRID":
                 number = integer(card[0])
                 x, y, z = map(real, (card[2], card[3], card[4]))
@@ -105,34 +108,34 @@ def _cards(path: Path) -> Iterator[_Card]:
             if card:
                 yield card
             card = found
-            continue
-        mark = line.split(",")[0][:8].strip(" +*")
-        if card is None:
+        elif card is None:
             raise ValueError(f"line {number}: it goes on from no card")
-        if mark and card.goes_on and mark != card.goes_on:
-            raise ValueError(f"line {number}: it goes on from {mark}, and does not follow that card; sort the cards")
-        card.fields += [""] * (-len(card.fields) % 4) + found.fields
-        card.goes_on = found.goes_on
+        else:
+            mark = re.split(",", line[:8])[0].strip(" +*")
+            if mark and card.goes_on and mark != card.goes_on:
+                card.fault = f"line {number} goes on from {mark}, which does not stand before it: sort the lines"
+            card.fields += found.fields
+            card.goes_on, card.fault = found.goes_on, card.fault or found.fault
     if card:
         yield card
 
 
 def _split(line: str, number: int) -> _Card:
-    """One line as a card; without a name where it goes on from the line before."""
-    wide = line[:8].split(",")[0].rstrip().endswith("*") or line.startswith("*")
-    count = 4 if wide else 8
+    """One line as a card of 8 fields, or 4 wide ones; without a name where it goes on from the line before."""
+    first = line[:8].split(",")[0]
+    wide = first.strip()[-1:] == "*" or first.startswith("*")
+    count, width = (4, 16) if wide else (8, 8)
+    fault = ""
     if "," in line:
-        first, *fields = (entry.strip() for entry in line.split(","))
-        if len(fields) > count + 1:
-            raise ValueError(f"line {number}: it has {len(fields) + 1} fields, more than {count + 2}")
-        fields, last = fields[:count], "".join(fields[count:])
-        fields += [""] * (count - len(fields))
+        fields = [entry.strip() for entry in line.split(",")][1:]
+        if any(fields[count + 1 :]):
+            fault = f"line {number} has more than {count + 2} fields"
+        fields, last = [*fields, *[""] * count][:count], "".join(fields[count : count + 1])
     else:
-        width = 16 if wide else 8
-        first, last = line[:8], line[72:80]
-        fields = [line[k : k + width].strip() for k in range(8, 72, width)]
-    goes_on = first.strip() == "" or first.lstrip()[0] in "+*"
-    return _Card("" if goes_on else first.strip(" *").upper(), number, fields, last.strip(" +*"))
+        fields, last = [line[k : k + width].strip() for k in range(8, 72, width)], line[72:80]
+    goes_on = not first.strip() or first.lstrip()[0] in "+*"
+    name = "" if goes_on else re.split(r"[\s*]", first.strip(), maxsplit=1)[0].upper()
+    return _Card(name, number, fields, last.strip(" +*"), fault)
 
 
 def _bulk(path: Path) -> Iterator[tuple[int, str]]:
