@@ -33,6 +33,7 @@ _LINES = re.compile(r"(?:T3D|T2D|DC1D|R2D)[23]|B[23][123]")
 _QUADRATIC_LINES = re.compile(r"(?:T3D|T2D|DC1D)3|B[23]2")
 _CORNERS = {3: 3, 4: 4, 6: 3, 8: 4, 9: 4}  # of faces, by their nodes
 _MARKS = re.compile(r"CP[SE]\d")  # plane elements, as gmsh writes named surfaces
+_LONGEST = 16  # numbers in a line
 _FLAGS = {"GENERATE", "INTERNAL", "UNSORTED"}
 Parameters = dict[str, str]
 Data = list[tuple[int, str]]
@@ -177,11 +178,14 @@ class _Reader:
     def _elements(self, data: Data, count: int) -> Iterator[tuple[int, list[int]]]:
         """Number and nodes of each element of `count` nodes, which may go on in further lines.
 
-        What a line has beyond these is passed over, as CalculiX does.
+        What a line of less than 16 numbers has beyond these is passed over, as CalculiX does.
         """
         rest: list[int] = []
         for self.line, text in data:
-            rest += [integer(entry) for entry in _fields(text)]
+            fields = _fields(text)
+            rest += map(integer, fields)
+            if len(rest) > 1 + count and len(fields) >= _LONGEST:  # it may go on
+                break
             if len(rest) > count:
                 yield self._own(rest[0]), [self._own(node) for node in rest[1 : 1 + count]]
                 if len(rest) > 1 + count:

@@ -97,5 +97,5 @@ class Mesh:
         if name not in self.node_sets:
             raise bad_value("node set", name, f"the mesh has {', '.join(sorted(self.node_sets)) or 'no sets'}")
         if not len(self.node_sets[name]):
-            raise bad_value("node set", name, "it is empty; name one that holds nodes")
+            raise bad_value("node set", name, "no cell has a node of it; name a set of nodes that cells have")
         return self.node_sets[name]

@@ -19,33 +19,40 @@ from warp_mca.geometry.cell_types import CELL_TYPES, STORED_TYPES
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
-from warp_mca.geometry.gmsh_file import GMSH_SUFFIXES, read_by_gmsh
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.meshio_file import read_by_meshio
 from warp_mca.geometry.nastran_file import NASTRAN_SUFFIXES, read_nastran
 from warp_mca.geometry.selection import Select, check_selections, with_selections
+from warp_mca.geometry.universal_file import UNIVERSAL_SUFFIXES, read_universal
+from warp_mca.geometry.vtk_file import VTK_SUFFIXES
 
 if TYPE_CHECKING:
     import meshio
 
 _READ = {cell.meshio: cell for cell in CELL_TYPES.values()}  # cells that are read, in the order they are kept
 Reader = Callable[[Path], "tuple[meshio.Mesh, list[str]]"]
-_READERS: dict[tuple[str, ...], tuple[str, Reader]] = {
-    ABAQUS_SUFFIXES: ("the reader of Abaqus files", read_abaqus),
-    NASTRAN_SUFFIXES: ("the reader of Nastran files", read_nastran),
-    KEYWORD_SUFFIXES: ("the reader of keyword files", read_keywords),
-    GMSH_SUFFIXES: ("gmsh", read_by_gmsh),
+_WHOLE = "write the whole mesh into it, as plain nodes, elements and sets, or save it as .vtu"
+_OTHER = "save it as binary .msh or as .vtu"
+_READERS: dict[tuple[str, ...], tuple[str, Reader, str]] = {  # by suffix: what reads, and what to do where it cannot
+    ABAQUS_SUFFIXES: ("the reader of Abaqus files", read_abaqus, _WHOLE),
+    NASTRAN_SUFFIXES: ("the reader of Nastran files", read_nastran, _WHOLE),
+    KEYWORD_SUFFIXES: ("the reader of keyword files", read_keywords, _WHOLE),
+    UNIVERSAL_SUFFIXES: ("gmsh", read_universal, _OTHER),
+    VTK_SUFFIXES: ("meshio or VTK", read_by_meshio, "save it with tetrahedra, hexahedra, wedges and pyramids"),
+    (".msh",): ("meshio", read_by_meshio, "save it in gmsh's format 4.1 with Mesh.SaveAll off or as .vtu"),
 }
-_MESHIO = "meshio", read_by_meshio
+_MESHIO = "meshio", read_by_meshio, _OTHER
 
 
 @dataclass(frozen=True)
 class MeshFile:
     """A mesh from a file; nodes that no cell uses are dropped.
 
-    gmsh reads .unv and .bdf, `keyword_file` the .k of LS-DYNA, meshio .msh, .inp, .vtu and all others that it knows.
-    Quadratic cells are taken as linear ones, which is logged as a warning.
+    Readers of our own take input files of Abaqus, Nastran and LS-DYNA, gmsh .unv, meshio .msh, .vtu and all others that
+    it knows, VTK those of its files that meshio does not. What would move, add or change nodes, cells or sets and is
+    not read is refused; what else a file holds, as shells and loads, is left out with a warning (docs/parts.md).
+    Quadratic cells are taken as linear ones, which is a warning too.
 
     Node sets come from the file's point sets and from its named groups of faces, edges or vertices; cell sets from
     its named groups of cells. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
@@ -106,7 +113,8 @@ class MeshFile:
         if not found:
             raise self._bad("there is no such file; check the path")
         notes = self._check_end()
-        reader, read = next((item for suffixes, item in _READERS.items() if path.suffix.lower() in suffixes), _MESHIO)
+        suffix = path.suffix.lower()
+        reader, read, remedy = next((item for suffixes, item in _READERS.items() if suffix in suffixes), _MESHIO)
         try:
             import meshio  # noqa: F401  which all readers answer in
         except ImportError as error:
@@ -121,8 +129,7 @@ class MeshFile:
                 reason = "it is empty"
             elif " " not in reason:  # a number or a key, which tells a user nothing
                 reason = f"it is damaged, or holds what {reader} does not know ({type(error).__name__} {reason})"
-            remedy = "in gmsh's format 4.1 with Mesh.SaveAll off" if path.suffix == ".msh" else "as binary .msh"
-            raise self._bad(f"{reader} cannot read it ({reason}); save it {remedy} or as .vtu") from error
+            raise self._bad(f"{reader} cannot read it ({reason}); {remedy}") from error
         return mesh, [*notes, *more]
 
     def _physical_names(self) -> dict[tuple[int, int], str]:

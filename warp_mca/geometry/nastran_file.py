@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     import meshio
 
 NASTRAN_SUFFIXES = (".bdf", ".nas", ".fem")
-_SOLIDS = {  # corners, nodes in all, meshio's name of the linear and of the quadratic cell
+# Corners, nodes at most (gmsh adds some to the 15 of CPENTA), meshio's names of the linear and the quadratic cell.
+_SOLIDS = {
     "CTETRA": (4, 10, "tetra", "tetra10"),
-    "CPENTA": (6, 15, "wedge", "wedge15"),
-    "CHEXA": (8, 20, "hexahedron", "hexahedron20"),
-    "CPYRA": (5, 13, "pyramid", "pyramid13"),
-    "CPYRAM": (5, 13, "pyramid", "pyramid13"),
+    "CPENTA": (6, 18, "wedge", "wedge15"),
+    "CHEXA": (8, 27, "hexahedron", "hexahedron20"),
+    "CPYRA": (5, 14, "pyramid", "pyramid13"),
+    "CPYRAM": (5, 14, "pyramid", "pyramid13"),
 }
 _MARKS = {"CTRIA3": 3, "CQUAD4": 4, "CTRIA6": 3, "CQUAD8": 4, "CBAR": 2, "CROD": 2}  # of gmsh, corners of each
 

@@ -17,19 +17,20 @@ from warp_mca.geometry.meshio_file import linear, stray_notes
 if TYPE_CHECKING:
     import meshio
 
-GMSH_SUFFIXES = (".unv",)
+UNIVERSAL_SUFFIXES = (".unv",)
 _CURVES = {1: ("line", 2), 8: ("line", 2)}
 _SURFACES = {2: ("triangle", 3), 3: ("quad", 4), 9: ("triangle", 3), 16: ("quad", 4), 10: ("quad", 4)}
 _VOLUMES = {cell.gmsh: (cell.meshio, cell.corners) for cell in CELL_TYPES.values()}
 _QUADRATIC = {code: (name, 0) for name, (code, *_) in QUADRATIC.items()}
 _TYPES = _CURVES | _SURFACES | _VOLUMES | _QUADRATIC  # by gmsh's code: meshio's name, nodes that are kept (0: all)
+_NODES, _ELEMENTS, _GROUPS = ("2411", "781"), ("2412",), ("2435", "2452", "2467", "2477")  # numbers of sections
 # Types of elements by their number in universal files: solids, beams, and what gmsh reads besides.
 _SOLIDS = (111, 112, 113, 114, 115, 116, 117, 118)
 _BEAMS = (11, 21, 22, 23, 24)
 _READ = (*_SOLIDS, *_BEAMS, *range(41, 100))
 
 
-def read_by_gmsh(path: Path) -> tuple[meshio.Mesh, list[str]]:
+def read_universal(path: Path) -> tuple[meshio.Mesh, list[str]]:
     """The edges, faces and cells of a file with its groups as cell sets, and sentences about what is left out.
 
     Without groups, properties are called "part_N".
@@ -50,10 +51,14 @@ def read_by_gmsh(path: Path) -> tuple[meshio.Mesh, list[str]]:
 
 
 def _kinds(path: Path) -> Counter[int]:
-    """Number of elements of each type, by its number in the format."""
-    found: Counter[int] = Counter()
+    """Number of elements of each type, by its number in the format.
+
+    Raises:
+        ValueError: a number is given twice, or a group has an element that is not given, which crashes gmsh.
+    """
+    kinds: dict[int, int] = {}
     places: dict[int, tuple[float, ...]] = {}
-    elements: set[int] = set()
+    grouped: set[int] = set()
     with path.open(errors="replace") as file:
         lines = iter(file)
         for line in lines:
@@ -64,19 +69,25 @@ def _kinds(path: Path) -> Counter[int]:
                 fields = record.split()
                 if fields == ["-1"]:
                     break
-                if dataset in ("2411", "781"):
+                if dataset in _NODES:
                     place = tuple(map(real, next(lines, "").split()))
                     if places.setdefault(integer(fields[0]), place) != place:
                         raise ValueError(f"node {fields[0]} is given twice")
-                elif dataset == "2412":
+                elif dataset in _ELEMENTS:
                     number, kind, *_, count = map(integer, fields)
-                    if number in elements:
+                    if number in kinds:
                         raise ValueError(f"element {number} is given twice")
-                    elements.add(number)
-                    found[kind] += 1
+                    kinds[number] = kind
                     for _ in range((count + 7) // 8 + (kind in _BEAMS)):
                         next(lines, "")
-    return found
+                elif dataset in _GROUPS:
+                    next(lines, "")  # its name
+                    for _ in range((integer(fields[-1]) + 1) // 2):
+                        members = list(map(integer, next(lines, "").split()))
+                        grouped.update(n for kind, n in zip(members[::4], members[1::4], strict=False) if kind == 8)
+    if missing := grouped - kinds.keys():
+        raise ValueError(f"a group has element {min(missing)}, which is not given")
+    return Counter(kinds.values())
 
 
 def _read(path: Path) -> meshio.Mesh:
