@@ -1,4 +1,4 @@
-"""Owns the reading of Nastran bulk data: grid points, solids by property."""
+"""Owns the reading of Nastran bulk data: grid points in their coordinate systems, solids by property."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warp_mca.geometry.deck import Deck, integer, real
 from warp_mca.geometry.deck_rules import NASTRAN_RULES
+from warp_mca.geometry.nastran_systems import Systems
 
 if TYPE_CHECKING:
     import meshio
@@ -46,46 +50,78 @@ def read_nastran(path: Path) -> tuple[meshio.Mesh, list[str]]:
     Raises:
         ValueError: a card cannot be read, or would change the mesh in a way that is not read.
     """
-    deck, systems, first = Deck(path), dict[int, str](), dict[int, int]()
-    placed: dict[int, int] = {}  # system of each grid point that names one
-    default = 0
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        by_gmsh = "created by gmsh" in file.readline().lower()
+        reader = _Reader(Deck(path), "created by gmsh" in file.readline().lower())
     for card in _cards(path):
         try:
-            kind = NASTRAN_RULES.kind(card.name)
-            if kind == "read" and card.fault:
-                raise ValueError(card.fault)
-            if card.name == "GRID":
-                number = integer(card[0])
-                x, y, z = map(real, (card[2], card[3], card[4]))
-                deck.add_node(number, (x, y, z))
-                first.setdefault(number, card.line)
-                if card[1]:
-                    placed[number] = integer(card[1])
-            elif card.name == "GRDSET":
-                default = integer(card[1] or "0")
-            elif card.name.startswith("CORD"):
-                systems[integer(card[0])] = card.name
-                if card.name.startswith("CORD1") and card[4]:
-                    systems[integer(card[4])] = card.name
-            elif card.name in _SOLIDS:
-                _take_solid(deck, card)
-            elif by_gmsh and card.name in _MARKS:
-                corners = [integer(card[2 + k]) for k in range(_MARKS[card.name])]
-                deck.add_face(integer(card[0]), card.name, corners, mark=True)
-            elif kind and kind != "read":
-                deck.left[kind, card.name] += 1
+            reader.take(card)
         except ValueError as error:
             raise ValueError(f"line {card.line}: {error}") from error
-    for number in deck.nodes:
-        if system := placed.get(number, default):
-            name = systems.get(system, "which is not given")
-            where = "by GRDSET" if number not in placed else "by its field CP"
-            raise ValueError(
-                f"line {first[number]}: grid point {number} lies in system {system} ({name}) {where}, which is not read"
-            )
-    return deck.mesh()
+    return reader.finish()
+
+
+class _Reader:
+    """Takes the cards of a file in turn; `by_gmsh`: gmsh wrote it, whose shells and bars mark faces and edges."""
+
+    def __init__(self, deck: Deck, by_gmsh: bool) -> None:
+        self.deck, self.by_gmsh, self.default = deck, by_gmsh, ""
+        self.grid: dict[int, tuple[str, list[float], int]] = {}  # system, coordinates, line
+        self.systems = Systems(self._place)
+        self.placing: set[int] = set()
+
+    def take(self, card: _Card) -> None:
+        """Read one card, or count it."""
+        kind = NASTRAN_RULES.kind(card.name)
+        if kind == "read" and card.fault:
+            raise ValueError(card.fault)
+        if card.name == "GRID":
+            self._take_grid(card)
+        elif card.name == "GRDSET":
+            self.default = card[1]
+        elif card.name.startswith("CORD2") and kind == "read":
+            points = [real(card[k]) for k in range(2, 11)]
+            self.systems.by_points(integer(card[0]), card.name, integer(card[1] or "0"), points)
+        elif card.name.startswith("CORD") and kind == "read":  # CORD1R has up to two systems; others are not read
+            for start in (0, 4) if card[4] else (0,):
+                points = [integer(card[start + k] or "0") for k in (1, 2, 3)] if card.name[4] == "1" else []
+                self.systems.by_grid_points(integer(card[start]), card.name, points)
+        elif card.name in _SOLIDS:
+            _take_solid(self.deck, card)
+        elif self.by_gmsh and card.name in _MARKS:
+            corners = [integer(card[2 + k]) for k in range(_MARKS[card.name])]
+            self.deck.add_face(integer(card[0]), card.name, corners, mark=True)
+        elif kind and kind != "read":
+            self.deck.left[kind, card.name] += 1
+
+    def _take_grid(self, card: _Card) -> None:
+        number, found = integer(card[0]), (card[1], [real(card[k]) for k in (2, 3, 4)], card.line)
+        if self.grid.setdefault(number, found)[:2] != found[:2]:
+            raise ValueError(f"grid point {number} is given twice, also in line {self.grid[number][2]}")
+
+    def _place(self, number: int) -> NDArray[np.float64]:
+        """Where a grid point lies in the basic system."""
+        if number not in self.grid:
+            raise ValueError(f"grid point {number} is not given")
+        if number in self.placing:
+            raise ValueError(f"grid point {number} lies in a system that it defines")
+        self.placing.add(number)
+        system, coordinates, _ = self.grid[number]
+        place = self.systems.place(integer(system or self.default or "0"), coordinates)
+        self.placing.remove(number)
+        return place
+
+    def finish(self) -> tuple[meshio.Mesh, list[str]]:
+        """The mesh, and sentences about what is left out."""
+        for number, (system, coordinates, line) in self.grid.items():
+            if (system or self.default or "0") == "0":
+                x, y, z = coordinates
+            else:
+                try:
+                    x, y, z = self._place(number).tolist()
+                except ValueError as error:
+                    raise ValueError(f"line {line}: grid point {number}: {error}") from error
+            self.deck.add_node(number, (x, y, z))
+        return self.deck.mesh()
 
 
 def _take_solid(deck: Deck, card: _Card) -> None:

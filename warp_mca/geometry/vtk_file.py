@@ -52,9 +52,12 @@ def read_by_vtk(path: Path) -> tuple[meshio.Mesh, dict[str, int]]:
 
     grid = _grid(path)
     from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkCommonDataModel import vtkCellTypes
 
-    codes, table = vtk_to_numpy(grid.GetCellTypesArray()), grid.GetCells()
+    try:
+        codes = vtk_to_numpy(grid.GetCellTypes())
+    except TypeError:  # before VTK 9.6
+        codes = vtk_to_numpy(grid.GetCellTypesArray())
+    table = grid.GetCells()
     starts, nodes = vtk_to_numpy(table.GetOffsetsArray()), vtk_to_numpy(table.GetConnectivityArray())
     physical = grid.GetCellData().GetArray("gmsh:physical")
     tags = None if physical is None else vtk_to_numpy(physical)
@@ -63,7 +66,7 @@ def read_by_vtk(path: Path) -> tuple[meshio.Mesh, dict[str, int]]:
     quadratic: dict[str, int] = {}
     for code in map(int, np.unique(codes)):
         own = np.flatnonzero(codes == code)
-        name = vtkCellTypes.GetClassNameFromTypeId(code)
+        name = grid.GetCell(int(own[0])).GetClassName()
         if code in _FLAT:
             kind, corners = _FLAT[code], (0,)
         elif _QUADRATIC.get(code, code) in _CELLS:
