@@ -93,7 +93,7 @@ def test_what_vtk_cannot_give_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(mca.RequestError, match="VTK finds no cells in it"):
         mca.MeshFile(tmp_path / "bad.vtk").build()
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
-    with pytest.raises(mca.RequestError, match=r"VTK, which may read it, cannot be imported .*pip install vtk"):
+    with pytest.raises(mca.RequestError, match=r"VTK, which may read it, cannot be imported .*pip install 'warp_mca"):
         mca.MeshFile(write(tmp_path / "wedge.vtu", grid("VTK_QUADRATIC_WEDGE"))).build()
     assert capfd.readouterr() == ("", "")
 

@@ -88,12 +88,15 @@ class Deck:
         blocks: dict[str, list[list[int]]] = {kind: [] for kind in (*_CORNERS, *_LOWER.values())}
         places: dict[int, tuple[str, int]] = {}  # block of each element, and its place there
         for number, (kind, corners) in (*self.cells.items(), *self.faces.items()):
-            missing = [node for node in corners if node not in index]
-            if missing and number in self.cells:
-                raise ValueError(f"element {number} has node {missing[0]}, which is not given")
-            if kind and not missing:
+            try:
+                row = [index[node] for node in corners]
+            except KeyError as error:
+                if number in self.cells:
+                    raise ValueError(f"element {number} has node {error.args[0]}, which is not given") from error
+                continue
+            if kind:
                 places[number] = kind, len(blocks[kind])
-                blocks[kind].append([index[node] for node in corners])
+                blocks[kind].append(row)
         cells = {kind: np.array(rows) for kind, rows in blocks.items() if rows}
         self._look_at_marks(cells, places)
         point_sets: dict[str, Any] = {}

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from warp_mca.geometry.deck import Block, Deck, blocks, integer, real
 from warp_mca.geometry.deck_rules import ELEMENTS, KEYWORD_RULES
@@ -16,7 +14,14 @@ if TYPE_CHECKING:
     import meshio
 
 KEYWORD_SUFFIXES = (".k", ".key", ".dyn")
-_NODE, _SOLID, _OTHER = (8, 16, 16, 16, 8, 8), (8,) * 10, (10,) * 8  # widths of the fields of a card
+
+
+def _columns(*widths: int) -> list[slice]:
+    """The columns of the fields of a card."""
+    return [slice(a, b) for a, b in pairwise(accumulate(widths, initial=0))]
+
+
+_NODE, _SOLID, _OTHER = _columns(8, 16, 16, 16, 8, 8), _columns(*[8] * 10), _columns(*[10] * 8)
 _PART_CARDS = {"PART": 2, "PART_CONTACT": 3, "PART_PRINT": 3}  # of each part; of others the first one is named
 Card = list[str]
 
@@ -41,14 +46,9 @@ def read_keywords(path: Path) -> tuple[meshio.Mesh, list[str]]:
     return reader.finish()
 
 
-def _fields(line: str, widths: tuple[int, ...] = _OTHER) -> Card:
+def _fields(line: str, columns: list[slice] = _OTHER) -> Card:
     """The fields of a card, without the empty ones at its end."""
-    if "," in line:
-        found = line.split(",")
-    else:
-        ends = np.cumsum((0, *widths))
-        found = [line[a:b] for a, b in pairwise(ends)]
-    found = [entry.strip() for entry in found]
+    found = [entry.strip() for entry in (line.split(",") if "," in line else [line[part] for part in columns])]
     while found and not found[-1]:
         found.pop()
     return found
@@ -91,9 +91,9 @@ class _Reader:
             elif cards and kind not in ("", "read"):
                 self.deck.left[kind, f"*{name}"] += 1
 
-    def _cards(self, block: Block, widths: tuple[int, ...] = _OTHER) -> Iterator[Card]:
+    def _cards(self, block: Block, columns: list[slice] = _OTHER) -> Iterator[Card]:
         for self.line, text in block.data:
-            if card := _fields(text, widths):
+            if card := _fields(text, columns):
                 yield card
 
     def _take_nodes(self, block: Block) -> None:

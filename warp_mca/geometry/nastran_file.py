@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +26,7 @@ _SOLIDS = {
     "CPYRA": (5, 14, "pyramid", "pyramid13"),
     "CPYRAM": (5, 14, "pyramid", "pyramid13"),
 }
+_NARROW, _WIDE = ([slice(k, k + width) for k in range(8, 72, width)] for width in (8, 16))  # columns of fields
 _MARKS = {"CTRIA3": 3, "CQUAD4": 4, "CTRIA6": 3, "CQUAD8": 4, "CBAR": 2, "CROD": 2}  # of gmsh, corners of each
 
 
@@ -148,7 +148,7 @@ def _cards(path: Path) -> Iterator[_Card]:
         elif card is None:
             raise ValueError(f"line {number}: it goes on from no card")
         else:
-            mark = re.split(",", line[:8])[0].strip(" +*")
+            mark = line[:8].partition(",")[0].strip(" +*")
             if mark and card.goes_on and mark != card.goes_on:
                 card.fault = f"line {number} goes on from {mark}, which does not stand before it: sort the lines"
             card.fields += found.fields
@@ -159,9 +159,9 @@ def _cards(path: Path) -> Iterator[_Card]:
 
 def _split(line: str, number: int) -> _Card:
     """One line as a card of 8 fields, or 4 wide ones; without a name where it goes on from the line before."""
-    first = line[:8].split(",")[0]
-    wide = first.strip()[-1:] == "*" or first.startswith("*")
-    count, width = (4, 16) if wide else (8, 8)
+    first = line[:8].partition(",")[0]
+    wide = "*" in first
+    count = 4 if wide else 8
     fault = ""
     if "," in line:
         fields = [entry.strip() for entry in line.split(",")][1:]
@@ -169,27 +169,26 @@ def _split(line: str, number: int) -> _Card:
             fault = f"line {number} has more than {count + 2} fields"
         fields, last = [*fields, *[""] * count][:count], "".join(fields[count : count + 1])
     else:
-        fields, last = [line[k : k + width].strip() for k in range(8, 72, width)], line[72:80]
+        fields, last = [line[part].strip() for part in (_WIDE if wide else _NARROW)], line[72:80]
     goes_on = not first.strip() or first.lstrip()[0] in "+*"
-    name = "" if goes_on else re.split(r"[\s*]", first.strip(), maxsplit=1)[0].upper()
+    name = "" if goes_on else first.split()[0].rstrip("*").upper()
     return _Card(name, number, fields, last.strip(" +*"), fault)
 
 
 def _bulk(path: Path) -> Iterator[tuple[int, str]]:
     """Lines of the bulk data with their numbers, without comments; all lines where no other section comes first."""
-    begun = not any(re.match(r"\s*BEGIN\b", line, re.IGNORECASE) for line in _lines(path))
-    in_bulk = begun
+    in_bulk = not any(line[:16].upper().split()[:1] == ["BEGIN"] for line in _lines(path))
     for number, line in enumerate(_lines(path), 1):
-        words = line.upper().split()
-        if not words:
+        head = line[:16].upper().split(maxsplit=1)[:1]
+        if not head:
             continue
-        if re.match(r"INCLUDE\b", words[0]):
+        if head[0].startswith("INCLUDE"):
             raise ValueError(f"line {number}: INCLUDE is not read: {NASTRAN_RULES.refused['INCLUDE']}")
-        if words[0] == "BEGIN":
-            if in_bulk or words[1:] not in (["BULK"], []):
+        if head[0] == "BEGIN":
+            if in_bulk or line.upper().split()[1:] not in (["BULK"], []):
                 raise ValueError(f"line {number}: superelements and other bulk sections are not read")
             in_bulk = True
-        elif words[0] == "ENDDATA" and in_bulk:
+        elif head[0] == "ENDDATA" and in_bulk:
             return
         elif in_bulk:
             yield number, line
@@ -198,4 +197,4 @@ def _bulk(path: Path) -> Iterator[tuple[int, str]]:
 def _lines(path: Path) -> Iterator[str]:
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         for line in file:
-            yield line.partition("$")[0].rstrip().expandtabs(8)
+            yield (line.partition("$")[0] if "$" in line else line).rstrip().expandtabs(8)

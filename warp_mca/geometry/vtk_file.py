@@ -88,7 +88,8 @@ def _grid(path: Path) -> Any:
         from vtkmodules.vtkIOLegacy import vtkDataSetReader
         from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
     except ImportError as error:
-        raise RequestError(f"VTK, which may read it, cannot be imported ({error}): pip install vtk") from error
+        what = f"VTK, which may read it, cannot be imported ({error}): pip install 'warp_mca[meshes]'"
+        raise RequestError(what) from error
     with _quiet():
         reader = vtkXMLUnstructuredGridReader() if path.suffix.lower() == ".vtu" else vtkDataSetReader()
         reader.SetFileName(str(path))
