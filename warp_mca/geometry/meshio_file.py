@@ -8,6 +8,8 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC
 from warp_mca.geometry.deck import ELEMENTS, left_out_notes, quadratic_notes
@@ -57,9 +59,24 @@ def _read(path: Path) -> meshio.Mesh:
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(io.StringIO()):
-            return meshio.read(path)
+            return _with_groups(meshio.read(path))
     except SystemExit as error:  # as some of its readers end, after they printed why
         raise ValueError(said.getvalue().strip() or "it gives no reason") from error
+
+
+def _with_groups(read: meshio.Mesh) -> meshio.Mesh:
+    """The mesh with the groups of .med files as its sets: meshio keeps them as the names of each number of a family."""
+    cells, points = read.cell_data.get("cell_tags", []), read.point_data.get("point_tags", [])
+    for number, names in getattr(read, "cell_tags", {}).items():
+        for name in names:
+            before = read.cell_sets.get(name, [np.zeros(0, dtype=np.int64)] * len(cells))
+            own = [np.flatnonzero(np.asarray(block) == number) for block in cells]
+            read.cell_sets[name] = [np.union1d(*pair) for pair in zip(before, own, strict=True)]
+    for number, names in getattr(read, "point_tags", {}).items():
+        for name in names:
+            own = np.flatnonzero(np.asarray(points) == number)
+            read.point_sets[name] = np.union1d(read.point_sets.get(name, own), own)
+    return read
 
 
 def linear(read: meshio.Mesh) -> dict[str, int]:
