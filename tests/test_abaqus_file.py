@@ -172,6 +172,7 @@ REFUSED: Iterable[tuple[str, str]] = [
     ("*ELEMENT, TYPE=C3D8\n3, 1,2,4,3,5,6,8,77\n", "element 3 has node 77, which is not given"),
     ("*ELEMENT, TYPE=C3D15V\n3, 1,2,4,3,5,6,8,77\n", "type C3D15V are not read"),
     ("*ELSET, ELSET=x\ny\n", "set x holds set Y, which is not given"),
+    ("*ELSET, ELSET=x\ny\n*ELSET, ELSET=y\n1, x\n", "set x holds itself"),
     ("*NSET, NSET=x, ELSET=y\n", "node set x is that of element set Y"),
     ("*NSET\n1\n", "NSET lacks a name"),
     ("*NODE\n20, a, 0., 0.\n", "line 18: 'a' is no number"),

@@ -44,19 +44,21 @@ class SetTable:
             ValueError: a set holds one that is not given, or itself.
         """
         for kept, sets in ((deck.cell_sets, self.elements), (deck.node_sets, self.nodes)):
-            known: dict[tuple[int, Key], list[int]] = {}
+            known: dict[tuple[int, Key], list[int] | None] = {}
             for key, item in sets.items():
                 inner = not key[0] and (True, key[1]) in sets
                 kept[f"{instance}.{item.name}" if inner else item.name] = self._members(deck, sets, key, known)
 
     def _members(
-        self, deck: Deck, sets: dict[Key, NamedSet], key: Key, known: dict[tuple[int, Key], list[int]]
+        self, deck: Deck, sets: dict[Key, NamedSet], key: Key, known: dict[tuple[int, Key], list[int] | None]
     ) -> list[int]:
-        """Numbers in a set and in all that it holds; `known` keeps those of sets that are done, [] of those begun."""
-        if (id(sets), key) in known:
-            return known[id(sets), key]
-        known[id(sets), key] = []
+        """Numbers in a set and in all that it holds; `known` keeps those of sets that are done, None of those begun."""
         item, of_nodes = sets[key], sets is self.nodes
+        if (id(sets), key) in known:
+            if (done := known[id(sets), key]) is None:
+                raise ValueError(f"set {item.name} holds itself")
+            return done
+        known[id(sets), key] = None
         found = list(item.numbers)
         tables = [deck.nodes] if of_nodes else [deck.cells, deck.faces]
         for span in item.ranges:
@@ -78,8 +80,8 @@ class SetTable:
                 raise ValueError(f"node set {item.name} is that of element set {reference[1]}, which is not given")
             for number in self._members(deck, self.elements, inner, known):
                 found += next((t[number][1] for t in (deck.cells, deck.faces) if number in t), [])
-        known[id(sets), key] = list(dict.fromkeys(found))
-        return known[id(sets), key]
+        members = known[id(sets), key] = list(dict.fromkeys(found))
+        return members
 
 
 def _find(reference: Key, sets: dict[Key, NamedSet]) -> Key | None:
