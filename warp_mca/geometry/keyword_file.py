@@ -68,12 +68,12 @@ class _Reader:
         self.line, text = block.line, block.keyword.upper()
         words = text.split() or [""]
         if words[0].endswith(("+", "%")) or (words[0] == "KEYWORD" and ("LONG=" in text or "I10=Y" in text)):
-            raise ValueError("its cards have long fields: write it in the standard format")
+            raise ValueError("its cards have long fields, not the standard ones")
         name = words[0].rstrip("-").removesuffix("_TITLE")
         try:
             kind = KEYWORD_RULES.kind(name)
         except ValueError as error:
-            raise ValueError(f"*{error}; write the mesh as one file of *NODE and *ELEMENT_SOLID") from error
+            raise ValueError(f"*{error}") from error
         if name == "NODE":
             self._take_nodes(block)
         elif name == "ELEMENT_SOLID":

@@ -14,7 +14,7 @@ from warp_mca.base.errors import RequestError
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC
 from warp_mca.geometry.deck import ELEMENTS, left_out_notes, quadratic_notes
 from warp_mca.geometry.markings import lie_on
-from warp_mca.geometry.vtk_file import VTK_SUFFIXES, cell_count, read_by_vtk
+from warp_mca.geometry.vtk_file import VTK_SUFFIXES, VtkError, cell_count, read_by_vtk
 
 if TYPE_CHECKING:
     import meshio
@@ -48,8 +48,8 @@ def read_by_meshio(path: Path) -> tuple[meshio.Mesh, list[str]]:
             raise
         try:
             read, names = read_by_vtk(path)
-        except RequestError as missing:
-            raise ValueError(f"{error}; {missing}") from error
+        except (RequestError, VtkError) as failure:
+            raise ValueError(f"meshio: {error}; {failure}") from error
     return read, quadratic_notes(path, names) + stray_notes(path, read)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +29,13 @@ _QUADRATIC = {
     **{21: 3, 35: 3, 68: 3, 22: 5, 34: 5, 69: 5, 23: 9, 28: 9, 30: 9, 70: 9},
     **{24: 10, 71: 10, 25: 12, 29: 12, 33: 12, 72: 12, 26: 13, 31: 13, 32: 13, 73: 13, 27: 14, 37: 14, 74: 14},
 }
+_TIME, _TIME_PER_BYTE = 20.0, 5e-5  # that VTK may take to start and to read [s], many times what it takes
+_SCRIPT = Path(__file__).with_name("vtk_process.py")
 _FLAT = {2: "poly_vertex", 4: "poly_line", 6: "triangle_strip", 7: "polygon"}
+
+
+class VtkError(ValueError):
+    """VTK cannot read a file."""
 
 
 def cell_count(path: Path) -> int | None:
@@ -42,75 +50,51 @@ def cell_count(path: Path) -> int | None:
 
 
 def read_by_vtk(path: Path) -> tuple[meshio.Mesh, dict[str, int]]:
-    """The cells of a file by their corners, and the number of quadratic ones and of higher order by VTK's name.
+    """The cells of a file by their corners, and the number of quadratic ones and of higher order by meshio's name.
 
     Raises:
         RequestError: VTK is not installed.
-        ValueError: it cannot read the file, or this holds solids of other kinds.
+        VtkError: it cannot read the file.
+        ValueError: the file holds solids of other kinds.
     """
     import meshio
+    from meshio._vtk_common import vtk_to_meshio_type
 
     grid = _grid(path)
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    try:
-        codes = vtk_to_numpy(grid.GetCellTypes())
-    except TypeError:  # before VTK 9.6
-        codes = vtk_to_numpy(grid.GetCellTypesArray())
-    table = grid.GetCells()
-    starts, nodes = vtk_to_numpy(table.GetOffsetsArray()), vtk_to_numpy(table.GetConnectivityArray())
-    physical = grid.GetCellData().GetArray("gmsh:physical")
-    tags = None if physical is None else vtk_to_numpy(physical)
+    codes, starts, nodes = grid["types"], grid["offsets"], grid["connectivity"].astype(np.int64)
     cells: list[Any] = []
     groups: list[np.ndarray] = []
     quadratic: dict[str, int] = {}
     for code in map(int, np.unique(codes)):
         own = np.flatnonzero(codes == code)
-        name = grid.GetCell(int(own[0])).GetClassName()
+        name = vtk_to_meshio_type.get(code, f"VTK's type {code}")
         if code in _FLAT:
             kind, corners = _FLAT[code], (0,)
         elif _QUADRATIC.get(code, code) in _CELLS:
             kind, corners = _CELLS[_QUADRATIC.get(code, code)]
         else:
-            raise ValueError(f"it holds {len(own)} cells of the type {name}")
+            raise ValueError(f"it holds {len(own)} cells {name}")
         if code in _QUADRATIC and _QUADRATIC[code] >= 10:
             quadratic[name] = len(own)
-        cells.append((kind, nodes[starts[own][:, None] + np.array(corners)].astype(np.int64)))
-        groups.append(np.zeros(len(own), int) if tags is None else tags[own])
-    data: dict[str, Any] = {} if tags is None else {"gmsh:physical": groups}
-    return meshio.Mesh(vtk_to_numpy(grid.GetPoints().GetData()).astype(np.float64), cells, cell_data=data), quadratic
+        cells.append((kind, nodes[starts[own][:, None] + np.array(corners)]))
+        groups.append(grid["physical"][own] if "physical" in grid else own)
+    data: dict[str, Any] = {"gmsh:physical": groups} if "physical" in grid else {}
+    return meshio.Mesh(grid["points"].astype(np.float64), cells, cell_data=data), quadratic
 
 
-def _grid(path: Path) -> Any:
-    """The unstructured grid of a file; a structured one is made one."""
+def _grid(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file's grid, which VTK reads in a process of its own, since a damaged file may crash it."""
+    if find_spec("vtkmodules") is None:
+        raise RequestError("VTK, which may read it, is not installed: pip install 'warp_mca[meshes]'")
+    limit = _TIME + _TIME_PER_BYTE * path.stat().st_size
+    command = [sys.executable, "-P", str(_SCRIPT), str(path.resolve())]
     try:
-        from vtkmodules.vtkFiltersCore import vtkAppendFilter
-        from vtkmodules.vtkIOLegacy import vtkDataSetReader
-        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
-    except ImportError as error:
-        what = f"VTK, which may read it, cannot be imported ({error}): pip install 'warp_mca[meshes]'"
-        raise RequestError(what) from error
-    with _quiet():
-        reader = vtkXMLUnstructuredGridReader() if path.suffix.lower() == ".vtu" else vtkDataSetReader()
-        reader.SetFileName(str(path))
-        reader.Update()
-        found = reader.GetOutput()
-        if reader.GetErrorCode() or found is None or not found.GetNumberOfCells():
-            raise ValueError("VTK finds no cells in it")
-        joined = vtkAppendFilter()
-        joined.AddInputData(found)
-        joined.Update()
-        return joined.GetOutput()
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Without what VTK prints."""
-    from vtkmodules.vtkCommonCore import vtkObject
-
-    shown = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.GlobalWarningDisplayOff()
-    try:
-        yield
-    finally:
-        vtkObject.SetGlobalWarningDisplay(shown)
+        done = subprocess.run(command, capture_output=True, timeout=limit, start_new_session=True)
+    except subprocess.TimeoutExpired as error:
+        raise VtkError(f"VTK took more than {limit:.2g} s, as damaged files may make it") from error
+    if done.returncode < 0:
+        raise VtkError("VTK crashed, as damaged files may make it")
+    if done.returncode:
+        raise VtkError(done.stderr.decode(errors="replace").strip().rpartition("\n")[2])
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as archive:
+        return dict(archive)
