@@ -9,7 +9,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.geometry.end_marks import cell_without_property, missing_end, unread_cells
+from warp_mca.geometry.end_marks import missing_end
 
 K = """*KEYWORD
 *NODE
@@ -57,36 +57,3 @@ def test_a_keyword_file_without_end_is_read_with_a_warning(tmp_path: Path, caplo
         with caplog.at_level(logging.WARNING, logger="warp_mca"):
             assert len(mca.MeshFile(file).build().points) == 4
         assert sum("lacks *END: if it was cut off" in record.message for record in caplog.records) == warned
-
-
-@pytest.mark.parametrize(
-    ("line", "cell"),
-    [
-        ("CHEXA   1               1       2       5       4       7       8       +11", "1"),
-        ("CTETRA,7,,1,2,3,4", "7"),
-        ("CTETRA* 12                              1               2", "12"),
-        ("CTETRA  12", "12"),
-        ("CTETRA  12      1       1       2       3       4", None),
-        ("CTETRA,7,3,1,2,3,4", None),
-    ],
-)
-def test_nastran_cells_without_a_property_are_refused(tmp_path: Path, line: str, cell: str | None):
-    """Gmsh leaves blank fields out, and would read nodes one field too early."""
-    file = tmp_path / "a.bdf"
-    file.write_text(f"BEGIN BULK\n{line}\nENDDATA\n")
-    assert cell_without_property(file) == cell
-    if cell:
-        with pytest.raises(RequestError, match=rf"^MeshFile\.path = .*: its cell {cell} has no property number; write"):
-            mca.MeshFile(file).build()
-
-
-def test_cards_that_the_reader_does_not_know_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture):
-    """Gmsh passes over them, so that the body has a hole."""
-    file = tmp_path / "a.bdf"
-    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
-    grid = [f"GRID,{k + 1},,{x}.,{y}.,{z}." for k, (x, y, z) in enumerate(points)]
-    cells = ["CTETRA,1,1,1,2,3,4", "CTE5RA,2,1,1,2,3,4", "CTRIA3,3,1,1,2,3"]
-    file.write_text("\n".join(["CEND", "BEGIN BULK", "CORD2R,1", *grid, *cells, "ENDDATA", ""]))
-    assert unread_cells(file) == {"CTE5RA": 1}
-    assert mca.MeshFile(file).build().cell_count == 1
-    assert f"{file}: 1 cards CTE5RA are left out" in caplog.text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -92,19 +93,64 @@ def test_elements_other_than_solids_are_left_out_with_a_word(tmp_path: Path, cap
     (tmp_path / "it.k").write_text(deck("columns").replace("*ELEMENT_SOLID", f"{shell}*ELEMENT_SOLID"))
     assert len(mca.MeshFile(tmp_path / "it.k").build().hexahedra) == 3
     (record,) = caplog.records
-    assert "elements of *ELEMENT_SHELL_THICKNESS are left out" in record.getMessage()
+    assert record.getMessage().endswith("left out are 1 cards of *ELEMENT_SHELL_THICKNESS")
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (
+            "*ELEMENT_BEAM\n       1       1       2       3\n       2       1       2       3\n",
+            "2 cards of .ELEMENT_BEAM",
+        ),
+        ("*ELEMENT_MASS\n       1       2     0.1\n", "1 cards of .ELEMENT_MASS"),
+        ("*CONSTRAINED_NODAL_RIGID_BODY\n1,0,3\n*MAT_ELASTIC\n1,1.,1.,.3\n", "1 constraints .*1 materials"),
+        ("*LOAD_NODE_SET\n1,1,1\n*RIGIDWALL_PLANAR\n1,1\n", "loads .*1 constraints"),
+        ("*SET_NODE_GENERAL\n1\nALL\n", r"1 sets \(.SET_NODE_GENERAL\)"),
+        ("*PART_INERTIA\nname\n1,1,1\n0.,0.,0.,1.\n", "1 inertias of parts"),
+        ("*FROBNICATE\n1\n", r"other keywords \(.FROBNICATE\)"),
+        ("*SET_NODE\n6\n1,888\n", "1 numbers in sets that nothing has"),
+        ("*CONTROL_TERMINATION\n0.1\n*DEFINE_CURVE\n1\n0.,1.\n*SECTION_SOLID\n1,1\n", "^$"),
+    ],
+)
+def test_what_is_left_out_is_counted(tmp_path: Path, lines: str, words: str):
+    (tmp_path / "it.k").write_text(deck("columns").replace("*NODE", f"{lines}*NODE", 1))
+    assert re.search(words, " ".join(mca.MeshFile(tmp_path / "it.k").build().notes))
+
+
+def test_sets_of_segments_columns_and_solids(tmp_path: Path):
+    """A segment has four nodes, of which 0 is none, and numbers behind them that are not read."""
+    sets = (
+        "*SET_SEGMENT\n         8       0.0       0.0       0.0       0.0MECH\n"
+        "        11        12        21         0       0.0       1.5\n"
+        "*SET_NODE_COLUMN\n9\n        41       2.5\n        31\n*SET_SOLID_TITLE\nends\n1\n2,7\n"
+        "*SET_SOLID_GENERATE\n2\n1,3\n"
+    )
+    (tmp_path / "it.k").write_text(deck("columns").replace("*NODE", f"{sets}*NODE", 1))
+    mesh = mca.MeshFile(tmp_path / "it.k").build()
+    assert [len(mesh.nodes(name)) for name in ("set_8", "set_9")] == [3, 2]
+    assert volumes(mesh)[mesh.cell_sets["ends"]] == pytest.approx([1 / 2, 1 / 6])
+    assert sorted(volumes(mesh)[mesh.cell_sets["set_2"]]) == pytest.approx([1 / 2, 1])
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("*TITLE", "*INCLUDE", "INCLUDE is not read"),
+        ("*TITLE", "*INCLUDE", "line 3: .INCLUDE is not read: it puts another file in"),
+        ("*TITLE", "*INCLUDE_TRANSFORM", "INCLUDE_TRANSFORM is not read"),
+        ("*TITLE", "*PARAMETER", "PARAMETER is not read"),
+        ("*TITLE", "*PART_MOVE", "PART_MOVE is not read: it moves nodes"),
+        ("*TITLE", "*NODE_TRANSFORM", "NODE_TRANSFORM is not read"),
+        ("*TITLE", "*DEFINE_TRANSFORMATION", "DEFINE_TRANSFORMATION is not read"),
+        ("*TITLE", "*SET_NODE_LIST_COLLECT", "SET_NODE_LIST_COLLECT is not read: it adds to other sets"),
+        ("*PART\n", "*NODE\n11, 0, 0, 1.01\n*PART\n", "node 11 is given twice"),
+        ("*PART\n", "*ELEMENT_SOLID\n7,1,1,2,11,41\n*PART\n", "element 7 is given twice"),
         ("*ELEMENT_SOLID", "*ELEMENT_SOLID_ORTHO", "ELEMENT_SOLID_ORTHO is not read"),
         ("*KEYWORD", "*KEYWORD LONG=Y", "long fields"),
         ("*NODE\n", "*NODE+\n", "long fields"),
         ("      31      31\n", "      31      14\n", "is of no known type"),
-        ("       1       2       3       4", "       1       2       3       8", "node 8 is used but not in"),
-        ("       1       2       3       4", "       1       2       x       4", "invalid literal"),
+        ("       1       2       3       4", "       1       2       3       8", "has node 8, which is not given"),
+        ("       1       2       3       4", "       1       2       x       4", "line 20: 'x' is no whole number"),
     ],
 )
 def test_what_is_not_read_is_refused(tmp_path: Path, old: str, new: str, words: str):
@@ -126,7 +172,7 @@ def test_wedges_of_gmsh_are_those_of_ls_dyna(tmp_path: Path):
     ):
         file = tmp_path / "wedge.k"
         file.write_text(f"{title}\n*KEYWORD\n*NODE\n{nodes}*ELEMENT_SOLID\n{solid}\n*END\n")
-        (block,) = read_keywords(file).cells
+        (block,) = read_keywords(file)[0].cells
         assert block.type == "wedge"
         found.append(block.data.tolist())
     assert found[0] == found[1] == [[0, 1, 2, 3, 4, 5]]

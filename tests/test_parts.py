@@ -204,6 +204,51 @@ def test_run_of_a_part_prints_a_scene_that_runs(
     assert mca.run(short, device="cpu").F_n.max() > 0.0
 
 
+def test_run_of_a_mesh_says_once_what_is_left_out(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    """Of the file that the script is made of, which is read several times, and of the run of that script."""
+    monkeypatch.chdir(tmp_path)
+    text = (folder / "part.bdf").read_text().replace("ENDDATA", "RBE2,1,1,123,2\nENDDATA")
+    Path("part.bdf").write_text(text)
+    main(["run", "part.bdf"])
+    out, err = capsys.readouterr()
+    assert err.count("left out are 1 rigid elements (RBE2)") == 1 and "build(" in out
+    Path("drop.py").write_text(out)
+    assert main(["run", "drop.py", "--duration", "1e-7", "--out", "results"]) == 0
+    assert capsys.readouterr().err.count("left out are 1 rigid elements (RBE2)") == 1
+    assert "left out are 1 rigid elements (RBE2)" in Path("results/summary.json").read_text()
+
+
+UNIVERSAL = {  # changes of a .unv file that gmsh would pass over, or that would crash it
+    "GROUP": ("         8      1523", "         8     99500", "a group has element 99500, which is not given"),
+    "NODE": (
+        "         2         1         1        11\n",
+        "         1         1         1        11\n",
+        "node 1 is given",
+    ),
+    "ELEMENT": ("      1523       111", "      1522       111", "element 1522 is given twice"),
+}
+
+
+@pytest.mark.parametrize("name", UNIVERSAL)
+def test_universal_files_that_gmsh_misreads_are_refused(folder: Path, tmp_path: Path, name: str):
+    old, new, words = UNIVERSAL[name]
+    text = (folder / "part.unv").read_text()
+    assert old in text
+    (tmp_path / "it.unv").write_text(text.replace(old, new, 1))
+    with pytest.raises(mca.RequestError, match=words):
+        part(tmp_path / "it.unv").build()
+
+
+def test_springs_of_a_universal_file_are_told(folder: Path, tmp_path: Path):
+    text = (folder / "part.unv").read_text()
+    spring = f"{9000:10d}{136:10d}{1:10d}{1:10d}{7:10d}{2:10d}\n{1:10d}{2:10d}\n"
+    (tmp_path / "it.unv").write_text(text.replace("  2412\n", f"  2412\n{spring}", 1))
+    (note,) = part(tmp_path / "it.unv").build().notes
+    assert note.endswith("left out are 1 of the type 136")
+
+
 FACET = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet"
 
 

@@ -74,6 +74,23 @@ def test_mesh_file_written_by_gmsh_itself(tmp_path: Path, version: float, binary
     assert np.array_equal(mesh.cell_sets["column"], np.arange(len(mesh.hexahedra)))
 
 
+def test_groups_of_med_files(tmp_path: Path):
+    """A cell may be in several; a group may have several families, of faces, cells or points."""
+    import meshio
+
+    box = Box(size=(2.0, 1.0, 1.0), divisions=(4, 1, 1)).build()
+    file = tmp_path / "box.med"
+    made = as_meshio(box, cell_data={"cell_tags": [np.array([-1]), np.array([-2, -2, -3, 0])]})
+    made.point_data["point_tags"] = np.where(box.points[:, 0] == 2.0, 5, 0)
+    made.cell_tags = {-1: ["wall"], -2: ["left", "all"], -3: ["all"]}
+    made.point_tags = {5: ["end"]}
+    meshio.write(file, made)
+    mesh = MeshFile(file).build()
+    assert {name: cells.tolist() for name, cells in mesh.cell_sets.items()} == {"left": [0, 1], "all": [0, 1, 2]}
+    assert (mesh.points[mesh.nodes("wall"), 0] == 0.0).all() and len(mesh.nodes("wall")) == 4
+    assert (mesh.points[mesh.nodes("end"), 0] == 2.0).all() and len(mesh.nodes("end")) == 4
+
+
 def test_mesh_file_vtu(tmp_path: Path, capfd):
     box = Box(size=(1.0, 2.0, 3.0), divisions=(2, 3, 4)).build()
     mesh = read_back(tmp_path / "box.vtu", as_meshio(box))
@@ -88,28 +105,6 @@ def test_mesh_file_point_and_cell_sets(tmp_path: Path):
     mesh = read_back(tmp_path / "box.inp", as_meshio(box, **sets))
     assert mesh.nodes("pins").tolist() == [0, 4]
     assert mesh.cell_sets["left"].tolist() == [0]
-
-
-@pytest.mark.parametrize(
-    ("lines", "words"),
-    [
-        ("*Part, name=a\n{}*End Part\n*PART, name=b\n{}", r"more than one \*PART"),
-        ("{}*Instance, name=a-1\n*End Instance\n *x\n* instance, name=a-2", r"more than one \*INSTANCE"),
-        ("{}*INSTANCE, name=a-1, part=a\n** moved\n0.1, 0., 0.\n*END INSTANCE\n", r"\*INSTANCE is moved"),
-        ("{}*node\n99, 0., 0., 0.\n", r"more than one \*NODE"),
-    ],
-)
-def test_abaqus_files_that_meshio_misreads_are_refused(tmp_path: Path, lines: str, words: str):
-    """It numbers nodes from the start in each part, and leaves instances where their parts are."""
-    file = tmp_path / "it.inp"
-    box = Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
-    read_back(file, as_meshio(box))
-    part = "".join(file.read_text().partition("*NODE")[1:])
-    file.write_text(f"*Part, name=a\n{part}*End Part\n*Instance, name=a-1, part=a\n\n** *Part\n*End Instance\n")
-    assert np.array_equal(MeshFile(file).build().points, box.points)
-    file.write_text(lines.format(part, part))
-    with pytest.raises(RequestError, match=rf"it\.inp.*{words}.*NO PARTS ASSEMBLIES"):
-        MeshFile(file).build()
 
 
 def test_a_refusal_gives_the_reason_of_meshio(tmp_path: Path):

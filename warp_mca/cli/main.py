@@ -26,13 +26,24 @@ from warp_mca.runs.advice import LOGGER
 
 
 class _Warnings(logging.Handler):
-    """Prints warnings, and what a run chose, on standard error; `sys.stderr` may differ from command to command."""
+    """Prints warnings, and what a run chose, on standard error; `sys.stderr` may differ from command to command.
+
+    A warning is printed once: what a reader of mesh files left out is told when it reads, and by the run.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._printed: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print one line."""
+        text = record.getMessage()
         with suppress(OSError):  # a closed standard error does not stop the run
-            kind = "warning: " if record.levelno >= logging.WARNING else ""
-            print(f"{kind}{record.getMessage()}", file=sys.stderr, flush=True)
+            if record.levelno < logging.WARNING:
+                print(text, file=sys.stderr, flush=True)
+            elif text not in self._printed:
+                self._printed.add(text)
+                print(f"warning: {text}", file=sys.stderr, flush=True)
 
 
 class _Terminated(KeyboardInterrupt):

@@ -10,7 +10,7 @@ import numpy as np
 
 from warp_mca.base.errors import RequestError
 
-MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
+MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".fem", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
 CELLS = 12  # tetrahedra along the diagonal of a CAD part
 SPEED = 5000.0  # of waves in metals [m/s]
 PASSES = 20  # of a wave along the part in the simulated time

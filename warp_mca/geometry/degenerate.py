@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,4 +83,4 @@ def tetrahedral(mesh: Mesh) -> Mesh:
     }
     none = np.zeros((0, HEXAHEDRON.corners), dtype=np.int32)
     tetrahedra = np.concatenate([cut, mesh.tetrahedra])[order].astype(np.int32)
-    return Mesh(mesh.points, none, mesh.node_sets, cell_sets, tetrahedra)
+    return replace(mesh, hexahedra=none, cell_sets=cell_sets, tetrahedra=tetrahedra)

@@ -1,154 +1,163 @@
-"""Owns the reading of LS-DYNA keyword files: nodes, solids, parts, sets of nodes and segments."""
+"""Owns the reading of LS-DYNA keyword files: nodes, solids, parts, sets of nodes, segments and solids."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from itertools import pairwise
+from collections.abc import Iterator
+from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
+from warp_mca.geometry.deck import Block, Deck, blocks, integer, real
+from warp_mca.geometry.deck_rules import ELEMENTS, KEYWORD_RULES
 
 if TYPE_CHECKING:
     import meshio
 
 KEYWORD_SUFFIXES = (".k", ".key", ".dyn")
-_WIDTHS = {"NODE": (8, 16, 16, 16, 8, 8), "ELEMENT_SOLID": (8,) * 10}  # columns of a card's fields; elsewhere ten
-_SETS = {"SET_NODE", "SET_NODE_LIST", "SET_NODE_LIST_GENERATE", "SET_SEGMENT"}
-_UNREAD = ("INCLUDE", "PARAMETER", "DEFINE_TRANSFORM", "NODE_TRANSFORM", "ELEMENT_SOLID_")  # they change the mesh
+
+
+def _columns(*widths: int) -> list[slice]:
+    """The columns of the fields of a card."""
+    return [slice(a, b) for a, b in pairwise(accumulate(widths, initial=0))]
+
+
+_NODE, _SOLID, _OTHER = _columns(8, 16, 16, 16, 8, 8), _columns(*[8] * 10), _columns(*[10] * 8)
+_PART_CARDS = {"PART": 2, "PART_CONTACT": 3, "PART_PRINT": 3}  # of each part; of others the first one is named
 Card = list[str]
 
 
-@dataclass
-class _Deck:
-    """What the blocks of a file hold, by the file's own numbers.
+def read_keywords(path: Path) -> tuple[meshio.Mesh, list[str]]:
+    """The solids of a keyword file with its sets and parts, and sentences about what is left out.
 
-    Attributes:
-        by_gmsh: gmsh wrote it, whose wedges have another order.
-    """
-
-    by_gmsh: bool = False
-    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
-    solids: dict[str, list[list[int]]] = field(default_factory=dict)
-    parts_of: dict[str, list[int]] = field(default_factory=dict)
-    titles: dict[int, str] = field(default_factory=dict)
-    sets: dict[str, list[int]] = field(default_factory=dict)
-
-
-def read_keywords(path: Path) -> meshio.Mesh:
-    """The solids of a keyword file, with sets of nodes and segments as point sets and parts as cell sets.
-
-    Fields may stand in columns of the usual widths or between commas. Elements that are not solids, as shells and
-    beams, are passed over, which is logged as a warning.
+    Fields may stand in columns of the usual widths or between commas.
 
     Raises:
-        ValueError: a card cannot be read, or the file is put together by keywords that are not read.
+        ValueError: a card cannot be read, or a keyword would change the mesh in a way that is not read.
     """
-    import meshio
-
     with path.open(errors="replace") as file:
-        deck, left = _Deck(by_gmsh="created by Gmsh" in file.readline()), set[str]()
-    for keyword, lines in _blocks(path):
-        if keyword.startswith(_UNREAD):
-            raise ValueError(f"*{keyword} is not read: write the mesh as one file of *NODE and *ELEMENT_SOLID")
-        name = keyword.removesuffix("_TITLE")
-        if name in _SETS:
-            _read_set(deck, name, lines, titled=name != keyword)
-        elif name in _READERS:
-            _READERS[name](deck, lines)
-        elif name.startswith("ELEMENT_") and any(map(_fields, lines)):
-            left.add(keyword)
-    if left:
-        blocks = ", ".join(f"*{keyword}" for keyword in sorted(left))
-        what = f"{path}: elements of {blocks} are left out, with their stiffness and mass: only *ELEMENT_SOLID is read"
-        logging.getLogger("warp_mca").warning("%s", what)
-    index = {number: k for k, number in enumerate(deck.nodes)}
-    try:
-        cells: list[Any] = [
-            (kind, np.array([[index[n] for n in nodes] for nodes in rows])) for kind, rows in deck.solids.items()
-        ]
-        point_sets: dict[str, Any] = {
-            name: np.array([index[n] for n in members]) for name, members in deck.sets.items() if members
-        }
-    except KeyError as error:
-        raise ValueError(f"node {error.args[0]} is used but not in *NODE") from error
-    cell_sets: dict[str, Any] = {}
-    for number in sorted({part for parts in deck.parts_of.values() for part in parts}):
-        by_block = [np.flatnonzero(np.array(parts) == number) for parts in deck.parts_of.values()]
-        before = cell_sets.get(name := deck.titles.get(number) or f"part_{number}")
-        cell_sets[name] = by_block if before is None else list(map(np.union1d, before, by_block))
-    points = np.array(list(deck.nodes.values())).reshape(-1, 3)
-    return meshio.Mesh(points, cells, point_sets=point_sets, cell_sets=cell_sets)
+        reader = _Reader(Deck(path), "created by Gmsh" in file.readline())
+    for block in blocks(path, "$"):
+        if block.keyword.upper().split()[:1] == ["END"]:
+            break
+        try:
+            reader.take(block)
+        except ValueError as error:
+            raise ValueError(f"line {reader.line}: {error}") from error
+    return reader.finish()
 
 
-def _blocks(path: Path) -> Iterator[tuple[str, list[str]]]:
-    """Keywords, without what follows the first blank, and the lines of each; comments are left out."""
-    keyword, lines = "", []
-    with path.open(errors="replace") as file:
-        for line in file:
-            if line.startswith("$"):
-                continue
-            if line.startswith("*"):
-                yield keyword, lines
-                words = line[1:].upper().split() or [""]
-                if words[0].endswith(("+", "%")) or (words[0] == "KEYWORD" and "LONG=" in line.upper()):
-                    raise ValueError("its cards have long fields: write it in the standard format")
-                keyword, lines = words[0], []
-                if keyword == "END":
-                    return
-            else:
-                lines.append(line.rstrip("\n"))
-    yield keyword, lines
-
-
-def _fields(line: str, widths: tuple[int, ...] = (10,) * 8) -> Card:
+def _fields(line: str, columns: list[slice] = _OTHER) -> Card:
     """The fields of a card, without the empty ones at its end."""
-    if "," in line:
-        found = line.split(",")
-    else:
-        ends = np.cumsum((0, *widths))
-        found = [line[a:b] for a, b in pairwise(ends)]
-    found = [entry.strip() for entry in found]
+    found = [entry.strip() for entry in (line.split(",") if "," in line else [line[part] for part in columns])]
     while found and not found[-1]:
         found.pop()
     return found
 
 
-def _numbers(card: Card) -> list[int]:
-    return [int(entry or 0) for entry in card]
+class _Reader:
+    """Takes the blocks of a file in turn; `by_gmsh`: gmsh wrote it, whose wedges have another order."""
+
+    def __init__(self, deck: Deck, by_gmsh: bool) -> None:
+        self.deck, self.by_gmsh, self.line = deck, by_gmsh, 0
+        self.titles: dict[int, str] = {}
+        self.parts: dict[int, list[int]] = {}  # solids of each part
+        self.ranges: list[tuple[dict[str, list[int]], str, range]] = []  # of members: table and name of the set
+
+    def take(self, block: Block) -> None:
+        """Read one block, or count it."""
+        self.line, text = block.line, block.keyword.upper()
+        words = text.split() or [""]
+        if words[0].endswith(("+", "%")) or (words[0] == "KEYWORD" and ("LONG=" in text or "I10=Y" in text)):
+            raise ValueError("its cards have long fields, not the standard ones")
+        name = words[0].rstrip("-").removesuffix("_TITLE")
+        try:
+            kind = KEYWORD_RULES.kind(name)
+        except ValueError as error:
+            raise ValueError(f"*{error}") from error
+        if name == "NODE":
+            self._take_nodes(block)
+        elif name == "ELEMENT_SOLID":
+            self._take_solids(block)
+        elif kind == "read" and name.startswith("SET_"):
+            self._take_set(name, block, titled="_TITLE" in words[0])
+        elif name == "ELEMENT_SHELL" and self.by_gmsh:
+            self._take_marks(block)
+        else:
+            if name.startswith("PART"):
+                self._take_titles(name, block)
+            cards = sum(bool(text.strip()) for _, text in block.data)
+            if cards and kind == ELEMENTS:
+                self.deck.left[kind, f"cards of *{name}"] += cards
+            elif cards and kind not in ("", "read"):
+                self.deck.left[kind, f"*{name}"] += 1
+
+    def _cards(self, block: Block, columns: list[slice] = _OTHER) -> Iterator[Card]:
+        for self.line, text in block.data:
+            if card := _fields(text, columns):
+                yield card
+
+    def _take_nodes(self, block: Block) -> None:
+        """Cards: number, x, y, z, constraints."""
+        for card in self._cards(block, _NODE):
+            x, y, z = (real(entry) for entry in (*card[1:4], "", "", "")[:3])
+            self.deck.add_node(integer(card[0]), (x, y, z))
+
+    def _take_solids(self, block: Block) -> None:
+        """Cards: number, part, nodes; the nodes may stand on a card of their own, or go on after a comma at its end."""
+        rest: list[int] = []
+        for self.line, text in block.data:
+            rest += [integer(entry or "0") for entry in _fields(text, _SOLID)]
+            open_end = text.endswith(",") and len(rest) == 11  # gmsh writes ten nodes so
+            if len(rest) > 2 and not open_end:
+                kind, nodes = _solid(rest[2:], self.by_gmsh)
+                self.deck.add_cell(rest[0], kind, nodes)
+                self.parts.setdefault(rest[1], []).append(rest[0])
+                rest = []
+        if rest:
+            raise ValueError(f"the nodes of solid {rest[0]} are missing")
+
+    def _take_marks(self, block: Block) -> None:
+        """Cards: number, part, nodes; of shells, which gmsh writes for named surfaces, beside solids of any number."""
+        for number, _, *nodes in self._cards(block, _SOLID):
+            corners = list(dict.fromkeys(integer(entry) for entry in nodes[:4]))
+            self.deck.add_face(-integer(number), "*ELEMENT_SHELL", corners, mark=True)
+
+    def _take_titles(self, name: str, block: Block) -> None:
+        """Cards of each part: title; number, section, material; others, as the keyword has them."""
+        count = _PART_CARDS.get(name, max(2, len(block.data)))
+        for (_, title), (self.line, card) in zip(block.data[::count], block.data[1::count], strict=False):
+            if found := _fields(card):
+                self.titles[integer(found[0])] = title.strip()
+
+    def _take_set(self, name: str, block: Block, titled: bool) -> None:
+        """Cards: title if `titled`; number of the set; its members, ranges of them, or four nodes of each segment."""
+        lines = [text for _, text in block.data]
+        title = lines[0].strip() if titled else ""
+        key = title or f"set_{integer(_fields(lines[titled])[0])}"
+        members: list[int] = []
+        used = {"SET_SEGMENT": 4, "SET_NODE_COLUMN": 1}.get(name, 8)
+        for self.line, text in block.data[titled + 1 :]:
+            members += [n for entry in _fields(text)[:used] if (n := integer(entry or "0"))]
+        sets = self.deck.cell_sets if name.startswith("SET_SOLID") else self.deck.node_sets
+        sets.setdefault(key, [])
+        if name.endswith("_GENERATE"):
+            ranges = zip(members[::2], members[1::2], strict=True)
+            self.ranges += [(sets, key, range(low, high + 1)) for low, high in ranges]
+        else:
+            sets[key] += members
+
+    def finish(self) -> tuple[meshio.Mesh, list[str]]:
+        """The mesh, and sentences about what is left out."""
+        deck = self.deck
+        for sets, key, span in self.ranges:
+            known = deck.nodes if sets is deck.node_sets else deck.cells
+            sets[key] += [n for n in known if n in span]
+        for number in sorted(self.parts):
+            deck.cell_sets.setdefault(self.titles.get(number) or f"part_{number}", []).extend(self.parts[number])
+        return deck.mesh()
 
 
-def _read_nodes(deck: _Deck, lines: list[str]) -> None:
-    """Cards: number, x, y, z, constraints."""
-    for line in lines:
-        card = _fields(line, _WIDTHS["NODE"])
-        if card:
-            x, y, z = (float(entry or 0.0) for entry in (*card[1:4], "", "", "")[:3])
-            deck.nodes[int(card[0])] = (x, y, z)
-
-
-def _read_solids(deck: _Deck, lines: list[str]) -> None:
-    """Cards: number, part, nodes; the nodes may stand on a card of their own, or go on after a comma at its end."""
-    rest: list[int] = []
-    open_end = False
-    for line in lines:
-        card = _numbers(_fields(line, _WIDTHS["ELEMENT_SOLID"]))
-        if not card:
-            continue
-        rest += card
-        open_end = line.rstrip().endswith(",") and len(rest) == 11  # gmsh writes ten nodes so
-        if len(rest) > 2 and not open_end:
-            kind, nodes = _solid(rest[2:], deck.by_gmsh)
-            deck.solids.setdefault(kind, []).append(nodes)
-            deck.parts_of.setdefault(kind, []).append(rest[1])
-            rest = []
-    if rest:
-        raise ValueError(f"the nodes of solid {rest[0]} are missing")
-
-
-def _solid(nodes: list[int], by_gmsh: bool = False) -> tuple[str, list[int]]:
+def _solid(nodes: list[int], by_gmsh: bool) -> tuple[str, list[int]]:
     """Type and nodes of a solid: wedges, pyramids and tetrahedra repeat their last nodes.
 
     LS-DYNA numbers the eight corners of a wedge 1 2 3 4 5 5 6 6, of a pyramid 1 2 3 4 5 5 5 5 and of a tetrahedron
@@ -169,28 +178,3 @@ def _solid(nodes: list[int], by_gmsh: bool = False) -> tuple[str, list[int]]:
     if len(different) == 4 and len(nodes) in (4, 8):
         return "tetra", different
     raise ValueError(f"a solid with the nodes {nodes} is of no known type")
-
-
-def _read_parts(deck: _Deck, lines: list[str]) -> None:
-    """Pairs of cards: title; number, section, material."""
-    for title, card in zip(lines[::2], lines[1::2], strict=False):
-        if found := _fields(card):
-            deck.titles[int(found[0])] = title.strip()
-
-
-def _read_set(deck: _Deck, keyword: str, lines: list[str], titled: bool) -> None:
-    """Cards: title if `titled`; number of the set; its nodes, or ranges of nodes, or four nodes of each segment."""
-    head, rows = lines[titled], [_numbers(_fields(line)) for line in lines[titled + 1 :]]
-    name = (lines[0].strip() if titled else "") or f"set_{int(_fields(head)[0])}"
-    members = [n for row in rows for n in (row[:4] if keyword == "SET_SEGMENT" else row) if n]
-    if keyword == "SET_NODE_LIST_GENERATE":
-        ranges = zip(members[::2], members[1::2], strict=True)
-        members = [n for low, high in ranges for n in range(low, high + 1) if n in deck.nodes]
-    deck.sets.setdefault(name, []).extend(members)
-
-
-_READERS: dict[str, Callable[[_Deck, list[str]], None]] = {
-    "NODE": _read_nodes,
-    "ELEMENT_SOLID": _read_solids,
-    "PART": _read_parts,
-}

@@ -24,6 +24,7 @@ class Mesh:
         node_sets: named node indices, each shape (count,), int32.
         cell_sets: named cell indices, each shape (count,), int32.
         tetrahedra: node indices in VTK order, shape (tetrahedron_count, 4), int32.
+        notes: what the reader of its file left out, a sentence each; a run has them among its warnings.
     """
 
     points: NDArray[np.float64]
@@ -31,6 +32,7 @@ class Mesh:
     node_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     cell_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     tetrahedra: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+    notes: tuple[str, ...] = ()
 
     @property
     def cells(self) -> dict[str, NDArray[np.int32]]:
@@ -95,5 +97,5 @@ class Mesh:
         if name not in self.node_sets:
             raise bad_value("node set", name, f"the mesh has {', '.join(sorted(self.node_sets)) or 'no sets'}")
         if not len(self.node_sets[name]):
-            raise bad_value("node set", name, "it is empty; name one that holds nodes")
+            raise bad_value("node set", name, "no cell has a node of it; name a set of nodes that cells have")
         return self.node_sets[name]

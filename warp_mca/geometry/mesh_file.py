@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import logging
 import textwrap
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,27 +14,45 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC, STORED_TYPES
+from warp_mca.geometry.abaqus_file import ABAQUS_SUFFIXES, read_abaqus
+from warp_mca.geometry.cell_types import CELL_TYPES, STORED_TYPES
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
-from warp_mca.geometry.end_marks import END_REQUIRED, cell_without_property, missing_end, unread_cells
-from warp_mca.geometry.gmsh_file import GMSH_SUFFIXES, read_by_gmsh
+from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.meshio_file import read_by_meshio
+from warp_mca.geometry.nastran_file import NASTRAN_SUFFIXES, read_nastran
 from warp_mca.geometry.selection import Select, check_selections, with_selections
+from warp_mca.geometry.universal_file import UNIVERSAL_SUFFIXES, read_universal
+from warp_mca.geometry.vtk_file import VTK_SUFFIXES
 
 if TYPE_CHECKING:
     import meshio
 
 _READ = {cell.meshio: cell for cell in CELL_TYPES.values()}  # cells that are read, in the order they are kept
+Reader = Callable[[Path], "tuple[meshio.Mesh, list[str]]"]
+_WHOLE = "write the whole mesh into it, as plain nodes, elements and sets, or save it as .vtu"
+_OTHER = "save it as binary .msh or as .vtu"
+_READERS: dict[tuple[str, ...], tuple[str, Reader, str]] = {  # by suffix: what reads, and what to do where it cannot
+    ABAQUS_SUFFIXES: ("the reader of Abaqus files", read_abaqus, _WHOLE),
+    NASTRAN_SUFFIXES: ("the reader of Nastran files", read_nastran, _WHOLE),
+    KEYWORD_SUFFIXES: ("the reader of keyword files", read_keywords, _WHOLE),
+    UNIVERSAL_SUFFIXES: ("gmsh", read_universal, _OTHER),
+    VTK_SUFFIXES: ("meshio or VTK", read_by_meshio, "save it with tetrahedra, hexahedra, wedges and pyramids"),
+    (".msh",): ("meshio", read_by_meshio, "save it in gmsh's format 4.1 with Mesh.SaveAll off or as .vtu"),
+}
+_MESHIO = "meshio", read_by_meshio, _OTHER
 
 
 @dataclass(frozen=True)
 class MeshFile:
     """A mesh from a file; nodes that no cell uses are dropped.
 
-    gmsh reads .unv and .bdf, `keyword_file` the .k of LS-DYNA, meshio .msh, .inp, .vtu and all others that it knows.
-    Quadratic cells are taken as linear ones, which is logged as a warning.
+    Readers of our own take input files of Abaqus, Nastran and LS-DYNA, gmsh .unv, meshio .msh, .vtu and all others that
+    it knows, VTK those of its files that meshio does not. What would move, add or change nodes, cells or sets and is
+    not read is refused; what else a file holds, as shells and loads, is left out with a warning (docs/parts.md).
+    Quadratic cells are taken as linear ones, which is a warning too.
 
     Node sets come from the file's point sets and from its named groups of faces, edges or vertices; cell sets from
     its named groups of cells. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
@@ -59,12 +76,12 @@ class MeshFile:
         check_selections("MeshFile", self.select)
 
     def build(self) -> Mesh:
-        """Reads the file.
+        """Reads the file; what it holds besides is left out with a warning, which `Mesh.notes` keeps.
 
         Raises:
             RequestError: it cannot be read, or holds something other than sound hexahedra.
         """
-        read = self._linear(self._read())
+        read, notes = self._read()
         points = self.scale * np.array(read.points, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise self._bad("its points are not three-dimensional; save it with x, y and z")
@@ -81,60 +98,39 @@ class MeshFile:
             )
             for kept in STORED_TYPES.values()
         }
-        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, **arrays))
+        for note in notes:
+            logging.getLogger("warp_mca").warning("%s", note)
+        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
         return with_selections(mesh, self.select)
 
-    def _read(self) -> meshio.Mesh:
+    def _read(self) -> tuple[meshio.Mesh, list[str]]:
+        """The file's mesh with linear cells, and sentences about what is left out."""
+        path = Path(self.path)
         try:
-            found = Path(self.path).is_file()
+            found = path.is_file()
         except OSError as error:  # as of a name that is too long
             raise self._bad(f"{error.strerror or error}; check the path") from error
         if not found:
             raise self._bad("there is no such file; check the path")
-        self._check_end()
-        suffix, said = Path(self.path).suffix.lower(), io.StringIO()
+        notes = self._check_end()
+        suffix = path.suffix.lower()
+        reader, read, remedy = next((item for suffixes, item in _READERS.items() if suffix in suffixes), _MESHIO)
         try:
-            import meshio
+            import meshio  # noqa: F401  which all readers answer in
         except ImportError as error:
             raise RequestError(f"meshio cannot be imported ({error}): install it with pip install meshio") from error
-        reader = "meshio"
         try:
-            if suffix in KEYWORD_SUFFIXES:
-                reader = "the reader of keyword files"
-                return read_keywords(Path(self.path))
-            if suffix in GMSH_SUFFIXES:
-                reader = "gmsh"
-                return read_by_gmsh(Path(self.path))
-            if suffix == ".inp":
-                self._check_abaqus()
-            with redirect_stdout(said), redirect_stderr(io.StringIO()):
-                return meshio.read(self.path)
+            mesh, more = read(path)
         except RequestError:
             raise
-        except (Exception, SystemExit) as error:  # some of its readers exit, others raise whatever went wrong
-            reason = textwrap.shorten(said.getvalue() if isinstance(error, SystemExit) else str(error), 200).rstrip(".")
-            if not Path(self.path).stat().st_size:
+        except Exception as error:  # readers of other packages raise whatever went wrong
+            reason = textwrap.shorten(str(error), 300).rstrip(".")
+            if not path.stat().st_size:
                 reason = "it is empty"
             elif " " not in reason:  # a number or a key, which tells a user nothing
-                reason = "it is damaged, or of an unknown kind"
-            what = f"{reader} cannot read it ({reason})"
-            remedy = "in gmsh's format 4.1 with Mesh.SaveAll off" if suffix == ".msh" else "as binary .msh"
-            raise self._bad(f"{what}; save it {remedy} or as .vtu") from error
-
-    def _linear(self, read: meshio.Mesh) -> meshio.Mesh:
-        """The mesh with quadratic cells as linear ones: their corners come first in all formats."""
-        count = sum(len(block.data) for block in read.cells if block.type in QUADRATIC)
-        if count:
-            kinds = ", ".join(sorted({block.type for block in read.cells if block.type in QUADRATIC}))
-            what = (
-                f"{self.path}: {count} quadratic cells ({kinds}) are taken as linear ones, without the nodes in edges"
-            )
-            logging.getLogger("warp_mca").warning("%s", what)
-        for block in read.cells:
-            if block.type in QUADRATIC:
-                _, block.type, corners = QUADRATIC[block.type]
-                block.data = block.data[:, :corners]
-        return read
+                reason = f"it is damaged, or holds what {reader} does not know ({type(error).__name__} {reason})"
+            raise self._bad(f"{reader} cannot read it ({reason}); {remedy}") from error
+        return mesh, [*notes, *more]
 
     def _physical_names(self) -> dict[tuple[int, int], str]:
         """Names of the physical groups of gmsh's file by number and dimension: a surface and a volume may share one,
@@ -151,38 +147,13 @@ class MeshFile:
                         break
         return names
 
-    def _check_end(self) -> None:
-        """Refuses a file that was cut off, where its format says so, or that gmsh would misread; warns where it may
-        have been cut off."""
-        if cell := cell_without_property(Path(self.path)):
-            raise self._bad(f"its cell {cell} has no property number; write one (PID) into each cell")
-        for card, count in unread_cells(Path(self.path)).items():
-            what = f"{self.path}: {count} cards {card} are left out, which gmsh does not know: look at them"
-            logging.getLogger("warp_mca").warning("%s", what)
+    def _check_end(self) -> list[str]:
+        """Refuses a file that was cut off, where its format says so; a sentence where it may have been cut off."""
         if not (mark := missing_end(Path(self.path))):
-            return
+            return []
         if Path(self.path).suffix.lower() in END_REQUIRED:
             raise self._bad(f"it lacks {mark}, as if it had been cut off; write it again, or add that if it is whole")
-        what = f"{self.path} lacks {mark}: if it was cut off, cells are missing"
-        logging.getLogger("warp_mca").warning("%s", what)
-
-    def _check_abaqus(self) -> None:
-        """Refuses what meshio passes over: it keeps the last block of nodes only, and places no instance."""
-        keyword, seen = "", set()
-        remedy = (
-            "write it as a flat input file (Abaqus: model keyword NO PARTS ASSEMBLIES), one *NODE in it, or as .vtu"
-        )
-        with Path(self.path).open(errors="replace") as lines:
-            for line in lines:
-                if line.startswith("**"):
-                    continue
-                if line.startswith("*"):
-                    keyword = line[1:].partition(",")[0].strip().upper()
-                    if keyword in seen:
-                        raise self._bad(f"it has more than one *{keyword}, which meshio would misread; {remedy}")
-                    seen |= {keyword} & {"NODE", "PART", "INSTANCE"}
-                elif keyword == "INSTANCE" and line.strip():
-                    raise self._bad(f"its *INSTANCE is moved, which meshio would pass over; {remedy}")
+        return [f"{self.path} lacks {mark}: if it was cut off, cells are missing"]
 
     def _cells(self, read: meshio.Mesh) -> dict[str, NDArray[np.int32]]:
         """Nodes of the cells of each type, by its name in CELL_TYPES."""

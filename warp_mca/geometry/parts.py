@@ -89,4 +89,5 @@ class Parts:
             {name: np.concatenate(items).astype(np.int32) for name, items in node_sets.items()},
             {name: np.concatenate(items).astype(np.int32) for name, items in cell_sets.items()},
             np.concatenate([mesh.tetrahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
+            notes=tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes)),
         )

@@ -1,4 +1,4 @@
-"""Owns what is said of a scene's meshes before it runs: slivers, parts that hardly hang together, coarse slaves."""
+"""Owns what is said of a scene's meshes before it runs: notes of readers, slivers, loose parts, coarse slaves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
         meshes: of its bodies, by name.
         model: assembled of them.
     """
-    found: list[str] = []
+    found = list(dict.fromkeys(note for mesh in meshes.values() for note in mesh.notes))
     stable = model.stable
     if stable.shortened > SHORTENED:
         name, element = model.owner(stable.element)
