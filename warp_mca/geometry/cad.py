@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +25,6 @@ from warp_mca.geometry.selection import Select, check_selections, with_selection
 
 # Metres for one unit of the coordinates that gmsh gives: of STEP and IGES files, which name their unit, it gives mm.
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
-_UNIT = "Geometry.OCCTargetUnit"  # gmsh's option: unit of what it reads from STEP and IGES
 _HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest slivers
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
@@ -113,8 +110,7 @@ def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mes
         if count > LIMIT:
             remedy = f"up to {count:.2g} elements would result in a part of {_diagonal(gmsh) * scale:.3g} m"
             raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
-        with _quiet():
-            gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.generate(3)
         return _read(gmsh.model, scale)
 
 
@@ -131,15 +127,9 @@ def _explained(path: str) -> Iterator[None]:
         raise bad_value("Cad.path", path, f"gmsh cannot read or mesh it ({words}); {remedy}") from error
 
 
-def _draw(gmsh: ModuleType, path: str) -> None:
+def _draw(gmsh: Any, path: str) -> None:
     """Reads the part into gmsh's model; sews the faces of a file without solids together."""
-    unit = gmsh.option.getString(_UNIT)
-    try:
-        gmsh.option.setString(_UNIT, "MM")
-        with _quiet():
-            gmsh.merge(path)
-    finally:
-        gmsh.option.setString(_UNIT, unit)
+    gmsh.merge(path)
     if Path(path).suffix.lower() == ".stl":
         _check_closed(gmsh, path)
         try:
@@ -154,14 +144,13 @@ def _draw(gmsh: ModuleType, path: str) -> None:
             gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(faces)])
         gmsh.model.geo.synchronize()
     elif not gmsh.model.getEntities(3):
-        with _quiet():
-            gmsh.model.occ.healShapes(tolerance=1e-6 * _diagonal(gmsh), sewFaces=True, makeSolids=True)
+        gmsh.model.occ.healShapes(tolerance=1e-6 * _diagonal(gmsh), sewFaces=True, makeSolids=True)
         gmsh.model.occ.synchronize()
     if not gmsh.model.getEntities(3):
         raise bad_value("Cad.path", path, "it holds no solid; save the part as a closed solid")
 
 
-def _check_closed(gmsh: ModuleType, path: str) -> None:
+def _check_closed(gmsh: Any, path: str) -> None:
     """Refuse triangles that leave an edge open: gmsh may never return from dividing them into faces.
 
     Raises:
@@ -199,33 +188,19 @@ def _box(points: NDArray) -> NDArray:
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _part_faces(gmsh: ModuleType, cut: bool) -> None:
+def _part_faces(gmsh: Any, cut: bool) -> None:
     """Parts the triangles of an STL file along sharp edges, and if `cut`, into pieces that can be flattened."""
     gmsh.model.mesh.classifySurfaces(_SHARP, True, cut, math.pi)
     gmsh.model.mesh.createGeometry()
 
 
-def _diagonal(gmsh: ModuleType) -> float:
+def _diagonal(gmsh: Any) -> float:
     """Of the box around the model, in the file's unit."""
     box = gmsh.model.getBoundingBox(-1, -1)
     return math.dist(box[:3], box[3:])
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Close standard output meanwhile: libraries in gmsh write there what they transferred, and which edges cross."""
-    sys.stdout.flush()
-    kept, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(null)
-
-
-def _read(model: ModuleType, scale: float) -> Mesh:
+def _read(model: Any, scale: float) -> Mesh:
     """Collects tetrahedra and sets; nodes that no tetrahedron uses are left out."""
     solids = [tag for _, tag in model.getEntities(3)]
     blocks = [model.mesh.getElementsByType(TETRAHEDRON.gmsh, tag)[1].reshape(-1, 4) for tag in solids]
@@ -253,7 +228,7 @@ def _read(model: ModuleType, scale: float) -> Mesh:
     return compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, tetrahedra))
 
 
-def _name(model: ModuleType, dim: int, tag: int) -> str:
+def _name(model: Any, dim: int, tag: int) -> str:
     """Name of a face or a solid in the file, without those of the assemblies that it lies in; "" without one."""
     name = model.getEntityName(dim, tag).rpartition("/")[2].strip()
     return "" if name in _GENERIC or name.startswith("Open CASCADE") else name
