@@ -18,7 +18,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
-from warp_mca.geometry.gmsh_session import gmsh_session
+from warp_mca.geometry.gmsh_session import allow, gmsh_session
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import LIMIT
 from warp_mca.geometry.selection import Select, check_selections, with_selections
@@ -29,6 +29,9 @@ _HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest sli
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
 _GENERIC = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
+# Time that gmsh may take, many times what it needs: to read and to mesh any part, for a byte of its file, for an
+# element [s].
+_READ, _MESH, _BYTE, _ELEMENT = 20.0, 60.0, 5e-5, 1e-4
 _KEPT = 4  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
 
 
@@ -93,7 +96,7 @@ def extent(path: str | Path, scale: float | None = None) -> float:
     part = Cad(path, size=1.0, scale=scale)
     if not Path(path).is_file():
         raise bad_value("Cad.path", str(path), "there is no such file; check the path")
-    with gmsh_session() as gmsh, _explained(str(path)):
+    with gmsh_session(_reading(path)) as gmsh, _explained(str(path)):
         _draw(gmsh, str(path))
         return _diagonal(gmsh) * (part.scale or UNITS[Path(path).suffix.lower()])
 
@@ -103,15 +106,21 @@ def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mes
     """The mesh of a file that was changed last at `stamp`: time [ns] and size [byte]."""
     # without a least size gmsh divides the part in ten
     options = {"Mesh__Algorithm3D": _HXT, "Mesh__MeshSizeMax": size / scale, "Mesh__MeshSizeMin": size / scale}
-    with gmsh_session(**options) as gmsh, _explained(path):
+    with gmsh_session(_reading(path), **options) as gmsh, _explained(path):
         _draw(gmsh, path)
         x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(-1, -1)
         count = 6.0 * (x1 - x0) * (y1 - y0) * (z1 - z0) * (scale / size) ** 3  # at most: of a part that fills its box
         if count > LIMIT:
             remedy = f"up to {count:.2g} elements would result in a part of {_diagonal(gmsh) * scale:.3g} m"
             raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
+        allow(gmsh, _MESH + _reading(path) + _ELEMENT * count)
         gmsh.model.mesh.generate(3)
         return _read(gmsh.model, scale)
+
+
+def _reading(path: str | Path) -> float:
+    """Time that gmsh may take for reading a file [s]."""
+    return _READ + _BYTE * Path(path).stat().st_size
 
 
 @contextmanager

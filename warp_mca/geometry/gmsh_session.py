@@ -24,8 +24,8 @@ from typing import Any
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 
-LIMIT = "WARP_MCA_MESH_TIME"  # environment variable: longest time for reading and meshing a file [s]
-DEFAULT_LIMIT = 600.0  # s
+LIMIT = "WARP_MCA_MESH_TIME"  # environment variable: longest time for reading a file, and for meshing it [s]
+DEFAULT_LIMIT = 600.0  # for a file whose size the caller does not tell [s]
 DYING = 5.0  # time that a process which answers no more takes to end, at most [s]
 _LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
 _OPTIONS = {"General.Terminal": 0.0, "General.NumThreads": 1.0, "Mesh.ElementOrder": 1.0}
@@ -35,19 +35,19 @@ _one_at_a_time = threading.Lock()  # gmsh keeps one global state
 
 
 @contextmanager
-def gmsh_session(**more: float) -> Iterator[Any]:
+def gmsh_session(allowed: float = DEFAULT_LIMIT, /, **more: float) -> Iterator[Any]:
     """gmsh with an empty model in a process of its own, whose functions are called as those of the module `gmsh`.
 
-    They raise Exception, as gmsh does, also where gmsh crashes or takes longer than `LIMIT` allows. The process is
-    ended with the session.
+    They raise Exception, as gmsh does, also where gmsh crashes or takes too long. The process ends with the session.
 
     Args:
+        allowed: time for all calls, unless the environment variable `LIMIT` gives another one or `allow` more [s].
         more: gmsh's options by name, with "__" for the dot, as Mesh__Algorithm3D.
 
     Raises:
         RequestError: gmsh or a library that it needs is missing, or the time limit is no number above 0.
     """
-    process = _Process(_limit())
+    process = _Process(_limit(allowed))
     try:
         gmsh = _Remote(process, "")
         with _explained():
@@ -60,12 +60,17 @@ def gmsh_session(**more: float) -> Iterator[Any]:
         process.end()
 
 
+def allow(gmsh: Any, allowed: float) -> None:
+    """Allow the process of a session so much time from now on [s], unless the environment gives another limit."""
+    gmsh._process.allow(_limit(allowed))
+
+
 class _Process:
     """The process, and the time until it is ended."""
 
     def __init__(self, limit: float) -> None:
-        """Start it; a limit [s] from now on is the longest that it may take."""
-        self.limit, self.end_time = limit, time.monotonic() + limit
+        """Start it, with that limit of time [s]."""
+        self.allow(limit)
         command = [sys.executable, "-P", str(_SERVER)]
         # a session of its own: an interrupt from the keyboard is for this process alone
         self.process = subprocess.Popen(
@@ -89,8 +94,8 @@ class _Process:
                     raise TimeoutError
                 good, answer = pickle.load(self.process.stdout)
             except TimeoutError:
-                longer = f"{LIMIT}={10.0 * self.limit:g} allows ten times as many"
-                self.broken = f"it took more than {self.limit:g} s, as damaged files may make it; {longer}"
+                longer = f"the environment variable {LIMIT}={10.0 * self.limit:.2g} allows ten times as many"
+                self.broken = f"it took more than {self.limit:.2g} s, as damaged files may make it; {longer}"
             except (EOFError, pickle.UnpicklingError):
                 self.broken = f"it crashed, as damaged files may make it: {self._how_it_ended()}"
             else:
@@ -100,6 +105,10 @@ class _Process:
                 raise kind(answer[1])
         self.end()
         raise Exception(self.broken)  # as gmsh's own errors are
+
+    def allow(self, limit: float) -> None:
+        """Let it take so long from now on [s]."""
+        self.limit, self.end_time = limit, time.monotonic() + limit
 
     def end(self) -> None:
         """Kill it, whatever it is doing."""
@@ -198,17 +207,17 @@ def _options(more: dict[str, float]) -> dict[str, float]:
     return _OPTIONS | {name.replace("__", "."): value for name, value in more.items()}
 
 
-def _limit() -> float:
-    """The longest time for a file [s].
+def _limit(allowed: float) -> float:
+    """The longest time [s]: that of the environment, or the one given.
 
     Raises:
         RequestError: the environment names none.
     """
-    text = os.environ.get(LIMIT, str(DEFAULT_LIMIT))
+    text = os.environ.get(LIMIT, str(allowed))
     with suppress(ValueError):
         if validate.is_number(limit := float(text)) and limit > 0.0:
             return min(limit, threading.TIMEOUT_MAX)
-    raise bad_value(LIMIT, text, "give the longest time for reading and meshing a file in seconds, or leave it out")
+    raise bad_value(LIMIT, text, "give the longest time [s] for reading a file, and for meshing it")
 
 
 @contextmanager

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
 
+SUFFIX = ".py"  # of scene files
+
+
 @dataclass(frozen=True)
 class SceneSource:
     """A scene file, read: what it is called, what it offers and how to build it.
@@ -114,11 +117,16 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
         RequestError: there is no such scene, or the file is no scene file.
     """
     name = str(name) if isinstance(name, os.PathLike) else name
-    if isinstance(name, str) and Path(name).suffix == ".py":
+    if isinstance(name, str) and Path(name).suffix == SUFFIX:
         return _source(_imported(Path(name)), Path(name).stem, builtin=False)
     names = scene_names()
     if name not in names:
         known = _known(name, names, "none")
+        if isinstance(name, str) and Path(name).suffix and (Path(name).exists() or "did you mean" not in known):
+            remedy = (
+                f"name a built-in scene or a Python file ({SUFFIX}); warp-mca run also takes model files (.mca), parts"
+            )
+            raise bad_value("scene", name, f"{remedy} (.step, .iges, .brep, .stl) and meshes (.msh, .inp, .k, .vtu, …)")
         raise bad_value(
             "scene", validate.brief(name), f"the scenes are {known}; or give a Python file (.py) or a model file (.mca)"
         )
@@ -136,16 +144,19 @@ def make_scene(name: str | os.PathLike[str], *, preset: str | None = None, **par
 
 
 def parse_overrides(settings: Iterable[str]) -> dict[str, str]:
-    """`KEY=VALUE` texts as a dict; of a key that occurs twice the last value counts.
+    """`KEY=VALUE` texts as a dict.
 
     Raises:
-        RequestError: a text is not of that form.
+        RequestError: a text is not of that form, or a key occurs twice.
     """
-    overrides = {}
+    overrides: dict[str, str] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not (key.strip() and equals and value.strip()):
             raise bad_value("--set", setting, "write it as KEY=VALUE, without spaces")
+        if key.strip() in overrides:
+            remedy = f"{key.strip()} is given twice, also as {overrides[key.strip()]}; leave one of the two out"
+            raise bad_value("--set", setting, remedy)
         overrides[key.strip()] = value.strip()
     return overrides
 
