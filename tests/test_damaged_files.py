@@ -27,7 +27,10 @@ def merge(path):
 option = types.SimpleNamespace(setNumber=lambda name, value: None)
 model = types.SimpleNamespace(add=lambda name: None)
 """
-BUSY = "[signal.signal(n, signal.SIG_IGN) for n in (2, 15)]; open(path + '.pid', 'w').write(str(os.getpid()))\n    while 1: 1"
+BUSY = """open(path + '.pid', 'w').write(str(os.getpid()))
+    while True:
+        [signal.signal(number, signal.SIG_IGN) for number in (2, 15)]
+"""
 COMMAND = "import sys; sys.path.insert(0, '.'); from warp_mca.cli.main import main; sys.exit(main(['run', 'a.step']))"
 
 
@@ -107,7 +110,7 @@ def test_a_limit_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch, text: 
 def test_a_session_ends_its_process_and_errors_of_gmsh_do_not():
     with gmsh_session() as gmsh:
         process = gmsh._process.process
-        with pytest.raises(Exception, match="Unknown model"):
+        with pytest.raises(Exception, match="Could not find model"):
             gmsh.model.setCurrent("none")
         with pytest.raises(AttributeError):
             gmsh.model.nothing()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,7 @@ def resume(args: argparse.Namespace) -> None:
     stored = stored_command(args.folder)
     scene = _scene(stored, folder, args.scene)
     words = _words(stored, folder)
-    print(" ".join(["going on with: warp-mca run", scene, *words]), flush=True)
+    print("going on with:", shlex.join(["warp-mca", "run", scene, *words]), flush=True)
     again = args.parse(["run", scene, *words, f"--out={folder}"])
     again.command(again)
 
@@ -105,7 +106,7 @@ def _words(stored: Mapping[str, Any], folder: Path) -> list[str]:
     words = []
     for name, value in options.items():
         several = value if isinstance(value, list) else [value]
-        if type(value) not in OPTIONS.get(name, ()) or not all(isinstance(item, str | int | float) for item in several):
+        if type(value) not in OPTIONS.get(name, ()) or not all(map(_is_word, several)):
             raise _strange(folder, name)
         words += [f"--{name.replace('_', '-')}={item}" for item in several]
     return words
@@ -114,6 +115,10 @@ def _words(stored: Mapping[str, Any], folder: Path) -> list[str]:
 def _strange(folder: Path, what: str) -> Exception:
     remedy = f"{FILE} there is damaged or of another version ({what}); give the run's own command again"
     return bad_value("folder", str(folder), remedy)
+
+
+def _is_word(item: object) -> bool:
+    return isinstance(item, int | float) or (isinstance(item, str) and item.isprintable())
 
 
 def _is_file(name: str | Path) -> bool:

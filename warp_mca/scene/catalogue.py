@@ -123,10 +123,9 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
     if name not in names:
         known = _known(name, names, "none")
         if isinstance(name, str) and Path(name).suffix and (Path(name).exists() or "did you mean" not in known):
-            remedy = (
-                f"name a built-in scene or a Python file ({SUFFIX}); warp-mca run also takes model files (.mca), parts"
-            )
-            raise bad_value("scene", name, f"{remedy} (.step, .iges, .brep, .stl) and meshes (.msh, .inp, .k, .vtu, …)")
+            others = "model files (.mca), parts (.step, .iges, .brep, .stl) and meshes (.msh, .inp, .k, .vtu, …)"
+            remedy = f"name a built-in scene or a Python file ({SUFFIX}); warp-mca run also takes {others}"
+            raise bad_value("scene", name, remedy)
         raise bad_value(
             "scene", validate.brief(name), f"the scenes are {known}; or give a Python file (.py) or a model file (.mca)"
         )
