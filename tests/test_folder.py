@@ -152,6 +152,16 @@ def test_the_lock_of_a_process_that_is_gone_does_not_count(tmp_path: Path):
     assert sorted(file.name for file in out.iterdir()) == sorted([*FILES, *PATH_FILES])
 
 
+@pytest.mark.parametrize("name", ["paths.npz", "history.csv"])
+def test_results_whose_data_are_gone_are_refused_and_figures_may_go(folder: Path, name: str):
+    """Paths that were gone were none."""
+    (folder / "forces.png").unlink()
+    assert load(folder).summary["run"] == 1
+    (folder / name).unlink()
+    with pytest.raises(RequestError, match=rf"^results = .*{name}"):
+        load(folder)
+
+
 LEFT = (".warp_mca-abc", ".warp_mca-checkpoint.npz-12345678", ".checkpoint.npz-12345678", ".sweep.csv-12345678")
 
 
