@@ -63,9 +63,9 @@ class Cad:
         if Path(self.path).suffix.lower() not in UNITS:
             known = ", ".join(UNITS)
             raise bad_value("Cad.path", str(self.path), f"CAD files end in {known}; MeshFile reads finished meshes")
-        validate.positive("Cad", size=self.size)
+        validate.within("Cad", 1e-12, 1e6, size=self.size)
         if self.scale is not None:
-            validate.positive("Cad", scale=self.scale)
+            validate.within("Cad", 1e-12, 1e6, scale=self.scale)
         check_selections("Cad", self.select)
 
     def refined(self, factor: float) -> Cad:

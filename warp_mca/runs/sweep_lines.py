@@ -34,7 +34,7 @@ def read_lines(path: Path) -> tuple[list[Row], list[int]]:
     Tables of earlier versions have no checksums.
 
     Raises:
-        ValueError: it is not of the form that this module writes; where all of several lines seem damaged, the header is.
+        ValueError: it is not of the form that this module writes; if all of several lines seem damaged, the header is.
         KeyError: it lacks a column that every sweep has.
     """
     header, *lines = path.read_bytes().split(b"\n")[:-1] or [b""]

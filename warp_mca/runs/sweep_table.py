@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import textwrap
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -153,9 +154,7 @@ def remove_sweep(folder: Path) -> None:
     stored = _stored_identity(folder)
     count = stored.get("runs") if stored and stored.get("folders") is True else None
     with _writing(folder):
-        found = list(folder.iterdir()) if isinstance(count, int) and not isinstance(count, bool) else []
-        # those that are there, whatever number of runs the file names
-        runs = [path for path in found if _is_run(path, count) and not path.is_symlink()]
+        runs = [path for path in folder.iterdir() if _is_run(path, count) and not path.is_symlink()]
         for run in runs:
             for name in ALL_FILES:
                 (run / name).unlink(missing_ok=True)
@@ -165,11 +164,12 @@ def remove_sweep(folder: Path) -> None:
             (folder / name).unlink(missing_ok=True)
 
 
-def _is_run(path: Path, count: int) -> bool:
-    """Whether a folder has the name of one of so many runs."""
-    name = path.name
-    digits = name.isascii() and name.isdigit() and len(name) <= len(str(MAX_COUNT))
-    return digits and int(name) < count <= MAX_COUNT and name == run_name(int(name), count)
+def _is_run(path: Path, count: object) -> bool:
+    """Whether a folder has the name of one of so many runs, if that is a number."""
+    if type(count) is not int or not 0 < count <= MAX_COUNT:
+        return False
+    number = int(path.name) if re.fullmatch("[0-9]{1,10}", path.name) else count
+    return number < count and path.name == run_name(number, count)
 
 
 def _stored_identity(folder: Path) -> dict[str, Any] | None:
