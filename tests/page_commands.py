@@ -81,7 +81,7 @@ REPLACED = {
     "warp-mca verify hertz_sphere rod_on_wall": "warp-mca verify rod_on_wall"
 }  # 17 s, as in tests/test_verify.py
 # Those that do not end with 0.
-STATUS = {"warp-mca paper": 1, "warp-mca run bracket.step": 2}  # runs are missing; the file is no scene
+STATUS = {"warp-mca paper": 1}  # runs are missing
 TABLES: dict[str, dict[str, Any]] = {"NOT_RUN": NOT_RUN, "ADDED": ADDED, "REPLACED": REPLACED, "STATUS": STATUS}
 
 

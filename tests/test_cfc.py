@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -71,3 +72,21 @@ REFUSED = ((0, "cfc = 0"), ("60", "cfc = '60'"), (1000, "interval of 0.0001 s"),
 def test_what_it_cannot_filter_is_refused(cfc, words):
     with pytest.raises(mca.RequestError, match=words):
         cfc_filter(np.zeros(10), 2e-4, cfc)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("shape", [(1,), (50,), (50, 3)])
+def test_a_value_that_is_no_number_is_refused(value: float, shape: tuple[int, ...]):
+    """One made all rows nan, without a word."""
+    values = np.zeros(shape)
+    values.ravel()[-1] = value
+    with pytest.raises(mca.RequestError, match=rf"^values = {value}: "):
+        cfc_filter(values, 1e-5, 60.0)
+
+
+@pytest.mark.parametrize("interval", [0.0, -1e-5, math.nan, math.inf, None, "1e-5"])
+def test_an_interval_that_is_no_time_is_refused(interval: Any):
+    with pytest.raises(mca.RequestError, match=r"^interval = "):
+        cfc_filter(np.zeros(50), interval, 60.0)
+    with pytest.raises(mca.RequestError, match=r"^values = 'text': give an array"):
+        cfc_filter(cast(Any, "text"), 1e-5, 60.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,10 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_full_disk import files_up_to
 
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.runs.checkpoint import FILE, Checkpoint, Every
+from warp_mca.runs.impact import Impact
+from warp_mca.runs.pure_setup import Place
 
 BLOCK = mca.Body(
     name="block",
@@ -143,3 +147,53 @@ def test_a_run_in_turn_and_a_run_without_a_folder_store_nothing(tmp_path: Path):
 def test_an_accuracy_beside_a_checkpoint_is_refused_by_its_value(asked: Any, words: str, tmp_path: Path):
     with pytest.raises(mca.RequestError, match=re.escape(words)):
         mca.run(LANDING, accuracy=asked, checkpoint="7", out=tmp_path)
+
+
+@pytest.mark.parametrize("why", ["full disk", "folder gone"])
+def test_a_state_that_cannot_be_written_is_a_warning_and_the_run_goes_on(
+    why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    """It ended the run, hours of work with it. Later states are stored as soon as there is room again."""
+    save, stored = Impact.save, []
+    out = tmp_path / "out"
+
+    def save_with_trouble(self: Impact, path: Any, more: Any = None) -> None:
+        if len(stored) in (1, 2) and why == "full disk":
+            stored.append(False)
+            with files_up_to(2000):
+                save(self, path, more)
+        elif len(stored) == 1:
+            shutil.rmtree(out)
+        stored.append(False)
+        save(self, path, more)
+        stored[-1] = (out / FILE).exists()
+        assert [file.name for file in out.iterdir()] == [FILE]
+
+    monkeypatch.setattr(Impact, "save", save_with_trouble)
+    result = mca.run(LANDING, out=out, threads=1, checkpoint="7")
+    assert stored == ([True, False, False, True, True] if why == "full disk" else [True, *4 * [False]])
+    (warning,) = [record.getMessage() for record in caplog.records if "the state could" in record.getMessage()]
+    reason = "File too large" if why == "full disk" else "No such file or directory"
+    assert warning == f"the state could not be written to {out / FILE} ({reason}): the run goes on"
+    whole = mca.run(LANDING, threads=1)
+    assert all(np.array_equal(result[name], whole[name], equal_nan=True) for name in whole.history)
+    assert mca.load(out).summary["n_steps"] == 40 and not (out / FILE).exists()
+
+
+PLACES: tuple[dict[str, Any], ...] = (
+    {"phase": "build"},
+    {"swung": -1},
+    {"swung": "1"},
+    {"touch": 1.5},
+    {"joint_impulse": {"O": "none"}},
+    {"wall": {"fe": "1"}},
+    {"more": 1},
+)
+
+
+@pytest.mark.parametrize("change", PLACES)
+def test_the_place_of_a_run_that_a_file_holds_is_checked(change: dict[str, Any]):
+    good = {"phase": "swing", "swung": 3, "touch": None, "joint_impulse": {"O": [1.0]}, "wall": {"fe": 1.0}}
+    assert Place.of(good).swung == 3
+    with pytest.raises((TypeError, ValueError)):
+        Place.of({**good, **change})

@@ -113,7 +113,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 2) -> 
         (["single_rod", "--duration", "1e-5", "--sweep", "duration=1e-5,2e-5"], ["--duration", "leave one of the two"]),
         (["single_rod", "--frames", "5"], ["--frames = 5", "no file that is asked for has frames"]),
         (["single_rod", "--magnify", "5", "--rrd", "a.rrd"], ["--magnify = 5", "no picture or film"]),
-        (["single_rod", "--set", "v=1e-200"], ["speed of the bodies = 1e-200", "motion of"]),
+        (["single_rod", "--set", "v=1e-28"], ["speed of the bodies = 1e-28", "motion of"]),
         (["two_link", "--viewer", "paraview"], ["'paraview'", "rerun"]),
         (["two_link", "--colour"], ["--colour"]),
         ([], ["SCENE"]),

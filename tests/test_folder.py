@@ -15,6 +15,7 @@ from test_results import TIME, history
 
 import warp_mca as mca
 from warp_mca.base.errors import GuardError, McaError, RequestError
+from warp_mca.base.files import write_atomically
 from warp_mca.base.folder import held
 from warp_mca.cli import main as cli
 from warp_mca.results.paths import PathHistory
@@ -149,6 +150,67 @@ def test_the_lock_of_a_process_that_is_gone_does_not_count(tmp_path: Path):
     save(result(1), out)
     assert numbers(out) == {1.0}
     assert sorted(file.name for file in out.iterdir()) == sorted([*FILES, *PATH_FILES])
+
+
+@pytest.mark.parametrize("name", ["paths.npz", "history.csv"])
+def test_results_whose_data_are_gone_are_refused_and_figures_may_go(folder: Path, name: str):
+    """Paths that were gone were none."""
+    (folder / "forces.png").unlink()
+    assert load(folder).summary["run"] == 1
+    (folder / name).unlink()
+    with pytest.raises(RequestError, match=rf"^results = .*{name}"):
+        load(folder)
+
+
+LEFT = (".warp_mca-abc", ".warp_mca-checkpoint.npz-12345678", ".checkpoint.npz-12345678", ".sweep.csv-12345678")
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_what_a_kill_left_is_cleared_by_the_next_run_whatever_its_age(tmp_path: Path, exists: bool):
+    """Unfinished files stayed for ever, and folders for an hour."""
+    out = tmp_path / "out"
+    if exists:
+        out.mkdir()
+
+    def die_while(write: Callable[[Path], object]) -> None:
+        def run() -> None:
+            with hold(out) as folder:
+                if write is write_atomically:
+                    write_atomically(out / "a", lambda file: os.kill(os.getpid(), signal.SIGKILL))
+                with folder.staging() as staging:
+                    (staging / "results").mkdir()
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        assert forked(run) == -signal.SIGKILL
+
+    die_while(write_atomically)
+    die_while(held)
+    out.mkdir(exist_ok=True)
+    for name in LEFT[1:]:
+        (out / name).write_text("")
+    (out / LEFT[0] / "results").mkdir(parents=True)
+    (out / ".checkpoint.npz-kept").write_text("")  # no name of ours
+    with held(out):
+        assert [file.name for file in out.iterdir()] == [".checkpoint.npz-kept"]
+        assert [file.name for file in tmp_path.iterdir()] == ["out"]
+
+
+def test_what_others_write_beside_is_not_taken_for_a_leftover(tmp_path: Path):
+    """Two runs make their folders in one that a third holds."""
+    with held(tmp_path / "a") as first, first.staging() as staging:
+        (staging / "results").mkdir()
+        started, go_on = os.pipe(), os.pipe()
+        if not (child := os.fork()):
+            with suppress(BaseException):
+                write_atomically(tmp_path / "b", lambda file: (os.write(started[1], b"."), os.read(go_on[0], 1)))
+                os._exit(0)
+            os._exit(1)
+        os.read(started[0], 1)
+        with held(tmp_path):
+            assert (staging / "results").exists()
+        os.write(go_on[1], b".")
+        assert os.waitpid(child, 0)[1] == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["b"]
 
 
 def test_runs_into_one_folder_do_not_mix(folder: Path):

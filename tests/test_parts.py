@@ -192,7 +192,7 @@ def test_run_of_a_part_prints_a_scene_that_runs(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
 ):
     monkeypatch.chdir(tmp_path)
-    assert main(["run", str(folder / name)]) == 2
+    assert main(["run", str(folder / name)]) == 0
     out, err = capsys.readouterr()
     assert f"{name} is a part, not a scene" in err and err.count("\n") == 1
     assert "#   face_1 (" in out if name == "part.step" else "#   foot (" in out

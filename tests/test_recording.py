@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from rrd import rows
 import warp_mca as mca
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.model.build import build_model
-from warp_mca.recorders import Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
+from warp_mca.recorders import AnimationFile, Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
 from warp_mca.recorders.checks import check_files
 from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
@@ -266,6 +267,29 @@ def test_outputs_that_cross_are_refused(tmp_path, monkeypatch, names: list[str],
     recorders = [kinds.get(Path(name).suffix, FinalState)(name) for name in names]
     with pytest.raises(RequestError, match=f"^recorders = '.*': .*{words}[^\n]*$"):
         check_files(recorders, out)
+
+
+def test_outputs_replace_links_and_leave_what_these_point_to(tmp_path):
+    """rerun, USD and pictures wrote through them, to wherever that was."""
+    kinds: dict[str, Callable] = {
+        "a.rrd": RerunStream,
+        "a.usdc": UsdFile,
+        "a.vtkhdf": VtkHdfFile,
+        "a.vtu": FinalState,
+        "a.gif": lambda file: AnimationFile(file, cadence=Cadence(frames=2)),
+        "a.png": lambda file: SnapshotFile(file, time=0.0),
+    }
+    (tmp_path / "else").mkdir()
+    for name in kinds:
+        (tmp_path / name).symlink_to(tmp_path / "else" / name)
+        if name != "a.rrd":  # of that it points to nothing
+            (tmp_path / "else" / name).write_text("kept")
+    mca.run(bar(), recorders=[make(tmp_path / name) for name, make in kinds.items()], duration=4e-6)
+    for name in kinds:
+        assert not (tmp_path / name).is_symlink() and (tmp_path / name).stat().st_size > 100
+    assert {file.name: file.read_text() for file in (tmp_path / "else").iterdir()} == dict.fromkeys(
+        [name for name in kinds if name != "a.rrd"], "kept"
+    )
 
 
 def test_outputs_side_by_side_are_fine(tmp_path):

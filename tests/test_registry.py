@@ -130,8 +130,10 @@ def test_a_setting_is_key_equals_value(setting: str):
         parse_overrides([setting])
 
 
-def test_the_last_of_two_settings_counts():
-    assert parse_overrides(["mu=1", "mu = 2"]) == {"mu": "2"}
+def test_two_settings_of_one_parameter_are_refused():
+    assert parse_overrides(["mu=1", "v = 2"]) == {"mu": "1", "v": "2"}
+    with pytest.raises(RequestError, match=r"^--set = 'mu = 2': mu is given twice, also as 1; leave one"):
+        parse_overrides(["mu=1", "v=1", "mu = 2"])
 
 
 @pytest.mark.parametrize(
@@ -140,7 +142,7 @@ def test_the_last_of_two_settings_counts():
         (Param(low=0.0, high=1.0), [0.0, 0.5, 1.0], [-1e-9, 1.1]),
         (Param(low=0.0, high=1.0, exclusive=True), [0.5], [0.0, 1.0]),
         (Param(high=2.0), [-1e9, 2.0], [2.1]),
-        (Param(), [-1e300, 0.0], [math.nan]),
+        (Param(), [-1e30, 0.0, 1e-30], [math.nan, 1e31, -1e300, 1e-31, -5e-324]),
     ],
 )
 def test_limits_belong_to_the_range_unless_exclusive(param: Param, allowed: list[float], refused: list[float]):

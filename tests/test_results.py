@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +10,6 @@ import numpy as np
 import pytest
 
 from warp_mca.base.errors import RequestError
-from warp_mca.base.folder import LONGEST_SAVE
 from warp_mca.results.force_history import (
     active_rows,
     contact_intervals,
@@ -196,18 +193,6 @@ def test_a_new_folder_appears_with_all_its_files(tmp_path: Path, monkeypatch: py
     assert [file.name for file in tmp_path.iterdir()] == ["new"]
     (tmp_path / "plain").mkdir()
     assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode
-
-
-def test_what_a_killed_save_left_goes_with_a_later_one(tmp_path: Path):
-    old, new = tmp_path / ".warp_mca-old", tmp_path / ".warp_mca-new"
-    for folder in (old, new):
-        folder.mkdir()
-        (folder / "history.csv").write_text("")
-    then = time.time() - 2 * LONGEST_SAVE
-    os.utime(old, (then, then))
-    save(Result({}, history()), tmp_path, force=True)
-    assert not old.exists()
-    assert new.exists()
 
 
 def test_failure_while_saving_leaves_nothing(tmp_path: Path):

@@ -200,7 +200,7 @@ def test_elastic_scene_keeps_no_history(material, size):
             r"largest eigenvalue of element 0 .* check their units",
         ),
         ({"penalty": 1e300}, r"largest eigenvalue of element \d+ .* check their units"),
-        ({"output_interval": 1e-30}, r"output_interval = 1e-30: .* rows, a history holds"),
+        ({"output_interval": 1e-14}, r"output_interval = 1e-14: .* rows, a history holds"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:overflow")
@@ -212,7 +212,7 @@ def test_what_no_number_or_history_holds_is_refused(changes, words):
 
 def test_a_duration_that_never_ends_is_refused():
     with pytest.raises(mca.RequestError, match=r"rows, a history holds"):
-        mca.run(bar(), duration=1e30)
+        mca.run(bar(), duration=1e8)
 
 
 @pytest.mark.parametrize(

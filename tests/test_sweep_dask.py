@@ -9,7 +9,7 @@ import pytest
 from sweeping import SCENE, figures
 
 from warp_mca.cli.main import main
-from warp_mca.runs.sweep_table import read_rows
+from warp_mca.runs.sweep_lines import read_lines
 
 distributed = pytest.importorskip("distributed", reason="the extra cluster is not installed")
 COMMAND = ["sweep", "block.py", "--grid", "v=1,2,3", "--grid", "kills=nothing,worker", "--set", "duration=2e-6"]
@@ -36,9 +36,9 @@ def test_a_killed_worker_of_a_cluster_loses_no_run(here: Path, address: str):
     assert main([*COMMAND, "--executor", f"dask://{address}", "--out", "all"]) == 0
     assert (here / "worker-2").exists()
     assert main([*COMMAND, "--workers", "1", "--out", "whole"]) == 0
-    rows = read_rows(here / "all/sweep.csv")
+    rows = read_lines(here / "all/sweep.csv")[0]
     assert [row["index"] for row in rows] == list(range(6))
-    assert figures(rows) == figures(read_rows(here / "whole/sweep.csv"))
+    assert figures(rows) == figures(read_lines(here / "whole/sweep.csv")[0])
 
 
 def test_a_scheduler_that_does_not_answer_is_named(

@@ -22,8 +22,8 @@ from warp_mca.cli.main import main
 from warp_mca.runs.sweep import TRIES
 from warp_mca.runs.sweep_job import DeviceLost, Job, check_device_after
 from warp_mca.runs.sweep_job import figures as summary_figures
+from warp_mca.runs.sweep_lines import read_lines
 from warp_mca.runs.sweep_plan import FULL, Plan, RunOptions, batches, differing
-from warp_mca.runs.sweep_table import read_rows
 from warp_mca.runs.sweep_workers import WorkerDied, Workers
 
 SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
@@ -102,8 +102,8 @@ def test_rows_of_an_interrupted_sweep_are_those_of_a_whole_one(here: Path):
     rest = Listing()
     assert figures(mca.sweep(scenes, batch=2, out="all", executor=rest)) == figures(whole)
     assert rest.jobs == [(1, 2), (3, 4)]  # run 1 is done, but has a part in the time step of run 2
-    assert read_rows(here / "all/sweep.csv")[1]["wall"] == float(lines[1].rpartition(",")[2])
-    assert figures(read_rows(here / "all/sweep.csv")) == figures(whole)
+    assert read_lines(here / "all/sweep.csv")[0][1]["wall"] == float(lines[1].split(",")[-2])
+    assert figures(read_lines(here / "all/sweep.csv")[0]) == figures(whole)
 
 
 def test_failed_and_stopped_runs_are_kept_with_their_reason(here: Path, capsys: pytest.CaptureFixture[str]):
@@ -164,15 +164,15 @@ def test_killed_workers_and_a_killed_sweep_lose_no_run(here: Path):
     started = [sys.executable, "-m", "warp_mca", *command, "--executor", "process", "--workers", "1"]
     done = subprocess.run(started, capture_output=True, text=True, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
-    assert [row["kills"] for row in read_rows(here / "all/sweep.csv")] == ["nothing"]
+    assert [row["kills"] for row in read_lines(here / "all/sweep.csv")[0]] == ["nothing"]
     assert (here / "worker-1").exists() and (here / "main-1").exists()
     for flag in ("worker-2", "main-2"):  # later runs kill nothing
         (here / flag).touch()
     assert main([*command, "--workers", "1"]) == 0
     assert main(whole) == 0
-    rows = read_rows(here / "all/sweep.csv")
+    rows = read_lines(here / "all/sweep.csv")[0]
     assert [row["index"] for row in rows] == list(range(6))
-    assert figures(rows) == figures(read_rows(here / "whole/sweep.csv"))
+    assert figures(rows) == figures(read_lines(here / "whole/sweep.csv")[0])
 
 
 def test_scenes_with_classes_of_their_file_travel_to_processes_that_have_not_read_it(

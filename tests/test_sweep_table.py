@@ -11,7 +11,8 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.runs.sweep_job import figures
-from warp_mca.runs.sweep_table import SweepTable, check_identity, read_rows, write_identity
+from warp_mca.runs.sweep_lines import read_lines
+from warp_mca.runs.sweep_table import SweepTable, check_identity, remove_sweep, write_identity
 
 
 def row(index: int, **values: object) -> dict[str, object]:
@@ -25,7 +26,7 @@ def test_values_come_back_as_they_were(tmp_path: Path):
     }  # fmt: skip
     table = SweepTable(tmp_path)
     table.add([row(0, **values)])
-    (found,) = read_rows(tmp_path / "sweep.csv")
+    (found,) = read_lines(tmp_path / "sweep.csv")[0]
     assert [(name, type(value), repr(value)) for name, value in found.items()] == [
         (name, type(value), repr(value)) for name, value in row(0, **values).items()
     ]
@@ -51,9 +52,9 @@ def test_columns_grow_and_runs_are_in_order_at_the_end(tmp_path: Path):
     table.add([row(2, v=1.0, wall=3.0)])
     table.add([{"index": 0, "v": 2.0, "status": "failed", "reason": "no mesh"}])
     table.add([row(1, v=0.5, count=7, large=2**70, F=0.25, wall=1.0)])
-    assert [found["index"] for found in read_rows(tmp_path / "sweep.csv")] == [2, 0, 1]
+    assert [found["index"] for found in read_lines(tmp_path / "sweep.csv")[0]] == [2, 0, 1]
     table.close()
-    rows = read_rows(tmp_path / "sweep.csv")
+    rows = read_lines(tmp_path / "sweep.csv")[0]
     assert [(found["index"], found["reason"], found["count"]) for found in rows] == [
         (0, "no mesh", None), (1, None, 7), (2, None, None)
     ]  # fmt: skip
@@ -67,7 +68,7 @@ def test_failed_runs_are_dropped_when_a_sweep_goes_on_and_stopped_ones_stay(tmp_
     table = SweepTable(tmp_path)
     table.add([row(0), row(1) | {"status": "failed"}, row(2) | {"status": "stopped"}])
     assert sorted(SweepTable(tmp_path).rows) == [0, 2]
-    assert len(read_rows(tmp_path / "sweep.csv")) == 2
+    assert len(read_lines(tmp_path / "sweep.csv")[0]) == 2
 
 
 @pytest.mark.parametrize("text", ["index,v\n0,1\n", "a;b\n1;2\n", 'index,status\n0,"done\n', "index,status\n0\n"])
@@ -75,6 +76,84 @@ def test_a_table_that_others_changed_is_refused(tmp_path: Path, text: str):
     (tmp_path / "sweep.csv").write_text(text, encoding="utf-8")
     with pytest.raises(mca.RequestError, match=r"sweep\.csv there was changed by others"):
         SweepTable(tmp_path)
+
+
+def table_of(folder: Path, count: int) -> bytes:
+    """sweep.csv of so many runs."""
+    table = SweepTable(folder)
+    table.add([row(k, F=0.1 * k, text='a "b", é', wall=1.0) for k in range(count)])
+    return (folder / "sweep.csv").read_bytes()
+
+
+def test_a_damaged_row_is_named_and_its_run_counts_as_not_done(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    """A digit that was changed was taken for the run's figure."""
+    whole = table_of(tmp_path, 3)
+    lines = whole.split(b"\n")
+    start, end = len(lines[0]) + len(lines[1]) + 2, len(whole) - len(lines[3]) - 1
+    for place in range(start, end):  # every byte of the row in the middle, and the end of its line
+        caplog.clear()
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << (place % 8)
+        (tmp_path / "sweep.csv").write_bytes(damaged)
+        table = SweepTable(tmp_path)
+        assert set(table.rows) <= {0, 2} and 0 in table.rows, place
+        assert "sweep.csv is damaged in line 3" in caplog.text
+        table.add([row(k, F=0.1 * k, text='a "b", é', wall=1.0) for k in range(3) if k not in table.rows])
+        table.close()
+        assert (tmp_path / "sweep.csv").read_bytes() == whole
+
+
+def test_a_damaged_header_is_refused(tmp_path: Path):
+    """A column under another name is another figure."""
+    whole = table_of(tmp_path, 2)
+    for place in range(whole.index(b"\n") + 1):
+        for bit in (0, 3):
+            damaged = bytearray(whole)
+            damaged[place] ^= 1 << bit
+            (tmp_path / "sweep.csv").write_bytes(damaged)
+            with pytest.raises(mca.RequestError, match=r"sweep\.csv there was changed by others"):
+                SweepTable(tmp_path)
+
+
+def test_a_table_without_checksums_is_read_and_gets_them(tmp_path: Path):
+    """As earlier versions wrote it."""
+    whole = table_of(tmp_path, 2).decode()
+    lines = whole.splitlines()
+    old = "\n".join(line.rpartition(",")[0] for line in lines) + "\n"
+    assert old.startswith("index,status,F,text,wall\n") and lines[0].endswith(",wall,checksum")
+    (tmp_path / "sweep.csv").write_text(old, encoding="utf-8")
+    assert sorted(SweepTable(tmp_path).rows) == [0, 1]
+    assert (tmp_path / "sweep.csv").read_text(encoding="utf-8") == whole
+    assert "checksum" not in read_lines(tmp_path / "sweep.csv")[0][0]
+
+
+@pytest.mark.parametrize("runs", [10**9, 10**18, 10**4000, -1, "3", [3], True, None, 1.5])
+def test_a_hostile_number_of_runs_is_no_work(tmp_path: Path, runs: object):
+    """--force looked for the folders of as many runs as the file named."""
+    (tmp_path / "sweep.json").write_text(json.dumps({"runs": runs, "folders": True}))
+    (tmp_path / "000000003").mkdir()
+    (tmp_path / "000000003" / "history.csv").write_text("")
+    remove_sweep(tmp_path)
+    assert (tmp_path / "000000003").exists() == (runs != 10**9)
+
+
+def test_folders_of_runs_are_emptied_but_not_through_links(tmp_path: Path):
+    out, other = tmp_path / "out", tmp_path / "other"
+    for folder in (out / "0", out / "2", other):
+        folder.mkdir(parents=True)
+        (folder / "history.csv").write_text("")
+    (out / "1").symlink_to(other)
+    write_identity(out, {"runs": 2, "folders": True})
+    remove_sweep(out)
+    assert (other / "history.csv").exists() and (out / "2" / "history.csv").exists() and not (out / "0").exists()
+
+
+@pytest.mark.parametrize("grid", [3, [1], {"v": 3}, {"v": {"a": [1]}}, {"v": ["x" * 10**5]}])
+def test_a_strange_grid_is_another_one(tmp_path: Path, grid: object):
+    write_identity(tmp_path, {"grid": grid})
+    with pytest.raises(mca.RequestError, match="it holds a sweep with grid = ") as caught:
+        check_identity(tmp_path, {"grid": {"v": [1.0]}})
+    assert len(str(caught.value)) < 1000
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,13 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
-import shutil
-import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.files import clear_leftovers, temporary_folder
 
-STAGING = ".warp_mca-"  # prefix of the hidden folders in which results are written first
-LONGEST_SAVE = 3600.0  # older hidden folders are leftovers of killed processes [s]
 ATTEMPTS = 100  # attempts to open a folder that other runs may remove
 
 
@@ -31,7 +27,7 @@ class Folder:
     """
 
     def __init__(self, path: Path) -> None:
-        """Make the folder if need be, and lock it.
+        """Make the folder if need be, lock it, and remove what killed processes left in it and beside it.
 
         Raises:
             RequestError: another run holds it, or it cannot be made.
@@ -102,14 +98,8 @@ class Folder:
     @contextmanager
     def staging(self) -> Iterator[Path]:
         """A hidden folder on the same disk, which is removed at the end."""
-        beside = self.path.parent if self.path in self.made else self.path
-        staging = Path(tempfile.mkdtemp(prefix=STAGING, dir=beside))
-        try:
+        with temporary_folder(self.path.parent if self.path in self.made else self.path) as staging:
             yield staging
-        finally:
-            shutil.rmtree(staging, ignore_errors=True)
-        for folder in (self.path, self.path.parent):
-            _clear(folder)
 
     def _acquire(self) -> None:
         for _ in range(ATTEMPTS):
@@ -131,6 +121,8 @@ class Folder:
                 return
             self._lock = descriptor
             if self._is_locked():
+                for folder in (self.path, self.path.parent):
+                    clear_leftovers(folder)
                 return
             self._unlock()
         raise bad_value("out", str(self.path), "other runs keep removing this folder; name another")
@@ -178,11 +170,3 @@ def held(path: Path) -> Iterator[Folder]:
         yield folder
     finally:
         folder.release()
-
-
-def _clear(path: Path) -> None:
-    """Remove hidden folders left by runs that were killed while they saved."""
-    for folder in path.glob(f"{STAGING}*"):
-        with suppress(OSError):
-            if time.time() - folder.stat().st_mtime > LONGEST_SAVE:
-                shutil.rmtree(folder, ignore_errors=True)

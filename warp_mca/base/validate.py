@@ -42,6 +42,8 @@ DAMAGE = (
     zlib.error,
 )
 
+SHORTEST, LONGEST = 1e-15, 1e9  # times that users may give [s]
+TIME = f"give a finite time from {SHORTEST:g} to {LONGEST:g} s"
 MAX_COUNT = 1_000_000_000  # upper limit of every count that users give; memory runs out before
 
 
@@ -74,6 +76,20 @@ def positive(owner: str, /, **values: float) -> None:
     for name, value in values.items():
         if not (is_number(value) and value > 0.0):
             raise bad_value(f"{owner}.{name}", value, "give a finite number above 0")
+
+
+def within(owner: str, low: float, high: float, /, **values: float) -> None:
+    """Each value must be a number from `low` to `high`, limits beyond which nobody means what is typed."""
+    for name, value in values.items():
+        if not (is_number(value) and low <= value <= high):
+            raise bad_value(f"{owner}.{name}", brief(value), f"give a number from {low:g} to {high:g}")
+
+
+def times(owner: str, /, **values: float) -> None:
+    """Each value must be a time that a run can have [s]."""
+    for name, value in values.items():
+        if not is_time(value):
+            raise bad_value(f"{owner}.{name}", brief(value), TIME)
 
 
 def finite(owner: str, /, **values: float) -> None:
@@ -180,6 +196,11 @@ def is_number(value: object) -> bool:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:  # a whole number that no float holds
         return False
+
+
+def is_time(value: object) -> bool:
+    """Whether it is a time that a run can have [s]."""
+    return is_number(value) and SHORTEST <= value <= LONGEST  # pyright: ignore[reportOperatorIssue]
 
 
 def is_list(value: object) -> bool:

@@ -109,7 +109,6 @@ def _carry_out(argv: Sequence[str] | None) -> int:
         parser = make_parser()
         completion.answer(parser)
         args = parser.parse_args(argv)
-        args.words = list(sys.argv[1:] if argv is None else argv)
         args.command(args)
     except SystemExit as stop:  # argparse's way of answering --help, --version and bad commands
         status = stop.code if isinstance(stop.code, int) else 2

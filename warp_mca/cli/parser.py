@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, paper, run, sweep, tradeoff
+from warp_mca.cli import commands, paper, resume, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.cli.folder import folder
 from warp_mca.elements import ELEMENTS
@@ -24,6 +24,7 @@ elastoplastic finite elements with frictional contact take over.
   warp-mca run two_link --set mu=0.3 --set v_plate=0.8 --out slippery
   warp-mca sweep two_link --grid mu=0.1,0.3 --grid v_plate=0.4,0.8,1.6 --out slip
   warp-mca run my_scene.py                         a scene of your own, in Python
+  warp-mca run part.step > drop.py                 a scene that drops a part, to start from
   warp-mca build two_link --preset paper -o paper.mca && warp-mca run paper.mca
   warp-mca tradeoff two_link --out trade           what each choice of the model costs in error, and in time
   warp-mca scenes                                  scenes, presets and parameters
@@ -75,7 +76,7 @@ def _group(parser: argparse.ArgumentParser, title: str, example: str) -> argpars
 
 
 def _run(parser: argparse.ArgumentParser) -> None:
-    _add_scene(parser)
+    _add_scene(parser, "; of a part or mesh (.step, .msh, …) a scene file is printed that drops it")
     _add_device(parser)
     _add_options(parser)
     add_accuracy(_group(parser, "accuracy", "two_link --set joint_nodes=pin --accuracy 2%"))
@@ -134,8 +135,15 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
 
 
 def _resume(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Go on with a run that was stopped, with the scene and the options that its folder holds. Results go to DIR "
+        "and nowhere else. A scene file must be the same as when the run was started."
+    )
     parser.add_argument("folder", metavar="DIR", type=folder, help="folder of a run with --checkpoint or pure-fem")
-    parser.set_defaults(command=run.resume, parse=lambda words: make_parser().parse_args(words))
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="where the scene file is now, if it was moved or lies in DIR"
+    )
+    parser.set_defaults(command=resume.resume, parse=lambda words: make_parser().parse_args(words))
 
 
 def _sweep(parser: argparse.ArgumentParser) -> None:
@@ -211,14 +219,14 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
 
 
-def _add_scene(parser: argparse.ArgumentParser) -> None:
+def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
     group = _group(parser, "scene", "two_link --preset standard --set mu=0.3 --set v_plate=0.8")
-    parser.add_argument("scene", metavar="SCENE", help="built-in scene, Python file (.py) or model file (.mca)")
+    parser.add_argument("scene", metavar="SCENE", help=f"built-in scene, Python file (.py) or model file (.mca){more}")
     group.add_argument("--preset", metavar="NAME", help="(default: the scene's first)")
     group.add_argument(
         "--refine", type=float, metavar="R", help="cells R times smaller than the recipes say; below 1 larger ones"
     )
-    help_text = "change a parameter; may be given several times"
+    help_text = "change a parameter; once for each"
     _add_element(group)
     group.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
 
-from warp_mca.base.errors import RequestError
+from warp_mca.base.errors import RequestError, bad_value
 
 MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".fem", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
 CELLS = 12  # tetrahedra along the diagonal of a CAD part
@@ -83,11 +84,23 @@ def part_script(name: str) -> str:
     )
 
 
-def explain(name: str) -> RequestError:
-    """Print a scene file for the part, and return the error that says what to do with it."""
+def print_script(name: str) -> None:
+    """Print a scene file for the part in the file `name`, and say on standard error what to do with it.
+
+    Raises:
+        RequestError: the file cannot be read.
+    """
     print(part_script(name), end="")
     script = f"{Path(name).stem}_drop.py"
-    return RequestError(
+    print(
         f"{Path(name).name} is a part, not a scene: the script on standard output drops it on a floor; save it with "
-        f"'warp-mca run {name} > {script}', then run it with 'warp-mca run {script}'"
+        f"'warp-mca run {name} > {script}', then run it with 'warp-mca run {script}'",
+        file=sys.stderr,
     )
+
+
+def no_scene(name: str) -> RequestError:
+    """The error that the part in the file `name` is no scene, for commands that make none of it."""
+    script = f"{Path(name).stem}_drop.py"
+    remedy = f"it is a part, not a scene; make one with 'warp-mca run {name} > {script}', then name {script}"
+    return bad_value("scene", name, remedy)

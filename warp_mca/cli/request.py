@@ -46,7 +46,7 @@ def read_request(args: argparse.Namespace) -> Request:
 def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]]) -> list[Request]:
     """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
     if part_script.is_part(args.scene):
-        raise part_script.explain(args.scene)
+        raise part_script.no_scene(args.scene)
     if Path(args.scene).suffix != SUFFIX:
         source = catalogue.load_source(args.scene)
         return [_of_source(args, source, more) for more in settings]

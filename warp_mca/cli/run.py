@@ -5,18 +5,19 @@ from __future__ import annotations
 import argparse
 import logging
 from collections.abc import Iterator
-from contextlib import chdir, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import warp_mca as mca
 from warp_mca.base.errors import McaError, bad_value
-from warp_mca.cli import sweep
+from warp_mca.cli import part_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.request import read_request
+from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
 from warp_mca.runs.advice import LOGGER
-from warp_mca.runs.checkpoint import DEFAULT, Every, stored_command
+from warp_mca.runs.checkpoint import DEFAULT, Every
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
@@ -25,13 +26,16 @@ DRAWING = {"frames": 100, "field": "von_mises", "magnify": 1.0}  # options for r
 
 
 def run(args: argparse.Namespace) -> None:
-    """Run a scene or a sweep, and print what came of it."""
+    """Run a scene or a sweep, and print what came of it; of a part, print a scene file."""
     from warp_mca.base.progress import progress_bar
     from warp_mca.report.console import print_summary
     from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
     if args.sweeps:
         _sweep(args)
+        return
+    if part_script.is_part(args.scene):
+        part_script.print_script(args.scene)
         return
     logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that what is about to run is said
     request = read_request(args)
@@ -113,21 +117,11 @@ def _time_words(t: float) -> str:
     return f"{t:g}s" if t >= 0.01 else f"{1e6 * t:g}us"
 
 
-def resume(args: argparse.Namespace) -> None:
-    """Repeat the command whose run stored its state in a folder: it goes on from there."""
-    words, directory = stored_command(args.folder)
-    folder = args.folder.absolute()
-    again = args.parse(words)
-    again.words, again.out, again.force = words, folder, False
-    with chdir(directory):
-        again.command(again)
-
-
 def _every(args: argparse.Namespace) -> Every | None:
-    """How often the run stores its state, with the command that repeats it; None if that is not asked for."""
+    """How often the run stores its state, with what `resume` needs; None if that is not asked for."""
     if args.checkpoint is None and args.method == "mca":
         return None
-    return Every.parse(DEFAULT if args.checkpoint is None else args.checkpoint, tuple(args.words))
+    return Every.parse(DEFAULT if args.checkpoint is None else args.checkpoint, command_of(args))
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.cell_types import HEXAHEDRON
-from warp_mca.geometry.gmsh_session import gmsh_session
+from warp_mca.geometry.gmsh_session import gmsh_here
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import check_size
 
@@ -124,7 +124,7 @@ class Blocks:
             RequestError: gmsh cannot be loaded, or cannot mesh these blocks.
         """
         self._check_cells()
-        with gmsh_session() as gmsh:
+        with gmsh_here() as gmsh:
             try:
                 surfaces, volumes = self._draw(gmsh.model.geo)
                 gmsh.model.geo.synchronize()

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +18,20 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
-from warp_mca.geometry.gmsh_session import gmsh_session
+from warp_mca.geometry.gmsh_session import allow, gmsh_session
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.recipe import LIMIT
 from warp_mca.geometry.selection import Select, check_selections, with_selections
 
 # Metres for one unit of the coordinates that gmsh gives: of STEP and IGES files, which name their unit, it gives mm.
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
-_UNIT = "Geometry.OCCTargetUnit"  # gmsh's option: unit of what it reads from STEP and IGES
 _HXT = 10.0  # gmsh's number of its algorithm for tetrahedra with the fewest slivers
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
 _GENERIC = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
+# Time that gmsh may take, many times what it needs: to read and to mesh any part, for a byte of its file, for an
+# element [s].
+_READ, _MESH, _BYTE, _ELEMENT = 20.0, 60.0, 5e-5, 1e-4
 _KEPT = 4  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
 
 
@@ -63,9 +63,9 @@ class Cad:
         if Path(self.path).suffix.lower() not in UNITS:
             known = ", ".join(UNITS)
             raise bad_value("Cad.path", str(self.path), f"CAD files end in {known}; MeshFile reads finished meshes")
-        validate.positive("Cad", size=self.size)
+        validate.within("Cad", 1e-12, 1e6, size=self.size)
         if self.scale is not None:
-            validate.positive("Cad", scale=self.scale)
+            validate.within("Cad", 1e-12, 1e6, scale=self.scale)
         check_selections("Cad", self.select)
 
     def refined(self, factor: float) -> Cad:
@@ -96,7 +96,7 @@ def extent(path: str | Path, scale: float | None = None) -> float:
     part = Cad(path, size=1.0, scale=scale)
     if not Path(path).is_file():
         raise bad_value("Cad.path", str(path), "there is no such file; check the path")
-    with gmsh_session() as gmsh, _explained(str(path)):
+    with gmsh_session(_reading(path)) as gmsh, _explained(str(path)):
         _draw(gmsh, str(path))
         return _diagonal(gmsh) * (part.scale or UNITS[Path(path).suffix.lower()])
 
@@ -106,16 +106,21 @@ def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mes
     """The mesh of a file that was changed last at `stamp`: time [ns] and size [byte]."""
     # without a least size gmsh divides the part in ten
     options = {"Mesh__Algorithm3D": _HXT, "Mesh__MeshSizeMax": size / scale, "Mesh__MeshSizeMin": size / scale}
-    with gmsh_session(**options) as gmsh, _explained(path):
+    with gmsh_session(_reading(path), **options) as gmsh, _explained(path):
         _draw(gmsh, path)
         x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(-1, -1)
         count = 6.0 * (x1 - x0) * (y1 - y0) * (z1 - z0) * (scale / size) ** 3  # at most: of a part that fills its box
         if count > LIMIT:
             remedy = f"up to {count:.2g} elements would result in a part of {_diagonal(gmsh) * scale:.3g} m"
             raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
-        with _quiet():
-            gmsh.model.mesh.generate(3)
+        allow(gmsh, _MESH + _reading(path) + _ELEMENT * count)
+        gmsh.model.mesh.generate(3)
         return _read(gmsh.model, scale)
+
+
+def _reading(path: str | Path) -> float:
+    """Time that gmsh may take for reading a file [s]."""
+    return _READ + _BYTE * Path(path).stat().st_size
 
 
 @contextmanager
@@ -131,15 +136,9 @@ def _explained(path: str) -> Iterator[None]:
         raise bad_value("Cad.path", path, f"gmsh cannot read or mesh it ({words}); {remedy}") from error
 
 
-def _draw(gmsh: ModuleType, path: str) -> None:
+def _draw(gmsh: Any, path: str) -> None:
     """Reads the part into gmsh's model; sews the faces of a file without solids together."""
-    unit = gmsh.option.getString(_UNIT)
-    try:
-        gmsh.option.setString(_UNIT, "MM")
-        with _quiet():
-            gmsh.merge(path)
-    finally:
-        gmsh.option.setString(_UNIT, unit)
+    gmsh.merge(path)
     if Path(path).suffix.lower() == ".stl":
         _check_closed(gmsh, path)
         try:
@@ -154,14 +153,13 @@ def _draw(gmsh: ModuleType, path: str) -> None:
             gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(faces)])
         gmsh.model.geo.synchronize()
     elif not gmsh.model.getEntities(3):
-        with _quiet():
-            gmsh.model.occ.healShapes(tolerance=1e-6 * _diagonal(gmsh), sewFaces=True, makeSolids=True)
+        gmsh.model.occ.healShapes(tolerance=1e-6 * _diagonal(gmsh), sewFaces=True, makeSolids=True)
         gmsh.model.occ.synchronize()
     if not gmsh.model.getEntities(3):
         raise bad_value("Cad.path", path, "it holds no solid; save the part as a closed solid")
 
 
-def _check_closed(gmsh: ModuleType, path: str) -> None:
+def _check_closed(gmsh: Any, path: str) -> None:
     """Refuse triangles that leave an edge open: gmsh may never return from dividing them into faces.
 
     Raises:
@@ -199,33 +197,19 @@ def _box(points: NDArray) -> NDArray:
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _part_faces(gmsh: ModuleType, cut: bool) -> None:
+def _part_faces(gmsh: Any, cut: bool) -> None:
     """Parts the triangles of an STL file along sharp edges, and if `cut`, into pieces that can be flattened."""
     gmsh.model.mesh.classifySurfaces(_SHARP, True, cut, math.pi)
     gmsh.model.mesh.createGeometry()
 
 
-def _diagonal(gmsh: ModuleType) -> float:
+def _diagonal(gmsh: Any) -> float:
     """Of the box around the model, in the file's unit."""
     box = gmsh.model.getBoundingBox(-1, -1)
     return math.dist(box[:3], box[3:])
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Close standard output meanwhile: libraries in gmsh write there what they transferred, and which edges cross."""
-    sys.stdout.flush()
-    kept, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(null)
-
-
-def _read(model: ModuleType, scale: float) -> Mesh:
+def _read(model: Any, scale: float) -> Mesh:
     """Collects tetrahedra and sets; nodes that no tetrahedron uses are left out."""
     solids = [tag for _, tag in model.getEntities(3)]
     blocks = [model.mesh.getElementsByType(TETRAHEDRON.gmsh, tag)[1].reshape(-1, 4) for tag in solids]
@@ -253,7 +237,7 @@ def _read(model: ModuleType, scale: float) -> Mesh:
     return compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, tetrahedra))
 
 
-def _name(model: ModuleType, dim: int, tag: int) -> str:
+def _name(model: Any, dim: int, tag: int) -> str:
     """Name of a face or a solid in the file, without those of the assemblies that it lies in; "" without one."""
     name = model.getEntityName(dim, tag).rpartition("/")[2].strip()
     return "" if name in _GENERIC or name.startswith("Open CASCADE") else name

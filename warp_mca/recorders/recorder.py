@@ -270,8 +270,8 @@ def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path
         raise bad_value(field, str(path), f"give the file the suffix {' or '.join(suffixes)}")
     if path.is_dir():
         raise bad_value(field, str(path), f"{path} is a folder; name another")
-    if not path.exists():
-        check_folder(field, path)
+    if path.is_symlink() or not path.exists():
+        check_folder(field, path.parent if path.is_symlink() else path)
         return path
     try:  # it stays as it is until the run starts
         path.open("r+b").close()
@@ -280,3 +280,14 @@ def check_file(field: str, file: str | os.PathLike[str], *suffixes: str) -> Path
             field, str(path), f"it cannot be written to ({error.strerror or error}); name another"
         ) from error
     return path
+
+
+def make_way(path: Path) -> None:
+    """Make missing folders above a file, and remove a symbolic link in its place: what it points to stays as it is.
+
+    Raises:
+        OSError: that cannot be done.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_symlink():
+        path.unlink()

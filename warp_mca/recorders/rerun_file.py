@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import bad_value
-from warp_mca.recorders.recorder import DISK_RESERVE, FULL
+from warp_mca.recorders.recorder import DISK_RESERVE, FULL, make_way
 
 if TYPE_CHECKING:
     from uuid import UUID
@@ -40,7 +40,7 @@ class RerunFile:
         import rerun as rr
 
         self.path, self.reason = path, ""
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_way(path)
         self.stream = rr.RecordingStream(application, recording_id=recording)
         try:
             self.stream.set_sinks(rr.FileSink(str(path)), default_blueprint=layout)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import brief, is_number
 from warp_mca.recorders.pictures import Subject
-from warp_mca.recorders.recorder import Cadence, Frame, RunInfo, check_file
+from warp_mca.recorders.recorder import Cadence, Frame, RunInfo, check_file, make_way
 
 
 class SnapshotFile:
@@ -48,7 +48,7 @@ class SnapshotFile:
         from warp_mca.report.snapshot import save_snapshot
 
         skins = self.subject.skins(self.info, frame)
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        make_way(self.path)
         save_snapshot(self.path, skins, frame.time, self.subject.look(self.info, skins))
 
     def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:

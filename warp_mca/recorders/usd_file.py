@@ -21,7 +21,17 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.recorders.colours import ColourScale, check_limit
-from warp_mca.recorders.recorder import CONTACT, DISK_RESERVE, FULL, SURFACE, Cadence, apart, check_disk, check_file
+from warp_mca.recorders.recorder import (
+    CONTACT,
+    DISK_RESERVE,
+    FULL,
+    SURFACE,
+    Cadence,
+    apart,
+    check_disk,
+    check_file,
+    make_way,
+)
 from warp_mca.recorders.usd_prims import BodyPrim, ContactPrim
 from warp_mca.recorders.usd_setting import Setting, bind, make_material, set_up_axis
 from warp_mca.report.setting import up_of
@@ -99,8 +109,8 @@ class UsdFile:
 
         self.info = info
         self.scale = ColourScale(info.scene, self.limit)
-        self.path.parent.mkdir(parents=True, exist_ok=True)
         try:
+            make_way(self.path)
             self.stage = _new_stage(str(self.path))
         except (Tf.ErrorException, OSError) as error:
             raise bad_value("usd", str(self.path), f"it cannot be written ({_reason(error)}); name another") from error

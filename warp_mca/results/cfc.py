@@ -28,14 +28,26 @@ def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
         cfc: channel frequency class [Hz], 60, 180, 600 or 1000 in the standard.
 
     Raises:
-        RequestError: the class is no number above 0, or rows are too far apart for it, or too near each other.
+        RequestError: class or interval is no finite number above 0, rows are too far apart for the class, or too near
+            each other, or a value is no finite number.
     """
     from scipy.signal import butter, sosfiltfilt
 
     if not (validate.is_number(cfc) and cfc > 0.0):
         raise bad_value("cfc", validate.brief(cfc), "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
+    if not (validate.is_number(interval) and interval > 0.0):
+        raise bad_value("interval", validate.brief(interval), "give the finite time between rows, above 0 s")
     check_class("cfc", cfc, interval, SLACK)
-    values = np.asarray(values, dtype=np.float64)
+    given = values
+    try:
+        values = np.asarray(values, dtype=np.float64)
+        len(values)
+    except (TypeError, ValueError) as error:
+        remedy = "give an array of numbers, rows along its first axis"
+        raise bad_value("values", validate.brief(given), remedy) from error
+    if len(strange := values[~np.isfinite(values)]):
+        remedy = "the filter would spread it over all rows; leave these rows out, or give finite values"
+        raise bad_value("values", float(strange[0]), remedy)
     if len(values) < 2:
         return values.copy()
     sections = butter(2, CORNER * cfc, fs=1.0 / interval, output="sos")

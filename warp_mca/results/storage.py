@@ -30,6 +30,7 @@ CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
 PROBE_FILES = (NPZ, CSV, "probes.png")  # of scenes with probes or sections, besides
 ALL_FILES = FILES + CONTACT_FILES + PATH_FILES + PROBE_FILES
+DATA = ("history.csv", *CONTACT_FILES, "paths.npz", NPZ, CSV)  # the others are figures
 DIGESTS = "files"  # key of summary.json: SHA-256 of each other file of the run, by its name
 
 
@@ -142,23 +143,27 @@ def load(directory: str | os.PathLike[str]) -> Result:
         paths = load_paths(path / "paths.npz") if (path / "paths.npz").exists() else ()
         contacts = load_contacts(path / "forces.npz") if (path / "forces.npz").exists() else ()
         sensors = load_sensors(path / NPZ) if (path / NPZ).exists() else ((), ())
-        strange = _of_other_runs(path, digests)
+        strange = _not_of_the_run(path, digests)
     except FileNotFoundError as error:
         raise bad_value("results", str(path), f"it has no {Path(error.filename).name}; name a run's folder") from error
     except DAMAGE as error:
         raise bad_value("results", str(path), "its files are damaged; run again") from error
     if strange:
-        remedy = f"{strange[0]} was changed, or is not of the run that summary.json is of; run again"
-        raise bad_value("results", str(path), remedy)
+        gone = not (path / strange).exists()
+        what = "is gone, though summary.json lists it" if gone else "was changed, or is not of the run of summary.json"
+        raise bad_value("results", str(path), f"{strange} {what}; run again")
     return Result(summary, history, path, warnings, paths, contacts=contacts, probes=sensors[0], sections=sensors[1])
 
 
-def _of_other_runs(path: Path, digests: Mapping[str, str] | None) -> list[str]:
-    """Names of the files with data in `path` that differ from those of the run whose `digests` these are."""
+def _not_of_the_run(path: Path, digests: Mapping[str, str] | None) -> str:
+    """Name of the first file with data in `path` that is not as in the run whose `digests` these are; "" if all are.
+
+    Figures may be removed: nothing is read from them.
+    """
     if digests is None:  # results of an earlier version
-        return []
-    found = [name for name in ("history.csv", "forces.npz", "paths.npz", NPZ, CSV) if (path / name).exists()]
-    return [name for name in found if digests.get(name) != _digest(path / name)]
+        return ""
+    present = {name: path / name for name in DATA if name in digests or (path / name).exists()}
+    return next((n for n, file in present.items() if not file.exists() or digests.get(n) != _digest(file)), "")
 
 
 def folder_path(field: str, directory: object) -> Path:

@@ -57,11 +57,11 @@ def span_of(scene: Scene, duration: float | None) -> float:
     """The duration [s] of the impact phase: `duration`, or the scene's own if None.
 
     Raises:
-        RequestError: it is no finite number above 0.
+        RequestError: it is no time that a run can have.
     """
     span = scene.impact.duration if duration is None else duration
-    if not (validate.is_number(span) and span > 0.0):
-        raise bad_value("duration", validate.brief(span), "give a finite time above 0 s")
+    if not validate.is_time(span):
+        raise bad_value("duration", validate.brief(span), validate.TIME)
     return float(span)
 
 

@@ -6,7 +6,8 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.validate import DAMAGE
+from warp_mca.runs.advice import warn
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Recorder
@@ -31,6 +33,7 @@ METHODS = ("mca", METHOD)
 DEFAULT = "30w"
 HEADER, MORE = "run/header", "run/more/"  # in that file, beside the arrays of the state
 REMEDY = "write it as 100 (steps), 2e-5s (simulated seconds) or 30w (seconds of wall time)"
+LEAST, MOST = 1e-12, 1e12  # what can be asked for, of any unit
 _LETTER = {"steps": "", "simulated": "s", "wall": "w"}
 SHORTEST = 4.0  # parts into which the time between two checkpoints is cut at least, to hit it
 
@@ -39,12 +42,12 @@ SHORTEST = 4.0  # parts into which the time between two checkpoints is cut at le
 class Every:
     """How often the state is stored: each `count` [steps, or s] of a `unit`, at the end of an output interval.
 
-    `command` are the words of a command line that gives the request again.
+    `command` is what `warp-mca resume` needs to give the request again, as JSON can hold it; None for a Python program.
     """
 
     count: float
     unit: Literal["steps", "simulated", "wall"]
-    command: tuple[str, ...] = ()
+    command: Mapping[str, Any] | None = None
 
     @property
     def text(self) -> str:
@@ -52,11 +55,11 @@ class Every:
         return f"{self.count:g}{_LETTER[self.unit]}"
 
     @staticmethod
-    def parse(value: object, command: tuple[str, ...] = ()) -> Every:
+    def parse(value: object, command: Mapping[str, Any] | None = None) -> Every:
         """What `--checkpoint` means.
 
         Raises:
-            RequestError: it is not of one of the three forms, or not above 0.
+            RequestError: it is not of one of the three forms, or out of range.
         """
         text = str(value).strip()
         unit: Literal["steps", "simulated", "wall"]
@@ -65,7 +68,7 @@ class Every:
             count = float(text if unit == "steps" else text[:-1])
         except ValueError:
             count = math.nan
-        if not (0.0 < count < math.inf) or (unit == "steps" and count != int(count)):
+        if not LEAST <= count <= MOST or (unit == "steps" and count != int(count)):
             raise bad_value("checkpoint", validate.brief(value), REMEDY)
         return Every(count, unit, command)
 
@@ -113,6 +116,7 @@ class Checkpoint:
         """Of the folder of a run; with `force` the run begins anew."""
         self.path, self.every, self.request = folder / FILE, every, {}
         self._steps, self._time, self._rate, self._begun = 0, time.perf_counter(), 0.0, 0
+        self._failed = False  # the last time: a warning says so once
         if force:
             self.path.unlink(missing_ok=True)
 
@@ -157,16 +161,19 @@ class Checkpoint:
     def store(self, impact: Impact, place: Mapping[str, Any], more: Mapping[str, NDArray] | None = None) -> None:
         """Write the state, a `place` in the run that JSON can hold, and `more` arrays.
 
-        Raises:
-            McaError: the file cannot be written.
+        Where the file cannot be written, it stays as it was, a warning says so, and the run goes on.
         """
-        head = {"request": self.request, "command": self.every.command, "cwd": str(Path.cwd()), "place": place}
+        head = {"request": self.request, "command": self.every.command, "place": place}
         arrays: dict[str, NDArray] = {MORE + name: array for name, array in (more or {}).items()}
         arrays[HEADER] = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
         try:
             impact.save(self.path, arrays)
         except OSError as error:
-            raise McaError(f"the state could not be written to {self.path}: {error.strerror or error}") from error
+            if not self._failed:
+                warn([f"the state could not be written to {self.path} ({error.strerror or error}): the run goes on"])
+            self._failed = True
+        else:
+            self._failed = False
         self.begin(impact)
 
     def stored(self) -> tuple[dict[str, Any], dict[str, NDArray]] | None:
@@ -198,7 +205,6 @@ def advance(impact: Impact, checkpoint: Checkpoint, told: Callable[[], None]) ->
 
     Raises:
         RequestError: the folder holds the state of another request.
-        McaError: the state cannot be written.
     """
     if checkpoint.stored() is not None:
         impact.load(checkpoint.path)
@@ -216,8 +222,8 @@ def go_on(impact: Impact, checkpoint: Checkpoint | None, told: Callable[[], None
     impact.advance(told=told)
 
 
-def stored_command(folder: Path) -> tuple[list[str], str]:
-    """The command line whose run stored its state in a folder, and the working directory that it had.
+def stored_command(folder: Path) -> dict[str, Any]:
+    """What `Every.command` was of the run that stored its state in a folder: a mapping, of which nothing is checked.
 
     Raises:
         RequestError: there is no such state, it is damaged, or a Python program stored it.
@@ -225,10 +231,28 @@ def stored_command(folder: Path) -> tuple[list[str], str]:
     path = folder / FILE
     if not path.is_file():
         raise bad_value("folder", str(folder), f"there is no {FILE}; name the folder of a run that was stopped")
-    head, _ = _read(path)
-    if not head["command"]:
+    command = _read(path)[0]["command"]
+    if command is None:
         raise bad_value("folder", str(folder), "mca.run stored this state, not a command; call it again with this out")
-    return list(head["command"]), head["cwd"]
+    if not isinstance(command, dict):
+        raise bad_value("folder", str(folder), f"{FILE} there is of another version; give the run's own command again")
+    return command
+
+
+@contextmanager
+def damage_explained(path: Path) -> Iterator[None]:
+    """Say that the file `path` is damaged where what it holds cannot be used.
+
+    Raises:
+        RequestError: so it is.
+    """
+    try:
+        yield
+    except McaError:
+        raise
+    except DAMAGE as error:
+        remedy = f"{FILE} there is damaged or of another version; run again with --force (force=True)"
+        raise bad_value("out", str(path.parent), remedy) from error
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -237,13 +261,10 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
     Raises:
         RequestError: the file is damaged.
     """
-    try:
+    with damage_explained(path):
         with np.load(path, allow_pickle=False) as archive:
             head = json.loads(archive[HEADER].tobytes())
             more = {name.removeprefix(MORE): archive[name] for name in archive.files if name.startswith(MORE)}
-        if not isinstance(head["request"], dict):
-            raise ValueError(head["request"])
-    except DAMAGE as error:
-        remedy = f"{FILE} there is damaged or of another version; run again with --force (force=True)"
-        raise bad_value("out", str(path.parent), remedy) from error
+        if not (isinstance(head["request"], dict) and isinstance(head["place"], dict) and "command" in head):
+            raise ValueError(head)
     return head, more

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from warp_mca.base import validate
@@ -43,7 +44,7 @@ def mesh(
             validate.kind_of(f"meshes[{body.name!r}]", geometry, Mesh, "give a finished Mesh, as mca.mesh makes it")
         key = _key(geometry)
         if key not in made:
-            made[key] = geometry if isinstance(geometry, Mesh) else _build(body.name, geometry)
+            made[key] = geometry if isinstance(geometry, Mesh) else _build(scene, body, geometry)
             check(made[key], body.name)
         meshes[body.name] = made[key]
     cut = _cut(scene, meshes)
@@ -73,19 +74,36 @@ def _geometry(scene: Scene, body: Body) -> object:
     Raises:
         RequestError: it cannot be made so.
     """
-    return body.geometry if scene.refine == 1.0 else refined(f"body {body.name}", body.geometry, scene.refine)
+    if scene.refine == 1.0:
+        return body.geometry
+    try:
+        return refined(f"body {body.name}", body.geometry, scene.refine)
+    except RequestError as error:
+        raise _of_refine(scene, body, error) from error
 
 
-def _build(body: str, geometry: object) -> Mesh:
+def _build(scene: Scene, body: Body, geometry: object) -> Mesh:
     """The mesh of a recipe, which may be the user's own.
 
     Raises:
         RequestError: its `build` failed or returned something else than a mesh.
     """
-    field, recipe = f"Body {body}.geometry", type(geometry).__name__
-    made = validate.call(field, recipe, "build()", lambda: getattr(geometry, "build")())  # noqa: B009
+    field, recipe = f"Body {body.name}.geometry", type(geometry).__name__
+    try:
+        made = validate.call(field, recipe, "build()", lambda: getattr(geometry, "build")())  # noqa: B009
+    except RequestError as error:
+        raise (error if geometry == body.geometry else _of_refine(scene, body, error)) from error
     validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
     return made
+
+
+def _of_refine(scene: Scene, body: Body, error: RequestError) -> RequestError:
+    """The error, which names `refine` where it is of a value that the recipe has from this."""
+    field = re.match(r"(\w+)\.(\w+) = ", str(error))
+    if field is None or field[2] == "path":
+        return error
+    own = type(body.geometry).__name__ == field[1] and getattr(body.geometry, field[2], None)
+    return error if str(error).startswith(f"{field[0]}{own!r}:") else bad_value("refine", scene.refine, str(error))
 
 
 def _key(geometry: object) -> object:

@@ -20,7 +20,7 @@ from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.rigid.placement import link_placements
 from warp_mca.runs.advice import warn
 from warp_mca.runs.arguments import Progress
-from warp_mca.runs.checkpoint import METHOD, Checkpoint, go_on
+from warp_mca.runs.checkpoint import METHOD, Checkpoint, damage_explained, go_on
 from warp_mca.runs.division import coarser
 from warp_mca.runs.forecast import announce
 from warp_mca.runs.impact import Impact
@@ -227,10 +227,11 @@ class PureRun:
         if found is None:
             return
         place, more = found
-        self.place = Place(**place)
-        for stage in self.clock.wall:
-            self.clock.wall[stage] += self.place.wall.pop(stage)
-        if self.place.phase == "impact":
-            self.swing = SceneRecords.of(more)
-            self.impact.steps = self.fine if self.place.touch is None else self._ending(self.place.touch)
+        with damage_explained(checkpoint.path):
+            self.place = Place.of(place)
+            for stage in self.clock.wall:
+                self.clock.wall[stage] += self.place.wall.pop(stage)
+            if self.place.phase == "impact":
+                self.swing = SceneRecords.of(more)
+                self.impact.steps = self.fine if self.place.touch is None else self._ending(self.place.touch)
         self.impact.load(checkpoint.path)

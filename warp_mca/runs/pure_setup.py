@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.validate import is_list
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
 from warp_mca.model.cells import nodal_masses
@@ -49,6 +50,22 @@ class Place:
     joint_impulse: dict[str, list[float]] = field(default_factory=dict)
     configuration: list[list[float]] = field(default_factory=list)
     wall: dict[str, float] = field(default_factory=dict)
+
+    @staticmethod
+    def of(stored: Mapping[str, Any]) -> Place:
+        """The place that a file holds.
+
+        Raises:
+            TypeError, ValueError: a value is missing, or of another type or range.
+        """
+        place = Place(**stored)
+        counts = [place.swung, *([] if place.touch is None else [place.touch])]
+        rows = [*place.joint_impulse.values(), *place.configuration, list(place.wall.values())]
+        if place.phase not in ("swing", "impact") or not all(type(count) is int and count >= 0 for count in counts):
+            raise ValueError(stored)
+        if not all(isinstance(row, list) and is_list(row) for row in rows):
+            raise ValueError(stored)
+        return place
 
 
 def check(scene: Scene) -> None:

@@ -4,32 +4,32 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from warp_mca.base.errors import McaError, bad_value
+from warp_mca.base.errors import LONGEST, McaError, bad_value
 from warp_mca.base.files import write_atomically
+from warp_mca.base.validate import MAX_COUNT
 from warp_mca.results.storage import ALL_FILES
 from warp_mca.runs.advice import warn
 from warp_mca.runs.sweep_columns import stored_row
 from warp_mca.runs.sweep_job import FAILED, Row
+from warp_mca.runs.sweep_lines import header_of, line_of, read_lines
 from warp_mca.runs.sweep_plan import run_name
 
 CSV, PARQUET, IDENTITY = "sweep.csv", "sweep.parquet", "sweep.json"
 PARQUET_INTERVAL = 5.0  # at least so long between two versions of the Parquet table while runs go on [s]
-FIELD = re.compile(r'("(?:[^"]|"")*"|[^,"]*)(,|$)')
-NUMBER = re.compile(r"[+-]?\d+")
 
 
 class SweepTable:
     """The rows of a sweep, in a folder or only in memory.
 
     `sweep.csv` grows by whole lines, in the order in which runs end; a line that a killed process left unfinished is
-    dropped. New columns, and the order of runs at the end, replace the file by rename. Texts are quoted, numbers are
-    not, nothing stands for None; floats have the digits that give them back bit for bit.
+    dropped, and a damaged one is. New columns, and the order of runs at the end, replace the file by rename.
 
     Attributes:
         rows: by number of the run.
@@ -50,10 +50,14 @@ class SweepTable:
         self._stored = 0.0
         if folder and (folder / CSV).exists():
             try:
-                found = [stored_row(row, parameters) for row in read_rows(folder / CSV)]
+                lines, damaged = read_lines(folder / CSV)
+                found = [stored_row(row, parameters) for row in lines]
             except (ValueError, KeyError) as error:
                 remedy = f"{CSV} there was changed by others; name another folder, or use --force (force=True)"
                 raise bad_value("out", str(folder), remedy) from error
+            if damaged:
+                numbers = ", ".join(map(str, damaged))
+                warn([f"{folder / CSV} is damaged in line {numbers}: the runs of these lines count as not done"])
             self.rows = {row["index"]: row for row in found if row and row["status"] != FAILED}
             self._columns = _columns(self.rows.values())
             self._rewrite()
@@ -68,7 +72,7 @@ class SweepTable:
         if not self.folder:
             return
         if set().union(*rows) <= set(self._columns):
-            lines = "".join(_csv_line(row.get(name) for name in self._columns) for row in rows)
+            lines = "".join(line_of(self._columns, row) for row in rows)
             with _writing(self.folder), (self.folder / CSV).open("ab", buffering=0) as file:
                 file.write(lines.encode())  # one call: the lines are in the file whole, or not at all
         else:
@@ -91,9 +95,8 @@ class SweepTable:
 
     def _rewrite(self) -> None:
         assert self.folder
-        header = ",".join(name if re.fullmatch(r"[\w.]+", name) else _csv_text(name) for name in self._columns)
-        lines = [_csv_line(row.get(name) for name in self._columns) for row in self.rows.values()]
-        text = (header + "\n" + "".join(lines)).encode()
+        lines = [header_of(self._columns), *(line_of(self._columns, row) for row in self.rows.values())]
+        text = "".join(lines).encode()
         with _writing(self.folder):
             write_atomically(self.folder / CSV, lambda file: file.write(text))
 
@@ -114,23 +117,6 @@ class SweepTable:
         with _writing(self.folder):
             write_atomically(self.folder / PARQUET, write)
         self._stored = time.monotonic()
-
-
-def read_rows(path: Path) -> list[Row]:
-    """The rows of a sweep.csv, without a line at its end that was not finished.
-
-    Raises:
-        ValueError: it is not of the form that `SweepTable` writes.
-        KeyError: it lacks a column that every sweep has.
-    """
-    lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-    if not lines:
-        return []
-    names = [str(name) for name in _fields(lines[0])]
-    rows = [dict(zip(names, _fields(line), strict=True)) for line in lines[1:]]
-    if not all(isinstance(row["index"], int) and isinstance(row["status"], str) for row in rows):
-        raise ValueError("index and status")
-    return rows
 
 
 def check_identity(folder: Path, identity: Mapping[str, object]) -> None:
@@ -171,9 +157,9 @@ def remove_sweep(folder: Path) -> None:
         McaError: a file cannot be removed.
     """
     stored = _stored_identity(folder)
-    count = stored.get("runs") if stored and stored.get("folders") else 0
-    runs = [folder / run_name(k, count) for k in range(count)] if isinstance(count, int) else []
+    count = stored.get("runs") if stored and stored.get("folders") is True else None
     with _writing(folder):
+        runs = [path for path in folder.iterdir() if _is_run(path, count) and not path.is_symlink()]
         for run in runs:
             for name in ALL_FILES:
                 (run / name).unlink(missing_ok=True)
@@ -181,6 +167,14 @@ def remove_sweep(folder: Path) -> None:
                 run.rmdir()
         for name in (PARQUET, CSV, IDENTITY):
             (folder / name).unlink(missing_ok=True)
+
+
+def _is_run(path: Path, count: object) -> bool:
+    """Whether a folder has the name of one of so many runs, if that is a number."""
+    if type(count) is not int or not 0 < count <= MAX_COUNT:
+        return False
+    number = int(path.name) if re.fullmatch("[0-9]{1,10}", path.name) else count
+    return number < count and path.name == run_name(number, count)
 
 
 def _stored_identity(folder: Path) -> dict[str, Any] | None:
@@ -210,45 +204,6 @@ def _columns(rows: Iterable[Collection[str]]) -> list[str]:
     return sorted(found, key=lambda name: name == "wall")
 
 
-def _csv_line(values: Iterable[object]) -> str:
-    return ",".join(map(_csv_text, values)) + "\n"
-
-
-def _csv_text(value: object) -> str:
-    """A value as sweep.csv has it."""
-    if value is None:
-        return ""
-    return '"' + value.replace('"', '""') + '"' if isinstance(value, str) else repr(value)
-
-
-def _fields(line: str) -> list[object]:
-    """The values of a line, as they were before `_csv_line`.
-
-    Raises:
-        ValueError: it is not a line that this module writes.
-    """
-    found, place = [], 0
-    while True:
-        match = FIELD.match(line, place)
-        if not match:
-            raise ValueError(line)
-        found.append(_value(match[1]))
-        place = match.end()
-        if not match[2]:
-            return found
-
-
-def _value(text: str) -> object:
-    if text.startswith('"'):
-        return text[1:-1].replace('""', '"')
-    if text in ("", "True", "False"):
-        return {"": None, "True": True, "False": False}[text]
-    try:
-        return int(text) if NUMBER.fullmatch(text) else float(text)
-    except ValueError:  # names of columns are not quoted
-        return text
-
-
 def _alike(values: list[Any]) -> list[Any]:
     """A column of one type: whole numbers beside others become floats, other mixtures text."""
     kinds = {type(value) for value in values if value is not None}
@@ -262,5 +217,6 @@ def _alike(values: list[Any]) -> list[Any]:
 def _brief(value: object) -> str:
     """A value of an identity for a message: grids as `mu=0.1,0.3 v=1`."""
     if isinstance(value, dict):
-        return " ".join(f"{key}={','.join(map(str, listed))}" for key, listed in value.items()) or "no parameters"
-    return "none" if value is None else str(value)
+        texts = {key: ",".join(map(str, item)) if isinstance(item, list) else str(item) for key, item in value.items()}
+        value = " ".join(f"{key}={text}" for key, text in texts.items()) or "no parameters"
+    return "none" if value is None else textwrap.shorten(str(value), LONGEST, placeholder=" …")

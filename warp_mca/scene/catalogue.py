@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
 
+SUFFIX = ".py"  # of scene files
+
+
 @dataclass(frozen=True)
 class SceneSource:
     """A scene file, read: what it is called, what it offers and how to build it.
@@ -115,7 +118,7 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
         RequestError: there is no such scene, or the file is no scene file.
     """
     name = str(name) if isinstance(name, os.PathLike) else name
-    if isinstance(name, str) and Path(name).suffix == ".py":
+    if isinstance(name, str) and Path(name).suffix == SUFFIX:
         return _source(_imported(Path(name)), Path(name).stem, builtin=False)
     names = scene_names()
     if name not in names:
@@ -123,6 +126,10 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
             remedy = "give a Python file (.py), a model file (.mca) or a name that warp-mca scenes lists"
             raise bad_value("scene", name, f"{remedy}; a part needs the suffix of its format, as .step or .inp")
         known = _known(name, names, "none")
+        if isinstance(name, str) and Path(name).suffix and (Path(name).exists() or "did you mean" not in known):
+            others = "model files (.mca), parts (.step, .iges, .brep, .stl) and meshes (.msh, .inp, .k, .vtu, …)"
+            remedy = f"name a built-in scene or a Python file ({SUFFIX}); warp-mca run also takes {others}"
+            raise bad_value("scene", name, remedy)
         raise bad_value(
             "scene", validate.brief(name), f"the scenes are {known}; or give a Python file (.py) or a model file (.mca)"
         )
@@ -140,16 +147,19 @@ def make_scene(name: str | os.PathLike[str], *, preset: str | None = None, **par
 
 
 def parse_overrides(settings: Iterable[str]) -> dict[str, str]:
-    """`KEY=VALUE` texts as a dict; of a key that occurs twice the last value counts.
+    """`KEY=VALUE` texts as a dict.
 
     Raises:
-        RequestError: a text is not of that form.
+        RequestError: a text is not of that form, or a key occurs twice.
     """
-    overrides = {}
+    overrides: dict[str, str] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not (key.strip() and equals and value.strip()):
             raise bad_value("--set", setting, "write it as KEY=VALUE, without spaces")
+        if key.strip() in overrides:
+            remedy = f"{key.strip()} is given twice, also as {overrides[key.strip()]}; leave one of the two out"
+            raise bad_value("--set", setting, remedy)
         overrides[key.strip()] = value.strip()
     return overrides
 

@@ -11,6 +11,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw, Penalty
 
+MOST_FRICTION = 1e6  # with which nothing slides [-]
 OVERLAP_CHOICES = ("refuse", "stress_free", "press")
 
 
@@ -100,8 +101,9 @@ class Contact:
             validate.positive("Contact", penalty=self.penalty)
         if self.initial_overlap not in OVERLAP_CHOICES:
             raise bad_value("Contact.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")
-        if not (validate.is_number(self.mu) and self.mu >= 0.0):
-            raise bad_value("Contact.mu", self.mu, "give a finite coefficient of friction, 0 or above")
+        if not (validate.is_number(self.mu) and 0.0 <= self.mu <= MOST_FRICTION):
+            remedy = f"give a coefficient of friction from 0 to {MOST_FRICTION:g}"
+            raise bad_value("Contact.mu", self.mu, remedy)
         validate.flags("Contact", two_way=self.two_way)
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")

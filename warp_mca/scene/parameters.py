@@ -8,6 +8,7 @@ from typing import Any
 
 from warp_mca.base.errors import bad_value
 
+LEAST, MOST = 1e-30, 1e30  # sizes of numbers that somebody may mean, in any unit
 TRUE = ("true", "yes", "on", "1")
 FALSE = ("false", "no", "off", "0")
 KIND_WORDS = {float: "a finite number", int: "a whole number", str: "a word", bool: "true or false"}
@@ -86,6 +87,8 @@ class Parameter:
             raise bad_value(self.name, value, self._remedy()) from None
         if not self.param.allows(result):
             raise bad_value(self.name, result, self._remedy())
+        if isinstance(result, int | float) and result and not LEAST <= abs(result) <= MOST:
+            raise bad_value(self.name, result, f"{self._remedy()}; of a size from {LEAST:g} to {MOST:g}")
         return result
 
     def _remedy(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
@@ -200,7 +199,7 @@ class ImpactPhase:
 
     def __post_init__(self) -> None:
         validate.plain(self)
-        validate.positive("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
+        validate.times("ImpactPhase", duration=self.duration, output_interval=self.output_interval)
         validate.positive("ImpactPhase", energy_tolerance=self.energy_tolerance)
         if self.output_interval > self.duration:
             raise bad_value(
@@ -210,7 +209,7 @@ class ImpactPhase:
             remedy = "give a factor of 1 or above for the stable step, or a step in seconds as 2e-8s"
             raise bad_value("ImpactPhase.mass_scaling", validate.brief(self.mass_scaling), remedy)
         if self.open_time is not None:
-            validate.positive("ImpactPhase", open_time=self.open_time)
+            validate.times("ImpactPhase", open_time=self.open_time)
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
 
@@ -219,5 +218,5 @@ def is_mass_scaling(value: object) -> bool:
     """Whether it is a factor for the stable step, or a step as "2e-8s"."""
     if isinstance(value, str) and value.endswith("s"):
         with suppress(ValueError):
-            return 0.0 < float(value[:-1]) < math.inf
+            return validate.is_time(float(value[:-1]))
     return validate.is_number(value) and value >= 1.0  # pyright: ignore[reportOperatorIssue]

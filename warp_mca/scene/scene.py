@@ -30,6 +30,8 @@ _PARTS = {
     "sections": Section,
 }
 
+FINEST = 1000.0  # factor by which `Scene.refine` may make cells smaller, or larger [-]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
@@ -91,7 +93,7 @@ class Scene:
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()
-        validate.positive("Scene", refine=self.refine)
+        validate.within("Scene", 1.0 / FINEST, FINEST, refine=self.refine)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
         for key in self.parameters:
@@ -141,7 +143,7 @@ class Scene:
         """
         if self.t_end is None:
             return
-        validate.positive("Scene", t_end=self.t_end)
+        validate.times("Scene", t_end=self.t_end)
         if self.rigid is None:
             raise bad_value("Scene.t_end", self.t_end, "swings and impacts in turn need a RigidPhase; give one")
         if self.impact.mass_scaling is not None:

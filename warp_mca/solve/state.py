@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import write_atomically
-from warp_mca.base.validate import DAMAGE
+from warp_mca.base.validate import DAMAGE, MAX_COUNT
 from warp_mca.elements.state import ElementState
 from warp_mca.solve.absorbing_stage import AbsorbingState
 from warp_mca.solve.constraint_stage import ConstraintState
@@ -152,6 +152,8 @@ class State:
                 raise ValueError(head["format"])
             alike = (head["model"], head["dt"], head["scalar"]) == (digest(model), dt, self._scalar)
             mine = {name: _fitting(name, to, stored.pop(name)) for name, to in self.arrays().items()} if alike else {}
+            if not (type(head["steps"]) is int and 0 <= head["steps"] <= MAX_COUNT):
+                raise ValueError(head["steps"])
             scenes = [SceneRecords.of(_part(stored, f"scenes/{k}/")) for k in range(head["scenes"])]
         except DAMAGE as error:
             raise bad_value(

@@ -30,6 +30,7 @@ Split = Callable[[int, Launch, int], None]  # (count, launch, least length of a 
 
 # Least length of a range, about 0.1 ms: to pass one to a thread costs about 0.02 ms.
 ELEMENTS, NODES, CONTACT = 1024, 4096, 512
+MOST = 4096  # threads that can be asked for
 RANGES = 4  # for each thread: one that is held up, or meets more that yields, leaves ranges to the others
 
 
@@ -41,8 +42,9 @@ def thread_count(threads: int | None) -> int:
     """
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if isinstance(threads, bool) or not isinstance(threads, Integral) or threads < 1:
-        raise bad_value("threads", threads, "give a whole number of threads above 0, or leave it out for all cores")
+    if isinstance(threads, bool) or not isinstance(threads, Integral) or not 1 <= threads <= MOST:
+        remedy = f"give a whole number of threads from 1 to {MOST:,}, or leave it out for all cores"
+        raise bad_value("threads", threads, remedy)
     return int(threads)
 
 
