@@ -39,6 +39,7 @@ def build(
         position=(0.0, radius, 0.0),
         rotation=(0.0, 0.0, -0.5 * math.pi),  # the pole points downwards
         velocity=(0.0, -v, 0.0),
+        exact_mass=False,  # published figures of this scene are of the mass of its cells
     )
     bodies = [moving]
     fixed = [mca.Fixed(body="sphere", nodes="ymin", axes="x"), mca.Fixed(body="sphere", nodes="zmin", axes="z")]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MAX_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
 from warp_mca.geometry.integrals import INTEGRALS
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.shape_volume import divided
 
 Cells = NDArray[np.int32]
 
@@ -81,4 +82,4 @@ def tetrahedral(mesh: Mesh) -> Mesh:
     }
     none = np.zeros((0, HEXAHEDRON.corners), dtype=np.int32)
     tetrahedra = np.concatenate([cut, mesh.tetrahedra])[order].astype(np.int32)
-    return Mesh(mesh.points, none, mesh.node_sets, cell_sets, tetrahedra)
+    return divided(Mesh(mesh.points, none, mesh.node_sets, cell_sets, tetrahedra), mesh, np.sort(owner))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -76,4 +78,10 @@ def compact(mesh: Mesh) -> Mesh:
     index = np.full(len(mesh.points), -1, dtype=np.int32)
     index[used] = np.arange(len(used), dtype=np.int32)
     node_sets = {name: index[nodes][index[nodes] >= 0] for name, nodes in mesh.node_sets.items()}
-    return Mesh(mesh.points[used], index[mesh.hexahedra], node_sets, mesh.cell_sets, index[mesh.tetrahedra])
+    return replace(
+        mesh,
+        points=mesh.points[used],
+        hexahedra=index[mesh.hexahedra],
+        node_sets=node_sets,
+        tetrahedra=index[mesh.tetrahedra],
+    )

@@ -16,6 +16,7 @@ from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.cycle_rows import STORED, Columns, Story, tell_story
 from warp_mca.runs.cycle_sensors import cycle_records
 from warp_mca.runs.cycle_setup import Setup
+from warp_mca.runs.mass_report import body_report
 from warp_mca.runs.parts import ImpactPart, Part
 
 Array = NDArray[np.float64]
@@ -108,7 +109,11 @@ def _without_impact(setup: Setup, history: Columns) -> dict[str, Any]:
         parameters=scene.parameters,
         theta=tuple(float(x) for x in start.theta),
         theta_dot=tuple(float(x) for x in start.theta_dot),
-        more={"energy_drift_rigid": start.energy_drift, "refine": scene.refine},
+        more={
+            "energy_drift_rigid": start.energy_drift,
+            "refine": scene.refine,
+            "bodies": body_report(scene, setup.meshes),
+        },
     )
     return summarise(history, facts)
 

@@ -10,6 +10,7 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.geometry.degenerate import cut_to
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined
+from warp_mca.geometry.shape_volume import built
 from warp_mca.runs.arguments import check_scene
 from warp_mca.scene import Body, Scene
 
@@ -69,7 +70,7 @@ def _build(body: str, geometry: object) -> Mesh:
         RequestError: its `build` failed or returned something else than a mesh.
     """
     field, recipe = f"Body {body}.geometry", type(geometry).__name__
-    made = validate.call(field, recipe, "build()", lambda: getattr(geometry, "build")())  # noqa: B009
+    made = validate.call(field, recipe, "build()", lambda: built(field, geometry))  # type: ignore[arg-type]
     validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
     return made
 
