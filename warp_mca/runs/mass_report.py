@@ -43,11 +43,12 @@ def mass_warnings(scene: Scene, meshes: Mapping[str, Mesh]) -> list[str]:
     found = []
     for name, own in body_report(scene, meshes).items():
         if (error := own["mass_error"]) is not None and abs(error) > COARSE:
-            exact = scene.body(name).exact_mass
-            what = "its mass is scaled to that, not its size and stiffness" if exact else "and it has their mass"
+            what = "body has that mass"
+            if scene.body(name).exact_mass:
+                what = "mass of the body is scaled to that of the shape, but its sections and stiffness are not"
             found.append(
                 f"the cells of body {name} are {abs(error):.1%} {'lighter' if error < 0.0 else 'heavier'} than its "
-                f"shape, since they are flat where it is round: {what}; refine its mesh, as with --refine 2"
+                f"shape, whose round faces they cut off flat; the {what}: refine its mesh, as with --refine 2"
             )
     return found
 
