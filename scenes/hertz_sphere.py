@@ -30,10 +30,9 @@ def build(
     material = mca.Elastic(E=E, nu=nu, rho=rho)
     ring = max(2, section // 2)
     patch = {"section": section, "ring": ring, "pole_size": pole_size, "pole_layers": pole_layers}
-    sphere = mca.Sphere(radius=radius, part="quarter", **patch)  # pyright: ignore[reportArgumentType]
     moving = mca.Body(
         name="sphere",
-        geometry=sphere,
+        geometry=mca.Sphere(radius=radius, part="quarter", **patch),  # pyright: ignore[reportArgumentType]
         material=mca.Elastic(E=E_ratio * E, nu=nu, rho=rho),
         rigid=rigid_sphere,
         position=(0.0, radius, 0.0),

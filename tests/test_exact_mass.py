@@ -40,7 +40,7 @@ def scene(geometry: Any, material: Any = METAL, **changes: Any) -> mca.Scene:
 
 def weighed(geometry: Any, material: Any = METAL, **changes: Any) -> dict[str, float | None]:
     asked = scene(geometry, material, **changes)
-    return body_report(asked, mca.mesh(asked))["b"]
+    return body_report(asked.bodies, mca.mesh(asked))["b"]
 
 
 def small_lug_rod(**changes: Any) -> mca.LugRod:
@@ -307,7 +307,7 @@ def test_model_files_keep_it_and_older_ones_keep_their_mass(tmp_path: Path):
     meshes, file = mca.mesh(asked), tmp_path / "b.mca"
     save(file, asked, meshes)
     stored = load(file)
-    assert body_report(stored.scene, stored.meshes) == body_report(asked, meshes)
+    assert body_report(stored.scene.bodies, stored.meshes) == body_report(asked.bodies, meshes)
 
     def forget(item: Any) -> Any:
         if isinstance(item, dict):
@@ -321,7 +321,7 @@ def test_model_files_keep_it_and_older_ones_keep_their_mass(tmp_path: Path):
     (tmp_path / "old.npz").rename(tmp_path / "old.mca")
     stored = load(tmp_path / "old.mca")
     cells = RHO * float(volumes(meshes["b"]).sum())
-    assert body_report(stored.scene, stored.meshes)["b"] == {"mass": pytest.approx(cells), "mass_error": None}
+    assert body_report(stored.scene.bodies, stored.meshes)["b"] == {"mass": pytest.approx(cells), "mass_error": None}
 
 
 def test_a_word_is_said_from_two_percent_on():
@@ -330,13 +330,13 @@ def test_a_word_is_said_from_two_percent_on():
         return mass_warnings(asked, mca.mesh(asked))
 
     (text,) = told(Sphere(radius=0.01))
-    assert "2.9% lighter" in text and "scaled" in text and "refine" in text
+    assert "2.9% less mass" in text and "scaled" in text and "refine" in text
     (text,) = told(Sphere(radius=0.01), exact_mass=False)
-    assert "2.9% lighter" in text and "body has that mass" in text
+    assert "2.9% less mass" in text and "the body has that mass" in text
     assert told(Sphere(radius=0.01), refine=2.0) == []
     assert told(Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1))) == []
     result = mca.run(scene(Sphere(radius=0.01, section=2, ring=1, pole_layers=2)), device="cpu")
-    assert any("lighter" in text for text in result.warnings)
+    assert any("less mass" in text for text in result.warnings)
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -42,6 +42,31 @@ def test_tetrahedra_too():
     assert excess(mca.Body(name="tet", geometry=mesh, material={"*": LIGHT}), mesh) == pytest.approx(4.0)
 
 
+BALL = mca.Sphere(radius=0.01, section=4, ring=2, pole_layers=4)
+ROD = mca.Rod(radius=0.005, length=0.05, tip="flat", section=4, ring=2)
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize(
+    ("recipe", "expected", "within"),
+    [
+        (BALL, [0.4 * 0.01**2] * 3, 0.02),
+        (mca.Sphere(radius=0.02), [0.4 * 0.02**2] * 3, 0.01),
+        (ROD, [0.5 * 0.005**2, *[0.05**2 / 12.0 + 0.25 * 0.005**2] * 2], 0.01),
+    ],
+)
+def test_the_shape_of_a_round_body_has_its_own_inertia(
+    recipe: Any, expected: list[float], within: float, exact: bool, element: str
+):
+    """2 m R^2 / 5 of a ball, m R^2 / 2 and m (L^2 / 12 + R^2 / 4) of a cylinder, whatever the cells leave out."""
+    body = mca.Body(name="b", geometry=recipe, material=STIFF, exact_mass=exact, element=element)
+    scene = mca.Scene(name="s", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6, output_interval=1e-6))
+    mesh = mca.mesh(scene)["b"]
+    mass = 2700.0 * (recipe.volume if exact else recipe.volume / float(mca.mesh(scene)["b"].volume_ratio[0]))
+    assert np.diag(inertias(body, mesh)[0]) == pytest.approx(mass * np.array(expected), rel=within)
+
+
 def told(*bodies: mca.Body, duration: float = 1e-5, **options: Any) -> list[float]:
     """Excess that each warning of a run names [-]."""
     phase = mca.ImpactPhase(duration=duration, output_interval=duration / 10)
@@ -72,6 +97,13 @@ def test_the_axis_counts_about_which_it_turns(rigid: bool, axis: Any, expected: 
     rate = tuple(float(w) for w in 20.0 * turn @ axis)
     bar = brick((20, 1, 1), (0.4, 0.02, 0.02), rigid=rigid, rotation=(0.0, 0.0, rotation), angular_velocity=rate)
     assert told(bar) == expected
+
+
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize(("recipe", "count"), [(mca.Sphere(radius=0.01), 0), (BALL, 1), (ROD, 0)])
+def test_round_bodies_are_held_to_their_round_shape(recipe: Any, count: int, exact: bool):
+    body = mca.Body(name="b", geometry=recipe, material=STIFF, angular_velocity=(0.0, 0.0, 99.0), exact_mass=exact)
+    assert len(told(body)) == count
 
 
 @pytest.mark.parametrize("rigid", [True, False])

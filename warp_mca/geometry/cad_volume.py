@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,11 @@ Array = NDArray[np.float64]
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 
 
-def solid_volumes(gmsh: ModuleType, path: str) -> Array:
+def solid_volumes(gmsh: Any, path: str) -> Array:
     """Volume of each solid of the model that gmsh has drawn from a file, in the file's unit; empty if not known."""
     if Path(path).suffix.lower() != ".stl":
-        return np.abs([gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3)])
+        found = np.abs([gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3)])
+        return found if (np.isfinite(found) & (found > 0.0)).all() else np.zeros(0)
     before = gmsh.model.getCurrent()
     gmsh.model.add("warp_mca_stl")  # the drawn model no longer has the file's own triangles
     try:

@@ -81,7 +81,7 @@ class MeshFile:
             )
             for kept in STORED_TYPES.values()
         }
-        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, **arrays))
+        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, **arrays))  # pyright: ignore[reportArgumentType]
         return with_selections(mesh, self.select)
 
     def _read(self) -> meshio.Mesh:

@@ -112,7 +112,7 @@ def _without_impact(setup: Setup, history: Columns) -> dict[str, Any]:
         more={
             "energy_drift_rigid": start.energy_drift,
             "refine": scene.refine,
-            "bodies": body_report(scene, setup.meshes),
+            "bodies": body_report(scene.bodies, setup.meshes),
         },
     )
     return summarise(history, facts)

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.geometry.hexahedron import CORNERS, determinants, shape_functions
-from warp_mca.geometry.tetrahedron import volumes
+from warp_mca.geometry.quality import volumes
+from warp_mca.geometry.shape_volume import of_cells
+from warp_mca.geometry.tetrahedron import volumes as tetrahedron_volumes
 from warp_mca.model.assembly import GROUND
 from warp_mca.model.cells import densities
 
@@ -89,9 +91,11 @@ def inertia_warnings(ready: Prepared, u: Array, v: Array) -> list[str]:
 
 
 def inertias(body: Body, mesh: Mesh) -> tuple[Array, Array]:
-    """Inertia about the mass centre of a body's volume, and of its nodes [kg m^2], each shape (3, 3), in its own frame.
+    """Inertia about the mass centre of a body's shape, and of its nodes [kg m^2], each shape (3, 3), in its own frame.
 
-    J = tr(S) I - S with S = integral of rho x x^T; lumping keeps mass and centre, so that S alone differs.
+    J = tr(S) I - S with S = integral of rho x x^T; lumping keeps mass and centre, so that S alone differs. What the
+    cells leave out of a round shape lies at their skin: of the same mass, the share 1 - 1 / r is a shell there, r the
+    shape's volume over that of the cells.
     """
     rho = densities(body, mesh)
     mass, first, exact, lumped, start = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 0
@@ -108,7 +112,23 @@ def inertias(body: Body, mesh: Mesh) -> tuple[Array, Array]:
             lumped += np.einsum("en,eni,enj->ij", nodal, x, x)
         start += len(conn)
     centred = np.outer(first, first) / mass
-    return _inertia(exact - centred), _inertia(lumped - centred)
+    plain = rho / of_cells(mesh) if body.exact_mass else rho
+    own = plain * volumes(mesh)
+    missing = 1.0 - float(own.sum() / (own @ of_cells(mesh)))
+    shape = exact - centred
+    if missing:
+        shape = (1.0 - missing) * shape + missing * mass * _skin(mesh, middle + first / mass)
+    return _inertia(shape), _inertia(lumped - centred)
+
+
+def _skin(mesh: Mesh, centre: Array) -> Array:
+    """Mean of x x^T over the skin of a mesh [m^2], shape (3, 3), with x from a centre [m]."""
+    faces = mesh.boundary[0]
+    a, b, c, d = np.moveaxis(mesh.points[faces] - centre, 1, 0)
+    area = np.linalg.norm(np.cross(c - a, d - b), axis=1)
+    triangle = (faces[:, 2] == faces[:, 3])[:, None]
+    middle = np.where(triangle, (a + b + c) / 3.0, (a + b + c + d) / 4.0)
+    return np.einsum("f,fi,fj->ij", area, middle, middle) / area.sum()
 
 
 def _excess(body: Body, mesh: Mesh, model: Model, own: slice, motion: Motion, x: Array) -> float:
@@ -145,7 +165,8 @@ def _motion(x: Array, v: Array, mass: Array) -> Motion:
     arms = x - centre
     inertia = _inertia(np.einsum("n,ni,nj->ij", mass, arms, arms))
     spin = mass @ np.cross(arms, v - velocity)
-    return Motion(centre, velocity, np.linalg.lstsq(inertia, spin, rcond=None)[0], total, inertia)
+    rate = np.linalg.lstsq(inertia, spin, rcond=None)[0].astype(np.float64)
+    return Motion(centre, velocity, rate, total, inertia)
 
 
 def _allowed(ready: Prepared, body: str, x: Array, motion: Motion) -> Motion:
@@ -195,4 +216,4 @@ def _points(x: Array, hexahedra: bool) -> tuple[Array, Array]:
         return _AT_GAUSS @ x, determinants(x)
     near, far = (5.0 + 3.0 * np.sqrt(5.0)) / 20.0, (5.0 - np.sqrt(5.0)) / 20.0  # Hammer, Marlowe and Stroud 1956
     share = np.full((4, 4), far) + (near - far) * np.eye(4)
-    return share @ x, np.repeat(volumes(x)[:, None] / 4.0, 4, axis=1)
+    return share @ x, np.repeat(tetrahedron_volumes(x)[:, None] / 4.0, 4, axis=1)

@@ -12,23 +12,23 @@ from warp_mca.model.cells import densities
 from warp_mca.model.mass_scaling import added_shares, peak_error, striking_body
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model.model import Model
-    from warp_mca.scene import Scene
+    from warp_mca.scene import Body, Scene
 
 
 COARSE = 0.02  # error of a mesh's mass from which on a word is said: forces and stiffness are off by as much
 
 
-def body_report(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, dict[str, float | None]]:
+def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str, dict[str, float | None]]:
     """Mass [kg] of each body, without what mass scaling adds, and error [-] of the mass of its cells, by its name.
 
     The error is None where nothing is known of the shape that the mesh stands for.
     """
     found: dict[str, dict[str, float | None]] = {}
-    for body in scene.bodies:
+    for body in bodies:
         mesh = meshes[body.name]
         mass = densities(body, mesh) * volumes(mesh)
         ratio = of_cells(mesh)
@@ -41,14 +41,15 @@ def body_report(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, dict[str,
 def mass_warnings(scene: Scene, meshes: Mapping[str, Mesh]) -> list[str]:
     """One sentence for each body whose cells have 2 % less or more mass than its shape."""
     found = []
-    for name, own in body_report(scene, meshes).items():
+    coarse = [body for body in scene.bodies if (np.abs(1.0 / meshes[body.name].volume_ratio - 1.0) > COARSE).any()]
+    for name, own in body_report(coarse, meshes).items():
         if (error := own["mass_error"]) is not None and abs(error) > COARSE:
-            what = "body has that mass"
+            what = "the body has that mass"
             if scene.body(name).exact_mass:
-                what = "mass of the body is scaled to that of the shape, but its sections and stiffness are not"
+                what = "its mass is scaled to that of the shape, but its sections and stiffness are not"
             found.append(
-                f"the cells of body {name} are {abs(error):.1%} {'lighter' if error < 0.0 else 'heavier'} than its "
-                f"shape, whose round faces they cut off flat; the {what}: refine its mesh, as with --refine 2"
+                f"the cells of body {name} have {abs(error):.1%} {'less' if error < 0.0 else 'more'} mass than its "
+                f"shape, because they are flat where it is round; {what}: refine its mesh, as with --refine 2"
             )
     return found
 
