@@ -327,7 +327,7 @@ def test_model_files_keep_it_and_older_ones_keep_their_mass(tmp_path: Path):
 def test_a_word_is_said_from_two_percent_on():
     def told(recipe: Any, **changes: Any) -> list[str]:
         asked = scene(recipe, **changes)
-        return mass_warnings(asked, mca.mesh(asked))
+        return mass_warnings(asked.bodies, mca.mesh(asked))
 
     (text,) = told(Sphere(radius=0.01))
     assert "2.9% less mass" in text and "scaled" in text and "refine" in text
@@ -335,8 +335,9 @@ def test_a_word_is_said_from_two_percent_on():
     assert "2.9% less mass" in text and "the body has that mass" in text
     assert told(Sphere(radius=0.01), refine=2.0) == []
     assert told(Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1))) == []
-    result = mca.run(scene(Sphere(radius=0.01, section=2, ring=1, pole_layers=2)), device="cpu")
-    assert any("less mass" in text for text in result.warnings)
+    for on in (True, False):
+        result = mca.run(scene(Sphere(radius=0.01, section=2, ring=1, pole_layers=2), exact_mass=on), device="cpu")
+        assert sum("less mass" in text for text in result.warnings) == 1
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -74,7 +74,8 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
                 f"faces of the slave {contact.slave.body} are {ratio:.2g} times as wide as those of its master, "
                 "whose nodes pass between its own: make the finer side the slave, or set two_way"
             )
-    found += mass_warnings(scene, meshes) + _loose_nodes(scene, meshes, model) + tie_warnings(model.ties)
+    found += mass_warnings([body for body in scene.bodies if body.exact_mass], meshes)
+    found += _loose_nodes(scene, meshes, model) + tie_warnings(model.ties)
     return found + unit_warnings(scene, meshes, model)
 
 

@@ -36,8 +36,10 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     history = {"time_s": history.pop("t") - t_contact, **history}
     contacts = _contacts(setup, results, story)
     warnings = [NOTHING] if not impacts else []
+    common = set.intersection(*(set(result.warnings) for result in results)) if results else set()
+    warnings += [w for w in results[0].warnings if w in common] if results else []
     for k, result in enumerate(results, 1):
-        warnings += [w if len(results) == 1 else f"impact {k}: {w}" for w in result.warnings]
+        warnings += [f"impact {k}: {w}" for w in result.warnings if w not in common]
     stopped = [part.stopped for part in parts if part.stopped]
     summary = results[0].summary if results else _without_impact(setup, history)
     summary = {**summary, **_of_all(setup, impacts, story, results, contacts, t_contact)}

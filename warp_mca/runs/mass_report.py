@@ -38,18 +38,20 @@ def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str,
     return found
 
 
-def mass_warnings(scene: Scene, meshes: Mapping[str, Mesh]) -> list[str]:
+def mass_warnings(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> list[str]:
     """One sentence for each body whose cells have 2 % less or more mass than its shape."""
     found = []
-    coarse = [body for body in scene.bodies if (np.abs(1.0 / meshes[body.name].volume_ratio - 1.0) > COARSE).any()]
-    for name, own in body_report(coarse, meshes).items():
-        if (error := own["mass_error"]) is not None and abs(error) > COARSE:
+    coarse = [body for body in bodies if (np.abs(1.0 / meshes[body.name].volume_ratio - 1.0) > COARSE).any()]
+    for body in coarse:
+        error = body_report([body], meshes)[body.name]["mass_error"]
+        if error is not None and abs(error) > COARSE:
             what = "the body has that mass"
-            if scene.body(name).exact_mass:
+            if body.exact_mass:
                 what = "its mass is scaled to that of the shape, but its sections and stiffness are not"
+            share = f"{abs(error):.1%} {'less' if error < 0.0 else 'more'}"
             found.append(
-                f"the cells of body {name} have {abs(error):.1%} {'less' if error < 0.0 else 'more'} mass than its "
-                f"shape, because they are flat where it is round; {what}: refine its mesh, as with --refine 2"
+                f"the cells of body {body.name} have {share} mass than its shape, because they are flat where it is "
+                f"round; {what}: refine its mesh, as with --refine 2"
             )
     return found
 

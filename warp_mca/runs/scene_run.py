@@ -22,7 +22,7 @@ from warp_mca.runs.flutter_warnings import flutter_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.inertia_warnings import inertia_warnings
 from warp_mca.runs.ledger import Ledger
-from warp_mca.runs.mass_report import body_report, mass_report
+from warp_mca.runs.mass_report import body_report, mass_report, mass_warnings
 from warp_mca.runs.passing import Pair, pairs_of, passed, passing_warnings
 from warp_mca.runs.rate_groups import rate_figures
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
@@ -253,6 +253,8 @@ class SceneRun:
         kinetic, time = ledger.kept.initial_kinetic, self.steps.dt * self.state.steps
         found += start_warnings(scene, self.ready.meshes, self.ready.model, kinetic, time)
         found += self.ready.warnings
+        # the mass of the cells was asked for: said with the results, not before each run
+        found += mass_warnings([body for body in scene.bodies if not body.exact_mass], self.ready.meshes)
         if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
             found.append(
                 f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic "
