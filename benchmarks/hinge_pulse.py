@@ -36,11 +36,11 @@ def rods(hinge: str, section: int, axis: str, pulse: float, duration: float) -> 
     elif hinge == "lug":
         inner, outer = mca.LugRod(**cells, start="flat", end="fork"), mca.LugRod(**cells)
         tied = {"nodes": "hole", "pin_radius": outer.hole_radius}
-    bodies = [mca.Body(name="OA", geometry=inner, material=METAL)]
+    bodies = [mca.Body(name="OA", geometry=inner, material=METAL, exact_mass=False)]
     joints = ()
     if hinge != "none":
         at: Any = (LENGTH, 0.0, 0.0)
-        bodies += [mca.Body(name="AB", geometry=outer, material=METAL, position=at)]
+        bodies += [mca.Body(name="AB", geometry=outer, material=METAL, position=at, exact_mass=False)]
         joints = (mca.Revolute(name="A", body="OA", at=at, other="AB", **tied),)
     times = tuple(pulse * i / 100 for i in range(101))
     speeds = tuple(-(math.sin(math.pi * t / pulse) ** 2) for t in times)

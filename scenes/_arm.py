@@ -54,7 +54,8 @@ def _bodies(
 ) -> tuple[mca.Body, ...]:
     """The rods, the last one with its tip, and the plate."""
     *inner, last = (
-        mca.Body(name=link, geometry=rod, material=materials["body"]) for link, rod in zip(links, rods, strict=True)
+        mca.Body(name=link, geometry=rod, material=materials["body"], exact_mass=False)
+        for link, rod in zip(links, rods, strict=True)  # published figures of these scenes are of the mass of its cells
     )
     tip = replace(last, material={"body": materials["body"], "tip": materials["tip"]})
     return (*inner, tip, plate)

@@ -30,15 +30,15 @@ def build(
     material = mca.Elastic(E=E, nu=nu, rho=rho)
     ring = max(2, section // 2)
     patch = {"section": section, "ring": ring, "pole_size": pole_size, "pole_layers": pole_layers}
-    sphere = mca.Sphere(radius=radius, part="quarter", **patch)  # pyright: ignore[reportArgumentType]
     moving = mca.Body(
         name="sphere",
-        geometry=sphere,
+        geometry=mca.Sphere(radius=radius, part="quarter", **patch),  # pyright: ignore[reportArgumentType]
         material=mca.Elastic(E=E_ratio * E, nu=nu, rho=rho),
         rigid=rigid_sphere,
         position=(0.0, radius, 0.0),
         rotation=(0.0, 0.0, -0.5 * math.pi),  # the pole points downwards
         velocity=(0.0, -v, 0.0),
+        exact_mass=False,  # published figures of this scene are of the mass of its cells
     )
     bodies = [moving]
     fixed = [mca.Fixed(body="sphere", nodes="ymin", axes="x"), mca.Fixed(body="sphere", nodes="zmin", axes="z")]

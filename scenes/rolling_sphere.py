@@ -42,6 +42,7 @@ def build(
         position=(0.0, radius - depth, 0.0),
         rotation=(0.0, 0.0, -0.5 * math.pi + 0.5 * turn),
         velocity=(v, 0.0, 0.0),
+        exact_mass=False,  # published figures of this scene are of the mass of its cells
     )
     duration = 1.5 * slide
     return mca.Scene(

@@ -188,7 +188,7 @@ OTHER_WAY = {"slave": mca.Surface(body="plate", nodes="ymax"), "master": mca.Sur
 def test_contact_of_rigid_bodies_keeps_momentum_and_energy(rigid: str, contact: dict[str, object]):
     impact = keeps_momentum(ball(rigid, **contact), axes=range(3))
     summary = result_of(impact).summary
-    assert summary["F_n_max"] > 1e3 and summary["energy_error"] < 2e-3
+    assert summary["F_n_max"] > 1e3 and summary["energy_error"] < 3e-3
     assert not summary["contact_open_at_end"] or summary["contacts"]
 
 

@@ -16,7 +16,9 @@ rod = mca.Rod(radius=taylor.RADIUS, length=taylor.LENGTH, tip="flat", **taylor.C
 copper = mca.J2Bilinear(E=taylor.E, nu=taylor.NU, rho=taylor.RHO, sigma_y=taylor.YIELD, E_t=taylor.E_T, beta=1.0)
 scene = mca.Scene(
     name="taylor",
-    bodies=(mca.Body(name="bar", geometry=rod, material=copper, element=element, kinematics="finite"),),
+    bodies=(
+        mca.Body(name="bar", geometry=rod, material=copper, element=element, kinematics="finite", exact_mass=False),
+    ),
     fixed=(mca.Fixed(body="bar", nodes="end", axes="x"),),
     impact=mca.ImpactPhase(duration=taylor.DURATION),
 )

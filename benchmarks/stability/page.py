@@ -48,9 +48,9 @@ WORDS = (
         "friction makes the cells under the tip vibrate: a lower `penalty` lessens it",
     ),
     (
-        "a moment of inertia of its nodes",
+        "moment of inertia of its nodes",
         "inertia",
-        "a rigid body turns with more inertia than its shape has: more cells",
+        "a body turns with more inertia than its shape has: more cells",
     ),
     ("went over to a face", "edge", "nodes went over to another face around a sharp edge"),
 )

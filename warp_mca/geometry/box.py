@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +42,11 @@ class Box:
         """The brick with `factor` times as many cells along each edge; even numbers stay even, for a middle plane."""
         return replace(self, divisions=tuple(refined_count(n, factor, even=n % 2 == 0) for n in self.divisions))
 
+    @property
+    def volume(self) -> float:
+        """Of the brick [m^3]."""
+        return math.prod(self.size)
+
     def build(self) -> Mesh:
         """The mesh, numbered with x running fastest, then y, then z."""
         nx, ny, nz = self.divisions
@@ -55,4 +61,5 @@ class Box:
             for side, where in (("min", 0), ("max", -1)):
                 node_sets[name + side] = index.take(where, axis=axis).ravel()
         points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-        return Mesh(points, hexahedra, node_sets, {"body": np.arange(len(hexahedra), dtype=np.int32)})
+        cells = np.arange(len(hexahedra), dtype=np.int32)
+        return Mesh(points, hexahedra, node_sets, {"body": cells}, volume_ratio=np.ones(1))

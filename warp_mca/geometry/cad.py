@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry.cad_volume import solid_volumes
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.gmsh_session import allow, gmsh_session
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.recipe import LIMIT
 from warp_mca.geometry.selection import Select, check_selections, with_selections
+from warp_mca.geometry.shape_volume import of_cells, with_ratios
 
 # Metres for one unit of the coordinates that gmsh gives: of STEP and IGES files, which name their unit, it gives mm.
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
@@ -72,6 +75,16 @@ class Cad:
         """The same part with tetrahedra `factor` times smaller."""
         return replace(self, size=self.size / factor)
 
+    @property
+    def volume(self) -> float | None:
+        """Of the solids in the file [m^3]; the part is meshed for it. None where triangles of an STL file face about.
+
+        Raises:
+            RequestError: as in `build`.
+        """
+        mesh = self.build()
+        return float(of_cells(mesh) @ volumes(mesh)) if len(mesh.volume_ratio) else None
+
     def build(self) -> Mesh:
         """Meshes the part, or takes its mesh from memory if the file is as it was.
 
@@ -115,7 +128,7 @@ def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mes
             raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
         allow(gmsh, _MESH + _reading(path) + _ELEMENT * count)
         gmsh.model.mesh.generate(3)
-        return _read(gmsh.model, scale)
+        return _read(gmsh.model, scale, scale**3 * solid_volumes(gmsh, path))
 
 
 def _reading(path: str | Path) -> float:
@@ -209,8 +222,8 @@ def _diagonal(gmsh: Any) -> float:
     return math.dist(box[:3], box[3:])
 
 
-def _read(model: Any, scale: float) -> Mesh:
-    """Collects tetrahedra and sets; nodes that no tetrahedron uses are left out."""
+def _read(model: Any, scale: float, exact: NDArray) -> Mesh:
+    """Collects tetrahedra and sets of solids of these volumes [m^3]; nodes that no tetrahedron uses are left out."""
     solids = [tag for _, tag in model.getEntities(3)]
     blocks = [model.mesh.getElementsByType(TETRAHEDRON.gmsh, tag)[1].reshape(-1, 4) for tag in solids]
     if not all(map(len, blocks)):
@@ -234,7 +247,12 @@ def _read(model: Any, scale: float) -> Mesh:
         first += len(block)
     cells = np.searchsorted(tags, np.concatenate(blocks)).astype(np.int32)
     tetrahedra = stored(points, cells, TETRAHEDRON.name)
-    return compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, tetrahedra))
+    mesh = compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, tetrahedra))
+    if not len(exact):
+        return mesh
+    counts = list(map(len, blocks))
+    own = np.add.reduceat(volumes(mesh), np.cumsum([0, *counts[:-1]]))
+    return with_ratios(mesh, np.repeat(exact / own, counts))
 
 
 def _name(model: Any, dim: int, tag: int) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MAX_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
 from warp_mca.geometry.integrals import INTEGRALS
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.shape_volume import divided
 
 Cells = NDArray[np.int32]
 
@@ -83,4 +84,4 @@ def tetrahedral(mesh: Mesh) -> Mesh:
     }
     none = np.zeros((0, HEXAHEDRON.corners), dtype=np.int32)
     tetrahedra = np.concatenate([cut, mesh.tetrahedra])[order].astype(np.int32)
-    return replace(mesh, hexahedra=none, cell_sets=cell_sets, tetrahedra=tetrahedra)
+    return divided(replace(mesh, hexahedra=none, cell_sets=cell_sets, tetrahedra=tetrahedra), mesh, np.sort(owner))

@@ -263,3 +263,23 @@ def lug(kind: Literal["fork", "eye"], section: int, ring: int) -> Mesh:
     x, y = mesh.points[:, 0], mesh.points[:, 1]
     sets = {"root": x > ROOT - WELD, "hole": np.hypot(x, y) < HOLE + WELD}
     return Mesh(mesh.points, mesh.hexahedra, {name: np.flatnonzero(it).astype(np.int32) for name, it in sets.items()})
+
+
+def lug_volume(kind: Literal["fork", "eye"]) -> float:
+    """Volume of a lug whose cells are infinitely small, without units of length: in cubes of the rod's radius.
+
+    The rod's end between the planes z = -a and a, with w^2 = 1 - z^2: half a disc of radius w, a rectangle 2 w wide up
+    to the shoulder, less the hole. The fork is what the eye would leave of the whole end.
+    """
+
+    def between(a: float) -> float:
+        rectangle = SHOULDER * 2.0 * (a * math.sqrt(1.0 - a * a) + math.asin(a))
+        return math.pi * (a - a**3 / 3.0) + rectangle - 2.0 * math.pi * HOLE**2 * a
+
+    root = math.pi * (ROOT - SHOULDER)
+    if kind == "eye":
+        return root + between(EYE)
+    behind = 2.0 / 3.0 * math.pi * (1.0 - (1.0 - HOLE**2) ** 1.5)  # of the hole, in the ball
+    angle = math.pi * (np.arange(64) + 0.5) / 64  # y = HOLE cos(angle): a smooth periodic integrand
+    beside = math.pi * HOLE**2 * float(np.mean(2.0 * np.sin(angle) ** 2 * np.sqrt(1.0 - (HOLE * np.cos(angle)) ** 2)))
+    return root + math.pi * (2.0 / 3.0 + SHOULDER) - behind - beside - between(SLOT)

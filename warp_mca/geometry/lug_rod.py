@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import HEXAHEDRON
-from warp_mca.geometry.lug import HOLE, ROOT, WELD, lug
+from warp_mca.geometry.lug import HOLE, ROOT, WELD, lug, lug_volume
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.rod import Rod
+from warp_mca.geometry.shape_volume import with_volumes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +66,12 @@ class LugRod(Rod):
         """Length of the cylinder without the lugs [m]."""
         return self._cylinder - len(self._ends) * ROOT * self.radius
 
+    @property
+    def _volumes(self) -> dict[str, float]:
+        lugs = [lug_volume(kind) for name in self._ends if (kind := getattr(self, name)) != "flat"]
+        body = math.pi * self.radius**2 * self._between_lugs + sum(lugs) * self.radius**3
+        return super()._volumes | {"body": body}
+
     def build(self) -> Mesh:
         """The mesh of a shorter `Rod`, with the lugs joined to its flat ends."""
         lugs = self._ends
@@ -78,7 +86,7 @@ class LugRod(Rod):
             turned = shape.hexahedra[:, list(HEXAHEDRON.mirrored)]
             points = shape.points * [-1.0, 1.0, 1.0] + [self.length, 0.0, 0.0]
             mesh = _joined(mesh, Mesh(points, turned, shape.node_sets), "end", "end_hole")
-        return mesh
+        return with_volumes(mesh, self._volumes)
 
     def _lug(self, kind: Literal["flat", "fork", "eye"]) -> Mesh:
         assert kind != "flat"

@@ -25,6 +25,8 @@ class Mesh:
         cell_sets: named cell indices, each shape (count,), int32.
         tetrahedra: node indices in VTK order, shape (tetrahedron_count, 4), int32.
         notes: what the reader of its file left out, a sentence each; a run has them among its warnings.
+        volume_ratio: volume of the shape that the mesh stands for over that of its cells [-], shape (cell_count,), or
+            (1,) where it is one for all cells, float64; empty where nothing is known of a shape but its cells.
     """
 
     points: NDArray[np.float64]
@@ -33,6 +35,7 @@ class Mesh:
     cell_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     tetrahedra: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
     notes: tuple[str, ...] = ()
+    volume_ratio: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def cells(self) -> dict[str, NDArray[np.int32]]:

@@ -17,6 +17,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.parts import Part, Parts
 from warp_mca.geometry.recipe import check_size
 from warp_mca.geometry.refinement import refined_count
+from warp_mca.geometry.shape_volume import with_volumes
 
 Array = NDArray[np.float64]
 Axes = tuple[Array, Array, Array]
@@ -148,6 +149,11 @@ class NestedPlate:
         before[0] = -end
         return np.concatenate([before, hole, -before[::-1]])
 
+    @property
+    def volume(self) -> float:
+        """Of the plate [m^3]."""
+        return self.length * self.width * self.height
+
     def build(self) -> Mesh:
         """The mesh: the boxes one after the other, from the core outwards."""
         boxes = self._boxes()
@@ -174,7 +180,8 @@ class NestedPlate:
         tied = {name for pair in self.tied for name in pair}
         node_sets = {name: nodes for name, nodes in whole.node_sets.items() if name in tied}
         node_sets |= {name: np.flatnonzero(where).astype(np.int32) for name, where in places.items()}
-        return Mesh(whole.points, whole.hexahedra, node_sets, {"body": whole.cell_sets["body"]})
+        mesh = Mesh(whole.points, whole.hexahedra, node_sets, {"body": whole.cell_sets["body"]})
+        return with_volumes(mesh, self.volume)
 
 
 def _grid(axes: Axes, hole: Axes | None) -> Mesh:

@@ -11,6 +11,7 @@ from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined
+from warp_mca.geometry.shape_volume import built, of_cells, with_ratios
 
 if TYPE_CHECKING:
     from warp_mca.geometry.recipe import Recipe
@@ -68,7 +69,10 @@ class Parts:
 
     def build(self) -> Mesh:
         """The mesh: nodes of the parts one after the other; of the cells first all hexahedra, then all tetrahedra."""
-        meshes = [part.geometry if isinstance(part.geometry, Mesh) else part.geometry.build() for part in self.parts]
+        meshes = [
+            part.geometry if isinstance(part.geometry, Mesh) else built(f"Part {part.name}.geometry", part.geometry)
+            for part in self.parts
+        ]
         nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
         hexahedra = np.cumsum([0, *(len(mesh.hexahedra) for mesh in meshes)])
         tetrahedra = hexahedra[-1] + np.cumsum([0, *(len(mesh.tetrahedra) for mesh in meshes)])
@@ -83,7 +87,7 @@ class Parts:
                 moved = np.where(members < count, members + hexahedra[k], members - count + tetrahedra[k])
                 for key in (f"{part.name}.{name}", name):
                     cell_sets.setdefault(key, []).append(moved)
-        return Mesh(
+        whole = Mesh(
             np.concatenate([mesh.points + np.asarray(p.at) for p, mesh in zip(self.parts, meshes, strict=True)]),
             np.concatenate([mesh.hexahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
             {name: np.concatenate(items).astype(np.int32) for name, items in node_sets.items()},
@@ -91,3 +95,7 @@ class Parts:
             np.concatenate([mesh.tetrahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
             notes=tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes)),
         )
+        if not any(len(mesh.volume_ratio) for mesh in meshes):
+            return whole
+        split = [np.split(of_cells(mesh), [len(mesh.hexahedra)]) for mesh in meshes]
+        return with_ratios(whole, np.concatenate([part[kind] for kind in (0, 1) for part in split]))

@@ -14,6 +14,7 @@ from warp_mca.geometry.blocks import Blocks, growth
 from warp_mca.geometry.edit import mirror, snapped
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined_count
+from warp_mca.geometry.shape_volume import with_volumes
 
 _FIRST_STEP = 1.5  # growth starts from this many fine edges; 1 costs a tenth of the stable step in fine meshes
 
@@ -108,6 +109,11 @@ class Plate:
     def _half_box(self) -> float:
         return min(0.5 * self.length, 0.5 * self.width, self.height) if self.box is None else self.box
 
+    @property
+    def volume(self) -> float:
+        """Of the plate, or of its part [m^3]."""
+        return self.length * self.width * self.height * (1.0 if self.part == "whole" else 0.25)
+
     def build(self) -> Mesh:
         """The mesh: one quarter by gmsh, mirrored twice for the whole."""
         mesh = self._quarter()
@@ -126,7 +132,7 @@ class Plate:
         near = np.abs(points[:, [0, 2]]).max(axis=1) <= self._contact * (1.0 + 1e-9)
         sets["contact"] = np.flatnonzero((points[:, 1] == 0.0) & near)
         node_sets = {name: nodes.astype(np.int32) for name, nodes in sets.items()}
-        return Mesh(points, mesh.hexahedra, node_sets, mesh.cell_sets)
+        return with_volumes(Mesh(points, mesh.hexahedra, node_sets, mesh.cell_sets), self.volume)
 
     def _quarter(self) -> Mesh:
         """The part with x >= 0 and z >= 0; corners are indexed by their place along x, down and along z."""

@@ -149,6 +149,10 @@ def check_whole(mesh: Mesh, name: str) -> None:
     if not used.all():
         idle = int(np.argmin(used))
         raise bad_value(f"body {name}: Mesh.points", idle, "this node is in no cell; leave it out of the mesh")
+    ratio = mesh.volume_ratio
+    if not (_is_array(ratio, "f", 1) and len(ratio) in (0, 1, mesh.cell_count) and (ratio > 0.0).all()):
+        remedy = f"give a positive number for each of the {mesh.cell_count} cells or one for all, or leave it out"
+        raise bad_value(f"body {name}: Mesh.volume_ratio", _what(ratio), remedy)
     for kind, sets, count in (("node", mesh.node_sets, len(points)), ("cell", mesh.cell_sets, mesh.cell_count)):
         owner = f"body {name}: Mesh.{kind}_sets"
         if not isinstance(sets, Mapping):

@@ -18,7 +18,8 @@ class Recipe(Protocol):
     """A frozen dataclass of plain numbers that can make its mesh; equal recipes make equal meshes.
 
     For `refine` it also has a method `refined(factor)`: the recipe of a mesh whose cells are `factor` times smaller
-    everywhere.
+    everywhere. It may have an attribute `volume`, that of its shape [m^3], which a mesh of flat cells falls short of:
+    `Body.exact_mass` gives the body the mass of that.
     """
 
     def build(self) -> Mesh:

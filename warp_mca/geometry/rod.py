@@ -17,6 +17,7 @@ from warp_mca.geometry.hemisphere import DEPTH_LIMIT, FOCUS_LIMIT, PATCH_LIMIT, 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined_count
 from warp_mca.geometry.rings import bands, disc, join
+from warp_mca.geometry.shape_volume import with_volumes
 
 _FOCUS_SIZE = 0.28  # default edge of the fine cells, times the cells along the section's core [radius]
 
@@ -113,6 +114,17 @@ class Rod:
             return finer
         return replace(finer, focus_size=min(self.focus_size / factor, finer._largest_focus_size))
 
+    @property
+    def volume(self) -> float:
+        """Of the rod [m^3]."""
+        return sum(self._volumes.values())
+
+    @property
+    def _volumes(self) -> dict[str, float]:
+        """Of the shape in each cell set [m^3]."""
+        found = {"body": math.pi * self.radius**2 * self._cylinder}
+        return found | ({"tip": 2.0 / 3.0 * math.pi * self.radius**3} if self.tip == "hemisphere" else {})
+
     def build(self) -> Mesh:
         """The mesh: one half by gmsh, mirrored; the nodes that others rely on are put exactly in their places."""
         mesh = mirror(self._half(), 2)
@@ -121,7 +133,7 @@ class Rod:
             points = self._rounded(points, mesh.nodes("tip"))
         for axis, place in ((0, 0.0), (0, self._cylinder), (0, self.length), (1, 0.0)):
             points = snapped(points, axis, place)
-        return Mesh(points, mesh.hexahedra, mesh.node_sets, mesh.cell_sets)
+        return with_volumes(Mesh(points, mesh.hexahedra, mesh.node_sets, mesh.cell_sets), self._volumes)
 
     def _rounded(self, points: NDArray[np.float64], tip: NDArray[np.int32]) -> NDArray[np.float64]:
         """Points with the tip's nodes on the sphere, and one node each at its centre and at the focus."""

@@ -16,6 +16,7 @@ from warp_mca.geometry.hemisphere import DEPTH_LIMIT, PATCH_LIMIT, Hemisphere
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined_count
 from warp_mca.geometry.rings import SIDES, Ring, bands, bowed_face, disc, join
+from warp_mca.geometry.shape_volume import with_volumes
 
 _CAP_ANGLE = 0.67  # half the angle that the coarse cap opposite the pole spans [rad]
 _CAP_RADIUS = 0.69  # from the centre to the inner corners of that cap [radius]
@@ -83,6 +84,11 @@ class Sphere:
             return finer
         return replace(finer, pole_size=min(self.pole_size / factor, finer._largest_size))
 
+    @property
+    def volume(self) -> float:
+        """Of the ball, or of its part [m^3]."""
+        return 4.0 / 3.0 * math.pi * self.radius**3 / {"whole": 1, "half": 2, "quarter": 4}[self.part]
+
     def build(self) -> Mesh:
         """The mesh: one half by gmsh, mirrored or cut."""
         mesh = self._half()
@@ -99,7 +105,7 @@ class Sphere:
         node_sets = {name: mesh.node_sets[name] for name in ("surface", "pole")}
         node_sets |= {name: np.flatnonzero(mesh.points[:, k] == 0.0).astype(np.int32) for name, k in cuts.items()}
         cells = np.arange(len(mesh.hexahedra), dtype=np.int32)
-        return Mesh(mesh.points, mesh.hexahedra, node_sets, {"body": cells})
+        return with_volumes(Mesh(mesh.points, mesh.hexahedra, node_sets, {"body": cells}), self.volume)
 
     def _half(self) -> Mesh:
         """The half with z >= 0."""

@@ -102,7 +102,7 @@ def _face_matrices(parts: Assembly, item: Absorbing, face: Index, element: Index
     moduli are those of the element behind the face.
     """
     centre = _centre(parts, item)
-    rho = np.array([material.rho for material in parts.materials])[parts.material[element]]
+    rho = parts.rho[element]
     c_p = np.sqrt((parts.K[element] + 4.0 / 3.0 * parts.G[element]) / rho)
     c_s = np.sqrt(parts.G[element] / rho)
     x, found = parts.X[face], np.zeros((2, len(face), 4, 3, 3))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.cells import Cells, body_cells, body_materials, element_masses, sum_to_nodes
+from warp_mca.model.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
 from warp_mca.model.patches import PATCH, compact_order
 from warp_mca.model.stable_step import StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.surfaces import Faces, make_faces
@@ -74,7 +74,7 @@ class Assembly:
         X: positions [m], shape (node_count, 3).
         cells: the elements by formulation and strain measure.
         materials: those of the scene; `material` is each element's index among them.
-        K, G: moduli [Pa], and volume [m^3], of each element.
+        K, G: moduli [Pa] of each element; rho: its density [kg/m^3], see `densities`; volume: of its mesh [m^3].
         rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
         mass: lumped masses [kg], shape (node_count,).
         relief: divisor of each node's mass in eigenvalues [-], shape (node_count,), see `TiedNodes.relief`; None
@@ -104,13 +104,13 @@ class Assembly:
                 self.material[cells + self.element_start[body.name]] = self.materials.index(material)
         self.K = np.array([m.bulk_modulus for m in self.materials])[self.material]
         self.G = np.array([m.shear_modulus for m in self.materials])[self.material]
-        rho = np.array([m.rho for m in self.materials])[self.material]
+        self.rho = np.concatenate([densities(body, meshes[body.name]) for body in scene.bodies])
         self.volume = np.empty(elements)
         self.mass = np.zeros(nodes)
         self.element_mass = []
         for part in self.cells:
-            mass = element_masses(part, self.X, rho)
-            self.volume[part.index] = mass.sum(axis=1) / rho[part.index]
+            mass = element_masses(part, self.X, self.rho)
+            self.volume[part.index] = mass.sum(axis=1) / self.rho[part.index]
             self.element_mass.append(mass)
             self.mass += sum_to_nodes(part.conn, mass, nodes)
 

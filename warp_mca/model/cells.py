@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.elements import ELEMENTS, Element, default_element
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.shape_volume import of_cells
 from warp_mca.model.tied_nodes import within_bodies
 from warp_mca.scene import Body, Scene
 from warp_mca.scene.materials import Material
@@ -47,6 +48,15 @@ def body_materials(body: Body, mesh: Mesh) -> list[tuple[Material, Index]]:
     if (owner < 0).any():
         raise bad_value(f"Body {body.name}.material", [n for n, _ in listed], "some cells have none; add a '*' entry")
     return [(m, np.flatnonzero(owner == k).astype(np.int32)) for k, (_, m) in enumerate(listed)]
+
+
+def densities(body: Body, mesh: Mesh) -> Array:
+    """Density of each cell [kg/m^3], shape (cell_count,), float64: with `Body.exact_mass`, times the volume of the
+    shape over that of its cells."""
+    rho = np.empty(mesh.cell_count)
+    for material, cells in body_materials(body, mesh):
+        rho[cells] = material.rho
+    return rho * of_cells(mesh) if body.exact_mass else rho
 
 
 @dataclass(frozen=True)
@@ -106,9 +116,7 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
     masses = {}
     for body in scene.bodies:
         mesh = meshes[body.name]
-        rho = np.empty(mesh.cell_count)
-        for material, cells in body_materials(body, mesh):
-            rho[cells] = material.rho
+        rho = densities(body, mesh)
         total = np.zeros(len(mesh.points))
         for part in body_cells(body, mesh):
             total += sum_to_nodes(part.conn, element_masses(part, mesh.points, rho), len(total))

@@ -13,6 +13,7 @@ from warp_mca.geometry import Box, Mesh, NestedPlate, Parts, Plate, Rod, Sphere
 from warp_mca.geometry.quality import doubled_nodes, pieces
 from warp_mca.model.surfaces import face_geometry
 from warp_mca.model.tied_nodes import tie_warnings
+from warp_mca.runs.mass_report import mass_warnings
 from warp_mca.runs.unit_warnings import unit_warnings
 from warp_mca.scene import Prismatic, RigidPlane, Weld
 
@@ -73,7 +74,9 @@ def mesh_warnings(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> lis
                 f"faces of the slave {contact.slave.body} are {ratio:.2g} times as wide as those of its master, "
                 "whose nodes pass between its own: make the finer side the slave, or set two_way"
             )
-    return found + _loose_nodes(scene, meshes, model) + tie_warnings(model.ties) + unit_warnings(scene, meshes, model)
+    found += mass_warnings([body for body in scene.bodies if body.exact_mass], meshes)
+    found += _loose_nodes(scene, meshes, model) + tie_warnings(model.ties)
+    return found + unit_warnings(scene, meshes, model)
 
 
 def _loose_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> list[str]:

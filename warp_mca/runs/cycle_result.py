@@ -16,6 +16,7 @@ from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.cycle_rows import STORED, Columns, Story, tell_story
 from warp_mca.runs.cycle_sensors import cycle_records
 from warp_mca.runs.cycle_setup import Setup
+from warp_mca.runs.mass_report import body_report
 from warp_mca.runs.parts import ImpactPart, Part
 
 Array = NDArray[np.float64]
@@ -35,8 +36,10 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     history = {"time_s": history.pop("t") - t_contact, **history}
     contacts = _contacts(setup, results, story)
     warnings = [NOTHING] if not impacts else []
+    common = set.intersection(*(set(result.warnings) for result in results)) if results else set()
+    warnings += [w for w in results[0].warnings if w in common] if results else []
     for k, result in enumerate(results, 1):
-        warnings += [w if len(results) == 1 else f"impact {k}: {w}" for w in result.warnings]
+        warnings += [f"impact {k}: {w}" for w in result.warnings if w not in common]
     stopped = [part.stopped for part in parts if part.stopped]
     summary = results[0].summary if results else _without_impact(setup, history)
     summary = {**summary, **_of_all(setup, impacts, story, results, contacts, t_contact)}
@@ -108,7 +111,11 @@ def _without_impact(setup: Setup, history: Columns) -> dict[str, Any]:
         parameters=scene.parameters,
         theta=tuple(float(x) for x in start.theta),
         theta_dot=tuple(float(x) for x in start.theta_dot),
-        more={"energy_drift_rigid": start.energy_drift, "refine": scene.refine},
+        more={
+            "energy_drift_rigid": start.energy_drift,
+            "refine": scene.refine,
+            "bodies": body_report(scene.bodies, setup.meshes),
+        },
     )
     return summarise(history, facts)
 

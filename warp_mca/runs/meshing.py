@@ -11,6 +11,7 @@ from warp_mca.elements import ELEMENTS
 from warp_mca.geometry.degenerate import cut_to
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined
+from warp_mca.geometry.shape_volume import built
 from warp_mca.runs.arguments import check_scene
 from warp_mca.scene import Body, Scene
 
@@ -90,7 +91,7 @@ def _build(scene: Scene, body: Body, geometry: object) -> Mesh:
     """
     field, recipe = f"Body {body.name}.geometry", type(geometry).__name__
     try:
-        made = validate.call(field, recipe, "build()", lambda: getattr(geometry, "build")())  # noqa: B009
+        made = validate.call(field, recipe, "build()", lambda: built(field, geometry))  # type: ignore[arg-type]
     except RequestError as error:
         raise (error if geometry == body.geometry else _of_refine(scene, body, error)) from error
     validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")

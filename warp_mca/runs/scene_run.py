@@ -22,7 +22,7 @@ from warp_mca.runs.flutter_warnings import flutter_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.inertia_warnings import inertia_warnings
 from warp_mca.runs.ledger import Ledger
-from warp_mca.runs.mass_report import mass_report
+from warp_mca.runs.mass_report import body_report, mass_report, mass_warnings
 from warp_mca.runs.passing import Pair, pairs_of, passed, passing_warnings
 from warp_mca.runs.rate_groups import rate_figures
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
@@ -161,7 +161,7 @@ class SceneRun:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
-        more |= mass_report(scene, model)
+        more |= {"bodies": body_report(scene.bodies, self.ready.meshes), **mass_report(scene, model)}
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
         if any(model.penalties):
@@ -229,7 +229,10 @@ class SceneRun:
         scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
         found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
         if stopped is None:
-            stiffened, depths = self.look(np.asarray(self.state.u.numpy(), dtype=np.float64))
+            u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
+            stiffened, depths = self.look(u)
+            nodes = slice(*self.solver.layout.nodes[self.index : self.index + 2])
+            found += inertia_warnings(self.ready, u[nodes], v[nodes])
             found += bending_warnings(self.ready.model, stiffened, ledger.kept.exchanged)
             found += passing_warnings(self.pairs, depths)
         tolerance = scene.impact.energy_tolerance
@@ -248,11 +251,11 @@ class SceneRun:
         depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
         found += soft_springs(shares, scene.contacts)
         found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths, scene.rigid_names)
-        if scene.rigid_names:
-            found += inertia_warnings(self.ready, self.solver.model.rigid_bodies, self.state, self.index)
         kinetic, time = ledger.kept.initial_kinetic, self.steps.dt * self.state.steps
         found += start_warnings(scene, self.ready.meshes, self.ready.model, kinetic, time)
         found += self.ready.warnings
+        # the mass of the cells was asked for: said with the results, not before each run
+        found += mass_warnings([body for body in scene.bodies if not body.exact_mass], self.ready.meshes)
         if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
             found.append(
                 f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic "

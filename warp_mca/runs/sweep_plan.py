@@ -167,7 +167,8 @@ def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
     span = impact.duration if options.duration is None else options.duration
     digest = hashlib.sha256()
     for body in scene.bodies:
-        _feed(digest, (body.name, body.geometry, _elastic(body), body.element, body.kinematics, body.rigid))
+        key = body.name, body.geometry, _elastic(body), body.element, body.kinematics, body.rigid, body.exact_mass
+        _feed(digest, key)
     for contact in scene.contacts:
         _feed(digest, _contact_key(contact))
     _feed(digest, (scene.refine, impact.time_step_scale, impact.mass_scaling))

@@ -40,6 +40,10 @@ class Body:
         rigid: whether it moves as a rigid body in the impact phase: its elements are not computed, and `material` gives
             its mass and the stiffness of contact springs alone. Its inertia is that of its nodes: for a brick of n
             cells along each edge 2 / n^2 above that of its volume.
+        exact_mass: whether masses of nodes are scaled to the volume of the shape that the recipe or CAD file describes,
+            where the mesh knows it (`Mesh.volume_ratio`): flat cells fill a round body less than fully. Momentum,
+            impulse, weight and moments of inertia then scale alike; waves are slower by half of the share. False: the
+            mass of the cells.
     """
 
     name: str
@@ -52,6 +56,7 @@ class Body:
     velocity: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
     rigid: bool = False
+    exact_mass: bool = True
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -67,7 +72,7 @@ class Body:
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         if self.kinematics not in ("corotational", "finite"):
             raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
-        validate.flags(f"Body {self.name}", rigid=self.rigid)
+        validate.flags(f"Body {self.name}", rigid=self.rigid, exact_mass=self.exact_mass)
         validate.vectors(
             f"Body {self.name}",
             position=self.position,
