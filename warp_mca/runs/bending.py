@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ERROR = 0.03  # of deflections, from which on a word is said
-JUMPING = 0.1  # the same of tet4, whose strain jumps where it is not bent, too
-PLASTIC = 0.1  # error of the plastic moment, from which on a word is said
+# Error of deflections, and of the plastic moment, from which on a word is said. Of two bodies that strike, forces and
+# times go with the root of the stiffness at most; strains of wedges and tet4 jump where they are not bent, too.
+ERROR, STRUCK, JUMPING, PLASTIC = 0.03, 0.2, 0.1, 0.1
 MISSING = 0.02  # share of strain energy in bending stresses beyond yield that do not yield, likewise
 # Cells of a body up to which all are looked at, and how many, evenly spread, of more: where strain jumps those around
 # them count, too, and all of 80,000 take 0.2 s.
@@ -112,7 +112,7 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
     return np.where(more, found, before)
 
 
-def bending_warnings(model: Model, bent: Array, exchanged: float, energy: float) -> Iterator[str]:
+def bending_warnings(model: Model, bent: Array, exchanged: float, energy: float, struck: bool = False) -> Iterator[str]:
     """A sentence for each body whose cells do not bend right.
 
     Args:
@@ -120,27 +120,30 @@ def bending_warnings(model: Model, bent: Array, exchanged: float, energy: float)
         bent: energies of its bodies, as `SceneRecords.stiffened` has them; empty without cells that can be so.
         exchanged: energy that bodies exchanged [J].
         energy: greatest of all energy that there was [J].
+        struck: whether bodies touched.
     """
     for name, sums in zip(model.element_start, bent, strict=False):
-        if sums[SPENT] > max(LEAST * exchanged, FREE * energy) and (found := _said(model, name, sums)):
+        if sums[SPENT] > max(LEAST * exchanged, FREE * energy) and (found := _said(model, name, sums, struck)):
             yield found
 
 
-def _said(model: Model, name: str, sums: Array) -> str:
+def _said(model: Model, name: str, sums: Array, struck: bool) -> str:
     """What cells do to the bending of the body with these `sums`; empty where that is right."""
     elements, wedge, yields = _kinds(model, name)
-    error, limit = sums[RIGHT] / sums[SPENT] - 1.0, JUMPING if elements == {"tet4"} else ERROR
+    error = sums[RIGHT] / sums[SPENT] - 1.0
+    limit = STRUCK if struck else JUMPING if wedge or "tet4" in elements else ERROR
     found = []
     if abs(error) > limit:
         flexible = "flexible in bending, its deflections" if error > 0.0 else "stiff in bending, its deflections"
-        jumps = " and in jumps of strain between them" if wedge or "tet4" in elements else ""
+        jumps = "in jumps of strain between cells" if wedge or "tet4" in elements else ""
+        single = "in bending of single cells" if elements != {"tet4"} else ""
         found.append(
             f"{' and '.join(sorted(elements))} makes {name} too {flexible} about {abs(error):.0%} too "
             f"{'large' if error > 0.0 else 'small'}: {sums[BENT] / sums[SPENT]:.0%} of the strain energy of {name} lay "
-            f"in bending of single cells{jumps} when it was greatest"
+            f"{' and '.join(filter(None, (single, jumps)))} when it was greatest"
         )
     flow = sums[FLOWING] / sums[FLOW] if sums[FLOW] > 0.0 else 1.0
-    if abs(flow - 1.0) > PLASTIC:
+    if abs(flow - 1.0) > (STRUCK if struck else PLASTIC):
         found.append(
             f"cells of {name} yield too {'early' if flow < 1.0 else 'late'} in bending, at about {flow:.2f} times the "
             "plastic moment"

@@ -231,7 +231,8 @@ class SceneRun:
         found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
         if stopped is None:
             stiffened, depths = self.look(np.asarray(self.state.u.numpy(), dtype=np.float64))
-            found += bending_warnings(self.ready.model, stiffened, ledger.kept.exchanged, ledger.kept.energy_scale)
+            kept = ledger.kept
+            found += bending_warnings(self.ready.model, stiffened, kept.exchanged, kept.energy_scale, kept.touched)
             found += passing_warnings(self.pairs, depths)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
