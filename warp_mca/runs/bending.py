@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 # Error of deflections, and of the plastic moment, from which on a word is said. Of two bodies that strike, forces and
 # times go with the root of the stiffness at most; strains of wedges and tet4 jump where they are not bent, too.
-ERROR, STRUCK, JUMPING, PLASTIC = 0.03, 0.2, 0.1, 0.1
+ERROR, STRUCK, JUMPING, PLASTIC = 0.03, 0.2, 0.08, 0.1
 MISSING = 0.02  # share of strain energy in bending stresses beyond yield that do not yield, likewise
 # Cells of a body up to which all are looked at, and how many, evenly spread, of more: where strain jumps those around
 # them count, too, and all of 80,000 take 0.2 s.

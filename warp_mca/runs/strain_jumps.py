@@ -61,16 +61,17 @@ class Wedges:
 
     Attributes:
         X: positions of their six corners [m], shape (6, 3, cell_count), float64.
-        inverse: of two edges of the mean triangle and half the axis, in columns [1/m], shape (3, 3, cell_count).
-        normal: of the triangle [-], shape (3, cell_count).
-        half: half the length of the axis [m], shape (cell_count,).
-        moment: mean of x x over the triangle, about its centre [m^2], shape (3, 3, cell_count).
-        volume: [m^3], shape (cell_count,).
-        stiffness: of `hex8r` in their stored corners [N/m], shape (cell_count, 24, 24), or None with `hex8`.
+        inverse: of two edges of the mean triangle and half the axis, in columns [1/m], shape (3, 3, cell_count),
+            float64.
+        normal: of the triangle [-], shape (3, cell_count), float64.
+        half: half the length of the axis [m], shape (cell_count,), float64.
+        moment: mean of x x over the triangle, about its centre [m^2], shape (3, 3, cell_count), float64.
+        volume: [m^3], shape (cell_count,), float64.
+        stiffness: of `hex8r` in their stored corners [N/m], shape (cell_count, 24, 24), float64; None with `hex8`.
     """
 
     X: Array
-    inverse: Array
+    inverse: NDArray[np.floating]
     normal: Array
     half: Array
     moment: Array
