@@ -29,7 +29,8 @@ ERROR, STRUCK, JUMPING, PLASTIC = 0.03, 0.2, 0.08, 0.1
 MISSING = 0.02  # share of strain energy in bending stresses beyond yield that do not yield, likewise
 # Cells of a body up to which all are looked at, and how many, evenly spread, of more: where strain jumps those around
 # them count, too, and all of 80,000 take 0.2 s.
-WHOLE, SAMPLE = {False: 1024, True: 16_384}, {False: 1024, True: 256}
+WHOLE, SAMPLE = {False: 1024, True: 16_384}, {False: 512, True: 256}
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
 FREE = 1e-4  # of all energy: rounding leaves less in bodies that move free of stress
 LOOKS = 8  # in a run, besides that at its end
@@ -69,12 +70,18 @@ def _sample(
 ) -> Cells:
     """The cells to look at out of the body's `own` ones of one material and type."""
     jumps = wedge or block.element == "tet4"
-    chosen = own if len(own) <= WHOLE[jumps] else own[:: -(-len(own) // SAMPLE[jumps])]
+    chosen = own if len(own) <= WHOLE[jumps] else own[_spread(len(own), SAMPLE[jumps])]
     cells = _with_neighbours(block.conn, chosen, own) if jumps else chosen
     K, G = model.law[material, :2]
     energies, prepare = _ENERGIES[block.element, wedge]
     share = len(own) / len(chosen)
     return Cells(body, energies, block.conn[:, cells].T, len(chosen), K, G, sigma_y, share, model.X, prepare)
+
+
+def _spread(total: int, count: int) -> NDArray[np.intp]:
+    """So many numbers below `total`, one at a varying place of each equal part: even steps would follow the layers."""
+    k = np.arange(count)
+    return np.floor((k + k * GOLDEN % 1.0) * (total / count)).astype(np.intp)
 
 
 def _wedges(block: Block) -> NDArray[np.bool_]:

@@ -94,66 +94,84 @@ def full_hexahedra(u: Array, cells: Cells) -> Array:
     """What `bent_cells` names of cells of `hex8` that are looked at, shape (COLUMNS,)."""
     bricks, strain, p = _strains(u, cells)
     G, V = cells.G, bricks.volume
-    common = _common(strain, p, bricks, cells.K, G)
-    bent, free, driven = _bending(p, bricks, G, cells.nu)
+    common, modes = _common(strain, p, bricks, cells.K, G), _modes(p, bricks, G)
+    bent = V / 6.0 * _spent(modes)
     spent = common + bent
-    right = common + _shared(bent, free, driven, spent)
+    right = common + V / 6.0 * _right(modes, G, cells.nu, bent / np.maximum(spent, _LITTLE))
     found = np.zeros(COLUMNS)
     found[:3] = right.sum(), spent.sum(), bent.sum()
     if cells.sigma_y > 0.0:
-        bent, free, driven = _bending(p, bricks, G, 0.5)  # flow keeps volumes
-        mean = np.sqrt(2.0 / 3.0 * deviator_square(strain))
-        point = np.sqrt(2.0 / 3.0 * bent / (G * V))
-        outer = np.sqrt(2.0 * _shared(bent, free, driven, bent + G * V * 1.5 * mean**2) / (G * V))
-        flows = 3.0 * G * np.maximum(mean + point, mean + outer) > cells.sigma_y
-        found[3:5] = V[flows] @ _flowing(mean, point)[flows], V[flows] @ _flow(mean, outer)[flows]
+        mean, point = np.sqrt(2.0 / 3.0 * deviator_square(strain)), np.sqrt(2.0 / 3.0 * bent / (G * V))
+        if 3.0 * G * (mean + 3.0 * point).max() > cells.sigma_y:  # right strains at the surface are no larger
+            share = point**2 / np.maximum(mean**2 + point**2, _LITTLE)
+            outer = np.sqrt(_right(modes, G, 0.5, share) / (3.0 * G))  # flow keeps volumes
+            flows = 3.0 * G * (mean + np.maximum(point, outer)) > cells.sigma_y
+            found[3:5] = V[flows] @ _flowing(mean, point)[flows], V[flows] @ _flow(mean, outer)[flows]
     return found
 
 
 def one_point_hexahedra(u: Array, cells: Cells) -> Array:
     """What `bent_cells` names of cells of `hex8r` that are looked at, shape (COLUMNS,)."""
     bricks, strain, p = _strains(u, cells)
-    common, (_, _, driven) = _common(strain, p, bricks, cells.K, cells.G), _bending(p, bricks, cells.G, cells.nu)
+    common, modes = _common(strain, p, bricks, cells.K, cells.G), _modes(p, bricks, cells.G)
+    bent = bricks.volume / 6.0 * _driven(modes, cells.G, cells.nu)
     found = np.zeros(COLUMNS)
-    found[:2] = (common + driven).sum()
-    found[2] = driven.sum()
+    found[:2] = (common + bent).sum()
+    found[2] = bent.sum()
     if cells.sigma_y > 0.0:
         mean = cells.G * np.sqrt(6.0 * deviator_square(strain)) / cells.sigma_y
-        outer = mean + np.sqrt(6.0 * cells.E * driven / bricks.volume) / cells.sigma_y
-        found[5] = (driven * np.clip(outer - 1.0, 0.0, 1.0))[mean < 1.0].sum()
+        outer = mean + np.sqrt(6.0 * cells.E * bent / bricks.volume) / cells.sigma_y
+        found[5] = (bent * np.clip(outer - 1.0, 0.0, 1.0))[mean < 1.0].sum()
     return found
 
 
-def _shared(bent: Array, free: Array, driven: Array, spent: Array) -> Array:
-    """Energy of right bending [J]: `driven` by the strain of the body where that has most of it, `free` without."""
-    share = bent / np.maximum(spent, _LITTLE)
-    return share * free + (1.0 - share) * driven
+Modes = list[tuple[Array, Array, Array, Array]]  # e_i, e_j and the forces f_i, f_j of hex8 against them, by edge k
 
 
-def _bending(p: Array, bricks: Bricks, G: float, nu: float) -> tuple[Array, Array, Array]:
-    """Energies of bending [J], shape (cell_count,) each: of hex8, and right ones for strains that are free and driven.
-
-    Free: where hex8 bends freely across (a force f_j against e_j), the right strain e_j is the one that springs of
-    stiffness -f_j/e_j leave, which stand for what lies around; otherwise the one that does the same work.
-    Driven: with the strains that hex8 has.
-    """
-    plane, E, h = 2.0 * G / (1.0 - nu), 2.0 * G * (1.0 + nu), bricks.half
-    bent, free, driven = (np.zeros_like(bricks.volume) for _ in range(3))
+def _modes(p: Array, bricks: Bricks, G: float) -> Modes:
+    """Strains of bending [-], and forces of hex8 against them over a third of the volume [Pa]."""
+    found, h = [], bricks.half
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         e_i, e_j = p[j, i] / h[i], p[i, j] / h[j]
         f_i = G * ((4.0 / 3.0 + (h[i] / h[k]) ** 2) * e_i - 2.0 / 3.0 * e_j)
         f_j = G * ((4.0 / 3.0 + (h[j] / h[k]) ** 2) * e_j - 2.0 / 3.0 * e_i)
-        work = f_i * e_i + f_j * e_j
-        bent += work
-        driven += plane * (e_i**2 + e_j**2 + 2.0 * nu * e_i * e_j)
-        left_i = np.where(f_i * e_i < 0.0, -nu * plane * e_j * e_i / (plane * e_i - f_i), e_i)
-        left_j = np.where(f_j * e_j < 0.0, -nu * plane * e_i * e_j / (plane * e_j - f_j), e_j)
+        found.append((e_i, e_j, f_i, f_j))
+    return found
+
+
+def _spent(modes: Modes) -> Array:
+    """Energy of bending of hex8 over V/6 [Pa]."""
+    return sum((f_i * e_i + f_j * e_j for e_i, e_j, f_i, f_j in modes), np.zeros_like(modes[0][0]))
+
+
+def _driven(modes: Modes, G: float, nu: float) -> Array:
+    """Right energy of bending with the strains of hex8, over V/6 [Pa]."""
+    found = sum((e_i**2 + e_j**2 + 2.0 * nu * e_i * e_j for e_i, e_j, _, _ in modes), np.zeros_like(modes[0][0]))
+    return 2.0 * G / (1.0 - nu) * found
+
+
+def _free(modes: Modes, G: float, nu: float) -> Array:
+    """Right energy of bending that is free to choose its strain across, over V/6 [Pa].
+
+    Where hex8 bends freely across, its force f_j does no work on e_j or goes against it; the right e_j is the one that
+    springs of stiffness -f_j/e_j leave, which stand for what lies around. Otherwise the right strains do the same work.
+    """
+    plane, E = 2.0 * G / (1.0 - nu), 2.0 * G * (1.0 + nu)
+    found = np.zeros_like(modes[0][0])
+    for e_i, e_j, f_i, f_j in modes:
+        work_i, work_j, across = f_i * e_i, f_j * e_j, nu * plane * e_i * e_j
+        left_i = np.where(work_i < 0.0, -across / (plane * e_i - f_i), e_i)
+        left_j = np.where(work_j < 0.0, -across / (plane * e_j - f_j), e_j)
         sprung = plane * (left_i**2 + left_j**2 + 2.0 * nu * left_i * left_j)
-        worked = work**2 * E / np.maximum(f_i**2 + f_j**2 - 2.0 * nu * f_i * f_j, _LITTLE)
-        free += np.where(np.minimum(f_i * e_i, f_j * e_j) < 0.0, sprung, worked)
-    sixth = bricks.volume / 6.0
-    return sixth * bent, sixth * free, sixth * driven
+        worked = (work_i + work_j) ** 2 * E / np.maximum(f_i**2 + f_j**2 - 2.0 * nu * f_i * f_j, _LITTLE)
+        found += np.where(np.minimum(work_i, work_j) < 0.0, sprung, worked)
+    return found
+
+
+def _right(modes: Modes, G: float, nu: float, share: Array) -> Array:
+    """Right energy of bending over V/6 [Pa]: free where it has most of a cell's energy, else driven by the body."""
+    return share * _free(modes, G, nu) + (1.0 - share) * _driven(modes, G, nu)
 
 
 def _flowing(mean: Array, point: Array) -> Array:
