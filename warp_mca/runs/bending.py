@@ -29,7 +29,7 @@ ERROR, STRUCK, JUMPING, PLASTIC = 0.03, 0.2, 0.08, 0.1
 MISSING = 0.02  # share of strain energy in bending stresses beyond yield that do not yield, likewise
 # Cells of a body up to which all are looked at, and how many, evenly spread, of more: where strain jumps those around
 # them count, too, and all of 80,000 take 0.2 s.
-WHOLE, SAMPLE = {False: 1024, True: 16_384}, {False: 512, True: 256}
+WHOLE, SAMPLE = {False: 1024, True: 16_384}, {False: 1024, True: 256}
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
 FREE = 1e-4  # of all energy: rounding leaves less in bodies that move free of stress

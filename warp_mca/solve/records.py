@@ -23,7 +23,7 @@ class SceneRecords:
             each row, each shape (channel_count,), float64.
         peaks: of each contact pass at its greatest, sum of normal forces [N] and sum of their squares [N^2], shape
             (pass_count, 2), float64.
-        stiffened: of each body, when its strain energy was greatest of a few looks, what `runs.bent_cells` names of the
+        stiffened: of each body, when its strain energy [J] was greatest of a few looks, what `bent_cells` names of the
             bending of its cells, shape (body_count, COLUMNS), float64.
         passed: of each pair that may go into each other, how deep it did in these looks [m], see `runs.passing`, shape
             (pair_count,), float64.
