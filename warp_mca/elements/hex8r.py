@@ -53,6 +53,29 @@ def _hourglass_stiffness(volume: Array, a: Array, K: Array, G: Array) -> Array:
     return D
 
 
+def stiffness(x: Array, K: Array, G: Array, scale: Array | None = None) -> Array:
+    """Stiffness [N/m] in x, y, z of the corners, shape (element_count, 24, 24), float64.
+
+    Args:
+        x: corners [m], shape (element_count, 8, 3). K, G: moduli [Pa], shape (element_count,).
+        scale: factors on the displacements of the corners [-], shape (element_count, 8).
+    """
+    n = len(x)
+    b, volume, gamma, directions, a = _parts(x)
+    if scale is not None:
+        b, gamma = b * scale[..., None], gamma * scale[:, None, :]
+    same = np.einsum("eai,ebi->eab", b, b)
+    cross = np.einsum("eai,ebj->eaibj", b, b)
+    matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
+    found = (volume * G)[:, None, None] * matrix.reshape(n, 24, 24)
+    flat = b.reshape(n, 24)
+    found += (K * volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+    amplitude = np.einsum("ema,eki->emkai", gamma, directions, optimize=True).reshape(n, 12, 24)
+    D = _hourglass_stiffness(volume, a, K, G)
+    found += np.einsum("epx,epq,eqy->exy", amplitude, D, amplitude, optimize=True)
+    return found
+
+
 class Hex8r:
     """See `warp_mca.kernels.elements.hex8r`; wedges and pyramids are hexahedra whose corners coincide."""
 
@@ -77,20 +100,7 @@ class Hex8r:
 
     def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
         """Of the 24 x 24 problem."""
-        n = len(x)
-        b, volume, gamma, directions, a = _parts(x)
-        root = 1.0 / np.sqrt(mass)
-        b, gamma = b * root[..., None], gamma * root[:, None, :]
-        same = np.einsum("eai,ebi->eab", b, b)
-        cross = np.einsum("eai,ebj->eaibj", b, b)
-        matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
-        stiffness = (volume * G)[:, None, None] * matrix.reshape(n, 24, 24)
-        flat = b.reshape(n, 24)
-        stiffness += (K * volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
-        amplitude = np.einsum("ema,eki->emkai", gamma, directions, optimize=True).reshape(n, 12, 24)
-        D = _hourglass_stiffness(volume, a, K, G)
-        stiffness += np.einsum("epx,epq,eqy->exy", amplitude, D, amplitude, optimize=True)
-        return np.linalg.eigvalsh(stiffness)[:, -1].astype(np.float64)
+        return np.linalg.eigvalsh(stiffness(x, K, G, 1.0 / np.sqrt(mass)))[:, -1].astype(np.float64)
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.elements import ELEMENTS
+from warp_mca.elements import ELEMENTS, default_element
+from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import cut_to
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined
@@ -27,8 +28,8 @@ def mesh(
         given: finished meshes by body, in place of the bodies' own geometry.
 
     Raises:
-        RequestError: an element is inverted, a mesh is not whole or not given, or a recipe or file cannot be turned
-            into a mesh.
+        RequestError: an element is inverted, a mesh is not whole or not given, a recipe or file cannot be turned into a
+            mesh, or an element was chosen that no body can take.
     """
     from warp_mca.geometry.quality import check
 
@@ -49,6 +50,7 @@ def mesh(
             check(made[key], body.name)
         meshes[body.name] = made[key]
     cut = _cut(scene, meshes)
+    _check_elements(scene, cut)
     for name, item in cut.items():
         if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
             check(item, name)
@@ -132,3 +134,19 @@ class _Itself:
 def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
     """The meshes, cut to the cell type of each body's element where that is possible."""
     return {body.name: cut_to(meshes[body.name], ELEMENTS[body.element].cell) for body in scene.bodies}
+
+
+def _check_elements(scene: Scene, meshes: Mapping[str, Mesh]) -> None:
+    """Refuses elements that were chosen, as other than the first of their cell type, and compute no cell.
+
+    Raises:
+        RequestError: there is one.
+    """
+    for element in ELEMENTS.values():
+        asked = [body for body in scene.bodies if body.element == element.name]
+        taken = any(len(meshes[body.name].cells[element.cell]) for body in asked if not body.rigid)
+        if asked and not taken and element is not default_element(element.cell):
+            names = ", ".join(body.name for body in asked)
+            cell = CELL_TYPES[element.cell].field
+            remedy = f"it computes {cell}, of which {names} {'has' if len(asked) == 1 else 'have'} none that deform"
+            raise bad_value("element", element.name, f"{remedy}; leave it out")

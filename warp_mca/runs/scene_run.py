@@ -15,7 +15,8 @@ from warp_mca.results.contact_history import contact_names, contact_warnings
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.results.sensor_history import sensor_figures, sensor_histories
-from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
+from warp_mca.runs.bending import bending_warnings, samples_of, seen
+from warp_mca.runs.bent_cells import Cells
 from warp_mca.runs.contact_warnings import resolution_warnings, symmetry_of
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.flutter_warnings import flutter_warnings
@@ -96,7 +97,7 @@ class SceneRun:
                 kept.sensors.extend(records["sensors"][rows[: kept.count - first], self.channels])
 
     @cached_property
-    def samples(self) -> list[Sample]:
+    def samples(self) -> list[Cells]:
         """Cells that `runs.bending` looks at."""
         return samples_of(self.ready.model)
 
@@ -233,7 +234,8 @@ class SceneRun:
             stiffened, depths = self.look(u)
             nodes = slice(*self.solver.layout.nodes[self.index : self.index + 2])
             found += inertia_warnings(self.ready, u[nodes], v[nodes])
-            found += bending_warnings(self.ready.model, stiffened, ledger.kept.exchanged)
+            kept = ledger.kept
+            found += bending_warnings(self.ready.model, stiffened, kept.exchanged, kept.energy_scale, kept.touched)
             found += passing_warnings(self.pairs, depths)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:

@@ -23,8 +23,8 @@ class SceneRecords:
             each row, each shape (channel_count,), float64.
         peaks: of each contact pass at its greatest, sum of normal forces [N] and sum of their squares [N^2], shape
             (pass_count, 2), float64.
-        stiffened: of each body, energy that its cells spent on their own stiffness and its strain energy [J], when that
-            was greatest of a few looks, see `runs.bending`, shape (body_count, 2), float64.
+        stiffened: of each body, when its strain energy [J] was greatest of a few looks, what `bent_cells` names of the
+            bending of its cells, shape (body_count, COLUMNS), float64.
         passed: of each pair that may go into each other, how deep it did in these looks [m], see `runs.passing`, shape
             (pair_count,), float64.
         count: rows so far [-].
@@ -49,7 +49,7 @@ class SceneRecords:
     path_stress: list[NDArray[np.float32]] = field(default_factory=list)
     sensors: list[Array] = field(default_factory=list)
     peaks: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    stiffened: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    stiffened: Array = field(default_factory=lambda: np.zeros((0, 6)))
     passed: Array = field(default_factory=lambda: np.zeros(0))
     count: int = 0
     records: int = 0

@@ -1,0 +1,227 @@
+"""What runs say of cells that do not bend right: sign and size of the error, and nothing where bodies bend right."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from impacts import Displaced
+from scipy.spatial.transform import Rotation
+
+import warp_mca as mca
+from warp_mca.cli.main import main
+from warp_mca.geometry.degenerate import stored, tetrahedral
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.build import build_model
+from warp_mca.model.model import Model
+from warp_mca.runs.bending import samples_of, seen
+from warp_mca.runs.bent_cells import FLOW, FLOWING, RIGHT, SPENT
+from warp_mca.solve.solver import Solver
+
+CUTS = {  # of a hexahedron into two wedges, whose axes go along its edges
+    "along": ((0, 3, 7, 1, 2, 6), (0, 7, 4, 1, 6, 5)),
+    "across": ((0, 5, 1, 3, 6, 2), (0, 4, 5, 3, 7, 6)),
+    "deep": ((0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)),
+}
+
+
+def grid(size, cells, kind: str = "", shake: float = 0.0) -> Mesh:
+    """A box with its corner at the origin, of hexahedra, of wedges (a key of CUTS) or of tetrahedra ("tet")."""
+    mesh = mca.Box(size=size, divisions=cells).build()
+    points = mesh.points - mesh.points.min(axis=0)
+    inner = (points > 1e-9) & (points < np.array(size) - 1e-9)
+    points = points + shake * np.random.default_rng(5).uniform(-1, 1, points.shape) * inner * np.divide(size, cells)
+    mesh = dataclasses.replace(mesh, points=points)
+    if kind == "tet":
+        return tetrahedral(mesh)
+    if kind:
+        halves = np.concatenate([mesh.hexahedra[:, cut] for cut in CUTS[kind]])
+        return dataclasses.replace(mesh, hexahedra=stored(points, halves, "wedge"), cell_sets={})
+    return mesh
+
+
+def sagging(mesh: Mesh, nu: float, element: str = "hex8", load: float = 1e-3, **metal) -> tuple[float, mca.Result]:
+    """A cantilever along x that sags from rest along its thinner side, and its greatest deflection over the exact one.
+
+    `load`: strain of its surface at its foot when it hangs at rest, half of the greatest one.
+    """
+    L, B, H = (float(s) for s in np.ptp(mesh.points, axis=0))
+    way, (H, B) = (2, (H, B)) if H < B else (1, (B, H))
+    E, rho, G = 70e9, 2700.0, 70e9 / (2.0 + 2.0 * nu)
+    g = load * E * H / (3.0 * rho * L**2)
+    exact = 2.0 * rho * g * (12.0 * L**4 / (8.0 * E * H**2) + 0.6 * L**2 / G)
+    material = mca.J2Bilinear(E=E, nu=nu, rho=rho, **metal) if metal else mca.Elastic(E=E, nu=nu, rho=rho)
+    period = 1.787 * L**2 / H * np.sqrt(12.0 * rho / E)  # of bending, 2 pi / 1.875^2
+    scene = mca.Scene(
+        name="strip",
+        bodies=(mca.Body(name="strip", geometry=mesh, material=material, element=element),),
+        fixed=(mca.Fixed(body="strip", nodes="xmin"),),
+        gravity=(0.0, -g * (way == 1), -g * (way == 2)),
+        impact=mca.ImpactPhase(duration=0.9 * period, output_interval=period / 128.0),
+        probes=(mca.Probe(name="tip", body="strip", nodes="xmax"),),
+    )
+    result = mca.run(scene)
+    way_of_tip = result.probes[0].position[:, way]
+    return float((way_of_tip[0] - way_of_tip.min()) / exact), result
+
+
+def told(result: mca.Result) -> float:
+    """Deflection over the right one that the warning of bending gives; 1 without."""
+    (text,) = [w for w in result.warnings if "in bending, its deflections" in w] or ["about 0% too large flexible"]
+    share, way = re.search(r"about (\d+)% too (large|small)", text).groups()
+    assert ("flexible" in text) == (way == "large") and ("stiff" in text) == (way == "small")
+    return 1.0 + (1 if way == "large" else -1) * int(share) / 100.0
+
+
+STRIPS = {  # size, cells, nu, element, cut: the error goes from -85 to +160 %
+    "short": ((0.04, 0.006, 0.002), (40, 6, 1), 0.3, "hex8", ""),
+    "square": ((0.04, 0.004, 0.002), (20, 2, 1), 0.0, "hex8", ""),
+    "rubber": ((0.02, 0.004, 0.002), (24, 4, 1), 0.49, "hex8", ""),
+    "long": ((0.04, 0.004, 0.002), (5, 1, 1), 0.45, "hex8", ""),
+    "two layers": ((0.03, 0.003, 0.002), (45, 4, 2), 0.1, "hex8", ""),
+    "three long layers": ((0.04, 0.004, 0.002), (14, 1, 3), 0.3, "hex8", ""),
+    "other way": ((0.03, 0.0015, 0.003), (10, 1, 1), 0.3, "hex8", ""),
+    "distorted": ((0.04, 0.004, 0.002), (20, 2, 1), 0.4, "hex8", "shaken"),
+    "wedges, deep": ((0.04, 0.004, 0.002), (30, 3, 1), 0.3, "hex8", "deep"),
+    "wedges, across": ((0.04, 0.004, 0.002), (20, 2, 2), 0.3, "hex8", "across"),
+    "wedges, along": ((0.04, 0.004, 0.002), (12, 2, 1), 0.3, "hex8", "along"),
+    "one point, deep": ((0.04, 0.004, 0.002), (20, 4, 1), 0.3, "hex8r", "deep"),
+    "one point, along": ((0.04, 0.004, 0.002), (12, 2, 1), 0.4, "hex8r", "along"),
+    "tetrahedra": ((0.04, 0.004, 0.002), (20, 2, 2), 0.3, "tet4", "tet"),
+    "more tetrahedra": ((0.016, 0.003, 0.002), (20, 3, 3), 0.3, "tet4", "tet"),
+}
+
+
+@pytest.mark.parametrize("case", STRIPS)
+def test_the_warning_has_sign_and_size_of_the_error(case: str):
+    size, cells, nu, element, cut = STRIPS[case]
+    mesh = grid(size, cells, "" if cut == "shaken" else cut, 0.2 if cut == "shaken" else 0.0)
+    ratio, result = sagging(mesh, nu, element)
+    assert abs(ratio - 1.0) > 0.03
+    assert (told(result) > 1.0) == (ratio > 1.0)
+    assert told(result) == pytest.approx(ratio, rel=0.35 if element == "tet4" or cut in CUTS else 0.12)
+    assert any("choose" in text and "hex8r" in text for text in result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("size", "cells", "element"),
+    [
+        ((0.04, 0.004, 0.002), (20, 2, 1), "hex8r"),
+        ((0.04, 0.004, 0.002), (6, 1, 1), "hex8r"),
+        ((0.03, 0.004, 0.0039), (36, 5, 5), "hex8"),
+    ],
+)
+def test_nothing_is_said_of_a_strip_that_bends_right(size, cells, element: str):
+    ratio, result = sagging(grid(size, cells), 0.3, element)
+    assert ratio == pytest.approx(1.0, abs=0.03)
+    assert not [text for text in result.warnings if "bending" in text]
+
+
+@pytest.mark.parametrize("kind", ["", "deep", "tet"])
+@pytest.mark.parametrize(("spin", "gravity"), [((0.0, 0.0, 0.0), -9.81), ((30.0, 0.0, 90.0), 0.0)])
+def test_nothing_is_said_of_bodies_in_flight(kind: str, spin, gravity: float):
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    mesh = grid((0.1, 0.02, 0.01), (4, 1, 1), kind)
+    body = mca.Body(name="it", geometry=mesh, material=steel, velocity=(0.0, 20.0, 1.0), angular_velocity=spin)
+    flight = mca.ImpactPhase(duration=2e-3, output_interval=1e-4)
+    result = mca.run(mca.Scene(name="flight", bodies=(body,), gravity=(0.0, gravity, 0.0), impact=flight))
+    assert not [text for text in result.warnings if "bending" in text]
+
+
+def model_of(mesh: Mesh, material, element: str) -> Model:
+    scene = mca.Scene(
+        name="one",
+        bodies=(mca.Body(name="it", geometry=mesh, material=material, element=element),),
+        impact=mca.ImpactPhase(duration=1e-6),
+    )
+    X = mca.mesh(scene)["it"].points
+    return build_model(scene, mca.mesh(scene), {"it": X}, {"it": np.zeros_like(X)})
+
+
+@pytest.mark.parametrize(
+    ("element", "kind"), [("tet4", "tet"), ("hex8", "deep"), ("hex8", "along"), ("hex8r", "deep"), ("hex8r", "across")]
+)
+def test_energy_spent_is_that_of_the_element(element: str, kind: str):
+    """Also in bodies that have turned far."""
+    mesh = grid((0.3, 0.2, 0.2), (2, 2, 1), kind)
+    model = model_of(mesh, mca.Elastic(E=3e9, nu=0.4, rho=1000.0), element)
+    rng = np.random.default_rng(2)
+    u = 1e-5 * rng.uniform(-1.0, 1.0, model.X.shape)
+    turn = Rotation.from_rotvec([0.7, -1.9, 0.4]).as_matrix()
+    u = (model.X + u) @ turn.T - model.X
+    held = Displaced(Solver(model, device="cpu", precision="float64", dt=1e-9))
+    held.forces(u)
+    expected = float(held.energies()[[0, 4]].sum())
+    (sums,) = seen(model, samples_of(model), u, np.zeros((0, 6)))
+    assert sums[SPENT] == pytest.approx(expected, rel=2e-3)
+
+
+def bent(model: Model, curvature: float, across: float) -> np.ndarray:
+    """Displacements of one brick that is bent about its width, u_x = -k x z, and across, u_y = -across k y z."""
+    x, y, z = (model.X - model.X.mean(axis=0)).T
+    u = np.zeros_like(model.X)
+    u[:, 0], u[:, 1] = -curvature * x * z, -across * curvature * y * z
+    return u
+
+
+@pytest.mark.parametrize(
+    ("long", "wide", "nu"), [(0.5, 0.25, 0.3), (1.0, 1.0, 0.0), (3.0, 0.5, 0.45), (8.0, 2.0, 0.499)]
+)
+def test_a_brick_that_bends_freely(long: float, wide: float, nu: float):
+    """Stiffness of hex8 over E: what is left by the strain across that takes no force, of its own and of the shear."""
+    model = model_of(grid((long, wide, 1.0), (1, 1, 1)), mca.Elastic(E=1e9, nu=nu, rho=1000.0), "hex8")
+    own, side = 4.0 / 3.0 + long**2, 4.0 / 3.0 + wide**2
+    stiffness = (own - (2.0 / 3.0) ** 2 / side) / (2.0 * (1.0 + nu))
+    (sums,) = seen(model, samples_of(model), bent(model, 1e-6, 2.0 / 3.0 / side), np.zeros((0, 6)))
+    assert sums[RIGHT] / sums[SPENT] == pytest.approx(1.0 / stiffness, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("long", "wide", "moment"), [(0.2, 0.2, 0.684), (0.5, 0.5, 0.765), (1.0, 1.0, 0.982), (2.0, 1.0, 1.515)]
+)
+def test_plastic_moment_of_a_brick(long: float, wide: float, moment: float):
+    """Beside the moments of an ideally plastic element that is bent ten times as far as it stays elastic."""
+    metal = mca.J2Bilinear(E=1e9, nu=0.3, rho=1000.0, sigma_y=1e6, E_t=0.0)
+    model = model_of(grid((long, wide, 1.0), (1, 1, 1)), metal, "hex8")
+    across = 2.0 / 3.0 / (4.0 / 3.0 + wide**2)
+    (sums,) = seen(model, samples_of(model), bent(model, 2e-2, across), np.zeros((0, 6)))
+    assert sums[FLOWING] / sums[FLOW] == pytest.approx(moment, rel=0.02)
+
+
+YIELDING = {  # cells, element, load over that at which the surface yields, and what must be said
+    "early": ((40, 4, 1), "hex8", 0.7, "yield too early in bending, at about 0.7"),
+    "late": ((10, 2, 1), "hex8", 2.5, "yield too late in bending"),
+    "not at all": ((20, 2, 1), "hex8r", 0.8, "hex8r does not let strip yield"),
+    "two layers of one point": ((20, 2, 2), "hex8r", 0.8, "hex8r does not let strip yield"),
+    "elastic": ((20, 2, 1), "hex8r", 0.4, ""),
+}
+
+
+@pytest.mark.parametrize("case", YIELDING)
+def test_plastic_bending(case: str):
+    cells, element, load, said = YIELDING[case]
+    metal = {"sigma_y": 70e6, "E_t": 0.7e9}
+    _, result = sagging(grid((0.04, 0.004, 0.002), cells), 0.3, element, 1e-3 * load, **metal)
+    assert any(said in text for text in result.warnings) if said else not [w for w in result.warnings if "yield" in w]
+    assert not any("choose hex8r" in text for text in result.warnings)
+
+
+@pytest.mark.parametrize("options", ["--set rigid=true", ""])
+def test_an_element_that_no_body_can_take_is_refused(options: str, tmp_path, capsys):
+    scene = tmp_path / "lone.py"
+    scene.write_text(
+        "import warp_mca as mca\n"
+        "from warp_mca.geometry.degenerate import tetrahedral\n"
+        "def build(rigid: bool = False) -> mca.Scene:\n"
+        "    mesh = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()\n"
+        "    steel = mca.Elastic(E=2e11, nu=0.3, rho=7800.0)\n"
+        "    body = mca.Body(name='it', geometry=mesh if rigid else tetrahedral(mesh), material=steel, rigid=rigid)\n"
+        "    return mca.Scene(name='lone', bodies=(body,), impact=mca.ImpactPhase(duration=1e-5))\n"
+    )
+    command = ["run", str(scene), "--element", "hex8r", "--out", str(tmp_path / "out"), *options.split()]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert "element = 'hex8r': it computes hexahedra, of which it has none that deform" in error
+    assert len(error.strip().splitlines()) == 1
