@@ -52,6 +52,20 @@ def shares_node(triangle: wp.array2d(dtype=wp.int32), face: int, a: int, b: int)
     return found
 
 
+@wp.func
+def part_inside(entered: float, slope: float, t: float, cosine: float):
+    """Depth behind the planes of the faces around a part of an edge that ends at a face, and the place of that.
+
+    Args:
+        entered: where the edge went in [m]; negative where its first end lies inside.
+        slope: cosine between the edge and the normal there.
+        t, cosine: of the face where it comes out.
+    """
+    if entered < 0.0:
+        return t * cosine, float(0.0)
+    return 0.5 * (t - entered) * wp.min(slope, cosine), 0.5 * (t + entered)
+
+
 @wp.kernel(enable_backward=False)
 def edges_inside(
     mesh: wp.uint64,
@@ -61,19 +75,11 @@ def edges_inside(
     depth_out: wp.array(dtype=wp.float32),
     at_out: wp.array(dtype=wp.vec3f),
 ):
-    """How deep parts of edges lie behind the faces of a mesh that they cross, 0 of edges that cross none.
+    """How deep parts of edges lie behind the faces of a mesh that they cross [m], 0 of edges that cross none; where.
 
     A part between two faces counts by its middle, one that holds an end of the edge by that end: how far these lie
-    behind the planes of the faces, which is as deep as the part can lie below the mesh or deeper.
-
-    Args:
-        mesh: its points and triangles.
-        inner: nodes of the edges [m].
-        edge: their nodes, shape (edge_count, 2).
-        triangle: triangles of the mesh, where the edges are its own and faces around their nodes do not count; else
-            empty.
-        depth_out: of the deepest part of each edge [m].
-        at_out: place of its middle, or of its end [m].
+    behind the planes of the faces, which is as deep as the part can lie below the mesh or deeper. `triangle` is empty
+    but where the edges are those of the mesh: faces around their nodes do not count then.
     """
     k = wp.tid()
     i = edge[k, 0]
@@ -82,11 +88,11 @@ def edges_inside(
     length = wp.length(inner[j] - a)
     along = wp.normalize(inner[j] - a)
     start = float(0.0)
-    entered = float(-1.0)  # where the edge went in, negative outside
-    slope = float(0.0)  # cosine between the edge and the normal there
-    crossings = int(0)
+    entered = float(-1.0)
+    slope = float(0.0)
+    outside = bool(False)  # known to be, after it came out
     depth = float(0.0)
-    deepest = float(0.0)
+    at = float(0.0)
     for _query in range(MOST):
         hit = wp.mesh_query_ray(mesh, a + start * along, along, length - start)
         if not hit.result:
@@ -96,27 +102,21 @@ def edges_inside(
         counts = bool(True)
         if triangle.shape[0] > 0:
             counts = not shares_node(triangle, hit.face, i, j)
-        if counts:
-            cosine = wp.dot(hit.normal, along)
-            if cosine < 0.0:
-                entered = t
-                slope = -cosine
-            else:
-                part = t * cosine
-                middle = float(0.0)
-                if entered >= 0.0:
-                    part = 0.5 * (t - entered) * wp.min(slope, cosine)
-                    middle = 0.5 * (t + entered)
-                if crossings == 0 or entered >= 0.0:
-                    if part > depth:
-                        depth = part
-                        deepest = middle
-                entered = float(-1.0)
-            crossings += 1
+        cosine = wp.dot(hit.normal, along)
+        if counts and cosine < 0.0:
+            entered = t
+            slope = -cosine
+        if counts and cosine >= 0.0:
+            part, middle = part_inside(entered, slope, t, cosine)
+            if part > depth and (entered >= 0.0 or not outside):
+                depth = part
+                at = middle
+            entered = float(-1.0)
+            outside = True
         if start >= length:
             break
     if entered >= 0.0 and (length - entered) * slope > depth:
         depth = (length - entered) * slope
-        deepest = length
+        at = length
     depth_out[k] = depth
-    at_out[k] = a + deepest * along
+    at_out[k] = a + at * along

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from warp_mca.runs.bending import LOOKS
 from warp_mca.solve.transfer import Transfer
@@ -34,8 +33,8 @@ class Looks:
         self._watched = [item for item, _ in watched]
         with wp.ScopedDevice(solver.device):
             nodes = wp.array(np.concatenate([item.watch.nodes + first for item, first in watched]), dtype=wp.int32)
-            self._gathered = wp.indexedarray(state.u, [nodes])
-            self._skins = wp.empty(len(nodes), dtype=wp.vec3d)
+            self._gathered: Any = wp.indexedarray(state.u, [nodes])
+            self._skins = wp.zeros(len(nodes), dtype=wp.vec3d)
         springs = {str(stage.index): state.contacts[stage.index].spring.depth for stage in solver.contacts}
         sources = {"u": self._skins, "speed_square": state.speed_square} | springs
         self._watch = Transfer(sources, solver.device)

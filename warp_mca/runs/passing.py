@@ -7,6 +7,7 @@ look decides when the next one is due, so that nothing passes the thinnest part 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -60,8 +61,7 @@ class Watch:
         first = np.cumsum([len(skin.nodes) for skin in self._skins])[:-1]
         for skin, own in zip(self._skins, np.split(x, first), strict=True):
             skin.move(own)
-        boxes = np.array([skin.box for skin in self._skins])
-        look = Look(boxes.mean(axis=(0, 1)), boxes)
+        look = Look(self._skins)
         passed = passed.copy() if len(passed) else self._start(look)
         for case, row in zip(self.cases, passed, strict=True):
             allowed = case.slack + PRESSED * max((pressed[k] for k in case.passes), default=0.0)
@@ -92,7 +92,8 @@ class Watch:
         found = []
         for case, row in zip(self.cases, passed, strict=False):
             if row[DEPTH]:
-                at = ", ".join(f"{coordinate:.3g}" for coordinate in row[PLACE])
+                digits = 1 - math.floor(math.log10(row[DEPTH]))  # place to a tenth of the depth or finer
+                at = ", ".join(f"{round(x, digits) + 0.0:g}" for x in row[PLACE].tolist())
                 seen = f"from t = {row[TIME] - origin:.3g} s on, up to {row[DEPTH]:.2g} m deep at ({at}) m"
                 found.append(f"{case.sentence} {seen}: {case.remedy}")
         return found

@@ -19,11 +19,10 @@ Index = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 SLACK = 0.05  # of the width of a face, and of the thickness of a body, by which skins may cross: they have flat faces
-SHARE = 0.25  # of the thinnest part of two bodies that they move on between two looks at most
+SHARE = 0.5  # of the thinnest part of two bodies that they move on between two looks at most
 BEND = 0.25  # of the gap between parts of a body that its nodes move out of shape before it is looked at
 SLENDER = 8.0  # lengths over thickness from which on a body without gaps may meet itself
 ROOM = 1.5  # times the reach of the place where bound bodies meet at the start: there they may overlap
-SHAPE_NODES = 1024  # of a body that tell how far it is out of shape, evenly spread
 
 APART = "no contact keeps them out there; take all of the surface, such as nodes='boundary', in a Contact"
 BETWEEN = (
@@ -32,17 +31,30 @@ BETWEEN = (
 )
 
 
-@dataclass(frozen=True)
 class Look:
-    """A scene at one time.
+    """Skins as they are now.
 
     Attributes:
-        origin: a point amid the bodies [m], shape (3,), float64.
         boxes: least and greatest coordinates of each skin [m], shape (body_count, 2, 3), float64.
+        origin: a point amid the bodies [m], shape (3,), float64.
     """
 
-    origin: Array
-    boxes: Array
+    def __init__(self, skins: Sequence[Skin]) -> None:
+        self._skins = skins
+        self.boxes = np.array([skin.box for skin in skins])
+        self.origin = self.boxes.mean(axis=(0, 1))
+        self._bent: dict[int, float] = {}
+
+    def gap(self, one: int, other: int) -> float:
+        """Between the boxes of two skins, along the axis where it is greatest [m]; negative where they meet."""
+        a, b = self.boxes[one], self.boxes[other]
+        return float(np.maximum(a[0] - b[1], b[0] - a[1]).max())
+
+    def bent(self, number: int) -> float:
+        """How far a skin is out of shape [m]."""
+        if number not in self._bent:
+            self._bent[number] = self._skins[number].bent()
+        return self._bent[number]
 
 
 @dataclass(frozen=True)
@@ -98,24 +110,22 @@ class WithinBody:
 
     def found(self, look: Look, least: float) -> Found:
         """Where they lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
-        if self._gap(look) > 0.0:
+        if look.gap(*self.numbers) > 0.0:
             return NOWHERE
         one, other = (look.boxes[k] for k in self.numbers)
         return self.pair.crossed((one, other), look.origin, least)
 
     def room(self, look: Look) -> float:
         """How far they can approach each other before they are through [m]."""
-        return max(SHARE * min(self.pair.one.thickness, self.pair.other.thickness), 0.5 * self._gap(look))
-
-    def _gap(self, look: Look) -> float:
-        """Between the boxes, along the axis where it is greatest [m]; negative where they meet."""
-        one, other = (look.boxes[k] for k in self.numbers)
-        return float(np.maximum(one[0] - other[1], other[0] - one[1]).max())
+        return max(SHARE * min(self.pair.one.thickness, self.pair.other.thickness), 0.5 * look.gap(*self.numbers))
 
     def holds(self, look: Look) -> bool:
         """Whether one lies in the other as a whole, given that their skins do not cross."""
         one, other = (look.boxes[k] for k in self.numbers)
-        for inner, outer, boxes in ((self.pair.one, self.pair.other, (one, other)), (self.pair.other, self.pair.one, (other, one))):
+        for inner, outer, boxes in (
+            (self.pair.one, self.pair.other, (one, other)),
+            (self.pair.other, self.pair.one, (other, one)),
+        ):
             if (boxes[0][0] > boxes[1][0]).all() and (boxes[0][1] < boxes[1][1]).all():
                 return outer.deepest(inner.x[:1])[0] > 0.0
         return False
@@ -147,26 +157,14 @@ class WithinItself:
 
     def found(self, look: Look, least: float) -> Found:
         """Where its parts lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
-        if self._bent() < self.play:
+        if look.bent(self.number) < self.play:
             return NOWHERE
         box = look.boxes[self.number]
         return self.pair.crossed((box, box), look.origin, least)
 
     def room(self, look: Look) -> float:
         """How far parts can approach each other before they are through [m]."""
-        return max(SHARE * self.pair.one.thickness, 0.5 * (self.play - self._bent()))
-
-    def _bent(self) -> float:
-        """Greatest distance of a node from its place in the undeformed body, moved rigidly as fits best [m].
-
-        The best rotation by Kabsch, Acta Cryst. A 32 (1976) 922.
-        """
-        skin = self.pair.one
-        some = slice(None, None, -(-len(skin.X) // SHAPE_NODES))
-        X, x = (points[some] - points[some].mean(axis=0) for points in (skin.X, skin.x))
-        left, _, right = np.linalg.svd(X.T @ x)
-        left[:, 2] *= np.sign(np.linalg.det(left @ right))
-        return float(np.linalg.norm(x - X @ (left @ right), axis=1).max())
+        return max(SHARE * self.pair.one.thickness, 0.5 * (self.play - look.bent(self.number)))
 
     @property
     def sentence(self) -> str:
@@ -176,7 +174,11 @@ class WithinItself:
     @property
     def remedy(self) -> str:
         """What helps."""
-        return BETWEEN if self.passes else "no contact keeps them apart; make bodies of them, welded where they hang together"
+        return (
+            BETWEEN
+            if self.passes
+            else "no contact keeps them apart; make bodies of them, welded where they hang together"
+        )
 
 
 Case = BelowPlane | WithinBody | WithinItself

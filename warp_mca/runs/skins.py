@@ -22,6 +22,7 @@ INWARD = 0.02  # of its shortest edge, by which a node is moved into its body: s
 FLAT = 0.1  # of the body's thickness, which that does not exceed
 THIN = 0.05  # quantile of distances through a body that counts as its thickness: at sharp edges it has none
 SAMPLES = 2048  # points of a skin that are looked for in another body, evenly spread, where edges lie in it
+SHAPE_NODES = 1024  # of a body that tell how far it is out of shape, evenly spread
 NOWHERE: Found = (0.0, np.full(3, np.nan))
 
 
@@ -83,11 +84,11 @@ class Skin:
 
     @cached_property
     def _inner(self) -> wp.array:
-        return wp.empty(len(self.nodes), dtype=wp.vec3f, device="cpu")
+        return wp.zeros(len(self.nodes), dtype=wp.vec3f, device="cpu")
 
     @cached_property
     def _normal(self) -> wp.array:
-        return wp.empty(len(self.nodes), dtype=wp.vec3f, device="cpu")
+        return wp.zeros(len(self.nodes), dtype=wp.vec3f, device="cpu")
 
     def _distances(self, middle: Array, normal: Array) -> tuple[float, float]:
         """Thickness and gap, by rays from the middles of triangles along their normals, inwards and outwards."""
@@ -100,7 +101,7 @@ class Skin:
             origin = (middle - self._origin + ahead * unit).astype(np.float32)
             start = wp.array(origin, dtype=wp.vec3f, device="cpu")
             direction = wp.array((sign * unit).astype(np.float32), dtype=wp.vec3f, device="cpu")
-            length = wp.empty(len(middle), dtype=wp.float32, device="cpu")
+            length = wp.zeros(len(middle), dtype=wp.float32, device="cpu")
             inputs = [self._mesh.id, start, direction, reach]
             wp.launch(crossing.ray_lengths, len(middle), inputs=inputs, outputs=[length], device="cpu")
             found.append(length.numpy().astype(float))
@@ -117,6 +118,17 @@ class Skin:
         """Least and greatest coordinates [m], shape (2, 3), float64."""
         columns = self.x.T  # numpy's extremes along the longer axis take many times as long
         return np.array([[f(column) for column in columns] for f in (np.min, np.max)])
+
+    def bent(self) -> float:
+        """Greatest distance of a node from its place in the undeformed body, moved rigidly as fits best [m].
+
+        The best rotation by Kabsch, Acta Cryst. A 32 (1976) 922.
+        """
+        some = slice(None, None, -(-len(self.X) // SHAPE_NODES))
+        X, x = (points[some] - points[some].mean(axis=0) for points in (self.X, self.x))
+        left, _, right = np.linalg.svd(X.T @ x)
+        left[:, 2] *= np.sign(np.linalg.det(left @ right))
+        return float(np.sqrt(((x - X @ (left @ right)) ** 2).sum(axis=1).max()))
 
     def settle(self, origin: Array) -> None:
         """Make the mesh ready for `edges_in`, with coordinates from an origin near the body [m], shape (3,)."""
@@ -138,12 +150,12 @@ class Skin:
         Both are settled with the same origin.
 
         Returns:
-            Depths below the planes of crossed faces [m], shape (chosen_count,), and places [m], shape (chosen_count, 3).
+            Depths below planes of crossed faces [m], shape (chosen_count,), and places [m], shape (chosen_count, 3).
         """
         edge = wp.array(self.edge[chosen], dtype=wp.int32, ndim=2, device="cpu")
-        own = self._triangle if other is self else wp.empty((0, 3), dtype=wp.int32, device="cpu")
-        depth = wp.empty(len(chosen), dtype=wp.float32, device="cpu")
-        at = wp.empty(len(chosen), dtype=wp.vec3f, device="cpu")
+        own = self._triangle if other is self else wp.zeros((0, 3), dtype=wp.int32, device="cpu")
+        depth = wp.zeros(len(chosen), dtype=wp.float32, device="cpu")
+        at = wp.zeros(len(chosen), dtype=wp.vec3f, device="cpu")
         inputs = [other._mesh.id, self._inner, edge, own]
         wp.launch(crossing.edges_inside, len(chosen), inputs=inputs, outputs=[depth, at], device="cpu")
         return depth.numpy().astype(float), at.numpy() + self._origin
@@ -185,25 +197,37 @@ class SkinPair:
     edges: tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
     def crossed(self, boxes: tuple[Array, Array], origin: Array, least: float) -> Found:
-        """How deep one lies in the other, where edges of one lie deeper than `least` [m] behind faces of the other."""
-        sides = ((self.one, self.other, 0), (self.other, self.one, 1))
-        self.one.settle(origin)
-        self.other.settle(origin)
+        """How deep one lies in the other, where edges of one lie deeper than `least` [m] behind faces of the other.
+
+        Args:
+            boxes: around the two, each shape (2, 3) [m].
+            origin: a point near them, for coordinates in float32 [m], shape (3,).
+            least: as above.
+        """
+        if self.one is self.other:
+            return self._in_itself(boxes[0], origin, least)
         crossing, points = False, []
-        for skin, other, k in sides[: 1 if self.one is self.other else 2]:
+        for skin, other, k in ((self.one, self.other, 0), (self.other, self.one, 1)):
             chosen = skin.near(boxes[1 - k])
             chosen = chosen[self.edges[k][chosen]]
+            if not len(chosen):
+                continue
+            skin.settle(origin)
+            other.settle(origin)
             depth, at = skin.edges_in(other, chosen)
-            if self.one is self.other:
-                best = int(depth.argmax())
-                return (float(depth[best]), at[best]) if depth[best] > least else NOWHERE
-            deep = depth > least
-            crossing |= bool(deep.any())
-            points.append(np.concatenate([at[deep], skin.samples(chosen)]))
+            crossing |= bool((depth > least).any())
+            points.append((other, skin, chosen, at[depth > least]))
         if not crossing:
             return NOWHERE
-        found = [other.deepest(at) for (_, other, _), at in zip(sides, points, strict=True)]
+        found = [body.deepest(np.concatenate([at, skin.samples(chosen)])) for body, skin, chosen, at in points]
         return max(found, key=lambda item: item[0])
+
+    def _in_itself(self, box: Array, origin: Array, least: float) -> Found:
+        skin = self.one
+        skin.settle(origin)
+        depth, at = skin.edges_in(skin, skin.near(box))
+        best = int(depth.argmax())
+        return (min(float(depth[best]), 0.5 * skin.thickness), at[best]) if depth[best] > least else NOWHERE
 
 
 def depths_below(points: Array, x: Array, triangle: Index) -> Array:

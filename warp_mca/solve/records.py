@@ -25,8 +25,8 @@ class SceneRecords:
             (pass_count, 2), float64.
         stiffened: of each body, energy that its cells spent on their own stiffness and its strain energy [J], when that
             was greatest of a few looks, see `runs.bending`, shape (body_count, 2), float64.
-        passed: of each case that `runs.passing_cases` lists, how deep it was seen [m], when first [s], where deepest [m]
-            and how deep at the start [m], shape (case_count, 6), float64; empty before the first look.
+        passed: of each case that `runs.passing_cases` lists, how deep it was seen [m], when first [s], where deepest
+            [m] and how deep at the start [m], shape (case_count, 6), float64; empty before the first look.
         due: step from which on the next of these looks is due [-].
         apart: steps between two of them, by the latest one [-]; 0 before the first.
         wait: steps from the latest one until the next is due [-].
