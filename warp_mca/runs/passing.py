@@ -39,7 +39,7 @@ class Watch:
 
     def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], model: Model, dt: float) -> None:
         """Choose what to look at; `dt` is the time step [s]."""
-        self._dt, self._longest = dt, scene.impact.duration / FEWEST
+        self._dt, self._most = dt, max(1, int(scene.impact.duration / FEWEST / dt))
         self._driven = float(np.abs(model.table_value).max(initial=0.0))
         self._gravity = float(np.linalg.norm(scene.gravity))
         self._skins = [Skin(b.name, meshes[b.name], model.X, model.node_start[b.name]) for b in scene.bodies]
@@ -57,7 +57,7 @@ class Watch:
             passed: what was seen before, as `SceneRecords.passed`; empty at the first look.
         """
         if not np.isfinite(x).all():
-            return passed, self._steps(np.inf, 0.0)
+            return passed, self._most
         first = np.cumsum([len(skin.nodes) for skin in self._skins])[:-1]
         for skin, own in zip(self._skins, np.split(x, first), strict=True):
             skin.move(own)
@@ -84,8 +84,8 @@ class Watch:
     def _steps(self, room: float, speed: float) -> int:
         """Steps in which two nodes can approach each other by `room` [m]: by 2 (v t + g t^2 / 2) at most."""
         v, g = FASTER * speed + self._driven, self._gravity
-        time = room / (v + np.sqrt(v * v + g * room)) if v + g > 0.0 else np.inf
-        return max(1, int(min(time, self._longest) / self._dt))
+        fastest = v + math.sqrt(v * v + g * room)
+        return max(1, int(min(self._most, room / fastest / self._dt))) if 0.0 < fastest < math.inf else self._most
 
     def said(self, passed: Array, origin: float = 0.0) -> list[str]:
         """A sentence for each case that was seen; times count from `origin` [s]."""

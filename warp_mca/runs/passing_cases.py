@@ -243,5 +243,5 @@ def _free_edges(one: Skin, other: Skin, bound: Sequence[Array]) -> tuple[Mask, M
             meets = trees[1 - k].query(skin.X, distance_upper_bound=near)[0] < np.inf
             away = np.asarray(KDTree(held).query(skin.X)[0])
             reach = ROOM * float(away[meets].max(initial=skin.width))
-            free[k] &= (away > reach)[skin.edge].any(axis=1)
+            free[k] &= (away > reach)[skin.edge].all(axis=1)
     return free[0], free[1]

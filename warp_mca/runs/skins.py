@@ -107,7 +107,7 @@ class Skin:
             found.append(length.numpy().astype(float))
         inward = min(float(np.quantile(found[0], THIN)), self.extents[0])
         outward = float(found[1].min())
-        return inward, outward if outward < reach else np.inf
+        return inward, outward if outward < 0.99 * reach else np.inf  # in float32
 
     def move(self, x: Array) -> None:
         """Take the place of its nodes [m], shape (node_count, 3), float64."""
