@@ -34,7 +34,9 @@ def ball(nodes: str, **impact: float) -> mca.Scene:
 
 def test_nodes_that_a_contact_leaves_out_do_not_go_through_a_plane_unseen():
     (warning,) = said(mca.run(ball("pole")), "went below the rigid plane")
-    assert warning.startswith("nodes of ball that are not in its contact's surface went below the rigid plane from t = ")
+    assert warning.startswith(
+        "nodes of ball that are not in its contact's surface went below the rigid plane from t = "
+    )
     assert not said(mca.run(ball("boundary")), "went below")
 
 

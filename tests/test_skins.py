@@ -53,7 +53,7 @@ def test_boxes_that_touch_do_not_cross(away: float):
 @pytest.mark.parametrize("along", [1, 2, 5, 12])
 @pytest.mark.parametrize("inside", [5e-4, 2e-3])
 def test_edges_that_cross_between_nodes_are_found(along: int, inside: float):
-    """Edges of two square bars cross at right angles: middles of the parts inside lie 1 / sqrt 2 as deep below faces."""
+    """Edges of two square bars cross: middles of the parts inside lie 1 / sqrt 2 as deep below faces."""
     low = (math.pi / 4, 0.0, 0.0)
     top = tuple((Rotation.from_rotvec([0.0, math.pi / 2, 0.0]) * Rotation.from_rotvec(low)).as_rotvec())
     height = 0.01 * math.sqrt(2.0) - inside
