@@ -20,6 +20,7 @@ from warp_mca.results.sensors import join_sensors
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
 from warp_mca.runs.looks import Looks
+from warp_mca.runs.passing import Watch
 from warp_mca.runs.scene_run import SceneRun
 from warp_mca.solve.output import Output
 from warp_mca.solve.records import SceneRecords
@@ -102,13 +103,14 @@ class Impact:
         self.solver.start(self.state)
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
+        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt) for item in ready]
         self._begin_scenes()
 
     def _begin_scenes(self) -> None:
         first = offsets([len(item.probes.corner) for item in self.ready])
         channel = offsets([item.sensors.channels for item in self.ready])
         self.scene_runs = [
-            SceneRun(item, self.steps, self.solver, self.state, k, int(first[k]), int(channel[k]))
+            SceneRun(item, self.steps, self.solver, self.state, self._watches[k], k, int(first[k]), int(channel[k]))
             for k, item in enumerate(self.ready)
         ]
 

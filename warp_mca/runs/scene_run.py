@@ -51,6 +51,7 @@ class SceneRun:
 
     Attributes:
         ledger: rows of its history, energy balance and guards.
+        watch: what may go into each other.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class SceneRun:
         steps: Steps,
         solver: Solver,
         state: State,
+        watch: Watch,
         index: int = 0,
         first_probe: int = 0,
         first_channel: int = 0,
@@ -70,11 +72,13 @@ class SceneRun:
             steps: of the run.
             solver: that runs it.
             state: that it advances.
+            watch: of what may go into each other.
             index: number of the scene in the solver's layout.
             first_probe: number of the scene's first probe of paths among the solver's.
             first_channel: number of the first channel of its probes and sections among the solver's.
         """
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
+        self.watch = watch
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         self.channels = slice(first_channel, first_channel + ready.sensors.channels)
         tolerance = ready.scene.impact.energy_tolerance
@@ -100,11 +104,6 @@ class SceneRun:
     def samples(self) -> list[Sample]:
         """Cells that `runs.bending` looks at."""
         return samples_of(self.ready.model)
-
-    @cached_property
-    def watch(self) -> Watch:
-        """What `runs.passing` looks at."""
-        return Watch(self.ready.scene, self.ready.meshes, self.ready.model, self.solver.dt)
 
     def bent(self, u: Array) -> Array:
         """What `runs.bending` has seen, with these displacements of all scenes [m] too: `SceneRecords.stiffened`."""
