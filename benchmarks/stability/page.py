@@ -39,6 +39,7 @@ WORDS = (
         "a contact nearly opened between two compressions: compare with a finer mesh",
     ),
     ("went into each other", "into each other", "bodies went into each other where no contact keeps them apart"),
+    ("through each other", "through itself", "parts of a body went through each other"),
     ("counts in millimetres", "units", "size, mass and step are those of a file in other units: give `scale`"),
     ("across the axis", "across", "friction acts across the axis of `F_t_N`: read the vectors of forces.npz"),
     (
