@@ -26,8 +26,7 @@ def box(size: tuple[float, float, float], cells: tuple[int, int, int], *place: t
 
 
 def depth(one: Skin, other: Skin, least: float = 0.0) -> float:
-    every = tuple(np.ones(len(item.edge), dtype=bool) for item in (one, other))
-    return SkinPair(one, other, every).crossed((one.box, other.box), one.box.mean(axis=0), least)[0]
+    return SkinPair(one, other).crossed((one.box, other.box), one.box.mean(axis=0), least)[0]
 
 
 @pytest.mark.parametrize("scale", [1e-5, 1.0, 1e3])

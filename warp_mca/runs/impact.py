@@ -103,7 +103,7 @@ class Impact:
         self.solver.start(self.state)
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
-        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt) for item in ready]
+        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span) for item in ready]
         self._begin_scenes()
 
     def _begin_scenes(self) -> None:

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 PRESSED = 2.0  # times the depth of a contact's springs, up to which skins cross by the contact's own doing
 MEANT = 1.25  # times the overlap at the start, up to which it is meant
 FEWEST = 16  # looks in an impact phase at least
+CLOSEST = 4  # steps between two looks at least: in so few nothing passes two cells below half of the wave speed
 FASTER = 1.5  # times the greatest speed so far that nodes may reach until the next look
 
 DEPTH, TIME, PLACE, START = 0, 1, slice(2, 5), 5  # columns of `SceneRecords.passed`
@@ -37,9 +38,9 @@ class Watch:
         nodes: of the skins, those of each in turn, in the model's numbering, int32; empty where there is no case.
     """
 
-    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], model: Model, dt: float) -> None:
-        """Choose what to look at; `dt` is the time step [s]."""
-        self._dt, self._most = dt, max(1, int(scene.impact.duration / FEWEST / dt))
+    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], model: Model, dt: float, span: float) -> None:
+        """Choose what to look at in an impact phase of `span` [s] with steps of `dt` [s]."""
+        self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
         self._driven = float(np.abs(model.table_value).max(initial=0.0))
         self._gravity = float(np.linalg.norm(scene.gravity))
         self._skins = [Skin(b.name, meshes[b.name], model.X, model.node_start[b.name]) for b in scene.bodies]
@@ -82,10 +83,11 @@ class Watch:
         return rows
 
     def _steps(self, room: float, speed: float) -> int:
-        """Steps in which two nodes can approach each other by `room` [m]: by 2 (v t + g t^2 / 2) at most."""
+        """Steps until a look, before two nodes have approached by `room` [m]: 2 (v t + g t^2 / 2) at most."""
         v, g = FASTER * speed + self._driven, self._gravity
         fastest = v + math.sqrt(v * v + g * room)
-        return max(1, int(min(self._most, room / fastest / self._dt))) if 0.0 < fastest < math.inf else self._most
+        steps = room / fastest / self._dt if 0.0 < fastest < math.inf else math.inf
+        return int(max(CLOSEST, min(self._most, steps)))
 
     def said(self, passed: Array, origin: float = 0.0) -> list[str]:
         """A sentence for each case that was seen; times count from `origin` [s]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -45,10 +46,15 @@ class Look:
         self.origin = self.boxes.mean(axis=(0, 1))
         self._bent: dict[int, float] = {}
 
-    def gap(self, one: int, other: int) -> float:
-        """Between the boxes of two skins, along the axis where it is greatest [m]; negative where they meet."""
-        a, b = self.boxes[one], self.boxes[other]
-        return float(np.maximum(a[0] - b[1], b[0] - a[1]).max())
+    @cached_property
+    def gaps(self) -> Array:
+        """Between the boxes of two skins, along the axis where it is greatest; negative where they meet [m].
+
+        Shape (body_count, body_count), float64.
+        """
+        lower, upper = self.boxes[:, 0], self.boxes[:, 1]
+        apart = (lower[:, None] - upper).max(axis=2)
+        return np.maximum(apart, apart.T)
 
     def bent(self, number: int) -> float:
         """How far a skin is out of shape [m]."""
@@ -110,14 +116,14 @@ class WithinBody:
 
     def found(self, look: Look, least: float) -> Found:
         """Where they lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
-        if look.gap(*self.numbers) > 0.0:
+        if look.gaps[self.numbers] > 0.0:
             return NOWHERE
         one, other = (look.boxes[k] for k in self.numbers)
         return self.pair.crossed((one, other), look.origin, least)
 
     def room(self, look: Look) -> float:
         """How far they can approach each other before they are through [m]."""
-        return max(SHARE * min(self.pair.one.thickness, self.pair.other.thickness), 0.5 * look.gap(*self.numbers))
+        return max(SHARE * min(self.pair.one.thickness, self.pair.other.thickness), 0.5 * look.gaps[self.numbers])
 
     def holds(self, look: Look) -> bool:
         """Whether one lies in the other as a whole, given that their skins do not cross."""
@@ -208,8 +214,7 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
         long = skin.extents[2] if skin.extents[2] > SLENDER * skin.extents[0] else np.inf
         play = BEND * min(skin.gap, long)
         if not scene.body(skin.name).rigid and np.isfinite(play):
-            every = np.ones(len(skin.edge), dtype=bool)
-            yield WithinItself(k, SkinPair(skin, skin, (every, every)), play, passes.get(frozenset((skin.name,)), ()))
+            yield WithinItself(k, SkinPair(skin, skin), play, passes.get(frozenset((skin.name,)), ()))
 
 
 def _bound_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> dict[frozenset[str], list[Index]]:
@@ -227,16 +232,18 @@ def _bound_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> dict
     return found
 
 
-def _free_edges(one: Skin, other: Skin, bound: Sequence[Array]) -> tuple[Mask, Mask]:
+def _free_edges(one: Skin, other: Skin, bound: Sequence[Array]) -> tuple[Mask, Mask] | None:
     """Edges of two skins off the places where joints and ties hold the bodies: hinges overlap there when they turn.
 
     Such a place reaches as far from the bound nodes as the bodies lie at each other there at the start, and half as far
-    again. `bound` are positions of these nodes [m], each shape (count, 3).
+    again. `bound` are positions of these nodes [m], each shape (count, 3); without any all edges are free, None.
     """
     from scipy.spatial import KDTree
 
+    if not bound:
+        return None
     free = [np.ones(len(skin.edge), dtype=bool) for skin in (one, other)]
-    trees = [KDTree(skin.X) for skin in (one, other)] if bound else []
+    trees = [KDTree(skin.X) for skin in (one, other)]
     near = 0.75 * (one.width + other.width)
     for held in bound:
         for k, skin in enumerate((one, other)):

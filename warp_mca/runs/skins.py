@@ -189,12 +189,12 @@ class SkinPair:
 
     Attributes:
         one, other: the skins.
-        edges: of each that count; those near what binds the bodies do not.
+        edges: of each that count, as those near what binds the bodies do not; None for all.
     """
 
     one: Skin
     other: Skin
-    edges: tuple[NDArray[np.bool_], NDArray[np.bool_]]
+    edges: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None
 
     def crossed(self, boxes: tuple[Array, Array], origin: Array, least: float) -> Found:
         """How deep one lies in the other, where edges of one lie deeper than `least` [m] behind faces of the other.
@@ -209,7 +209,7 @@ class SkinPair:
         crossing, points = False, []
         for skin, other, k in ((self.one, self.other, 0), (self.other, self.one, 1)):
             chosen = skin.near(boxes[1 - k])
-            chosen = chosen[self.edges[k][chosen]]
+            chosen = chosen[self.edges[k][chosen]] if self.edges else chosen
             if not len(chosen):
                 continue
             skin.settle(origin)
