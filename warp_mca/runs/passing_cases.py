@@ -84,8 +84,8 @@ class BelowPlane:
         return (float(depth[best]), self.skin.x[best]) if depth[best] > least else NOWHERE
 
     def room(self, look: Look) -> float:
-        """How far nodes can move before they are far below [m]."""
-        return max(SHARE * self.skin.thickness, 0.5 * float(self._height().min()))
+        """How far nodes can move before a look is due [m]: none comes out of a plane on its other side."""
+        return SHARE * float(self.skin.extents[2])
 
     def _height(self) -> Array:
         """Of the nodes above the plane [m], shape (node_count,); inf of those that contact keeps out."""
