@@ -1,6 +1,7 @@
 """Contact that is not resolved: refused where bodies could cross, said where force and time are not to be trusted."""
 
 import pytest
+from impacts import prepared
 
 import warp_mca as mca
 
@@ -86,14 +87,20 @@ def test_nodes_that_are_driven_through_a_plane_are_named(bound: str):
     assert said(mca.run(scene), "9 nodes of block were driven into the plane, up to 5") == (bound != "free")
 
 
-def crossed(axial: int, other: int, **contact) -> mca.Scene:
-    """Two rods of 10 mm, one along x falls on one along z, with so many cells along each 200 mm."""
+def crossed(
+    axial: int, other: int, along: float = 0.003, speed: float = 5.0, tilt: float = 0.0, **contact
+) -> mca.Scene:
+    """Two rods of 10 mm, one along x falls on one along z, with so many cells along each 200 mm.
+
+    They cross at `along` [m] on the lower one; the upper one is tilted by an angle [rad].
+    """
 
     def rod(name: str, cells: int, **start) -> mca.Body:
         bar = mca.Box(size=(0.2, 0.01, 0.01), divisions=(cells, 2, 2), origin=(-0.1, -0.005, -0.005))
         return mca.Body(name=name, geometry=bar, material=STEEL, **start)
 
-    upper = rod("upper", axial, position=(0.007, 0.0101, 0.003), velocity=(0.0, -5.0, 0.0))
+    start = {"position": (0.007, 0.0101 + 0.012 * tilt, along), "rotation": (0.0, 0.0, tilt)}
+    upper = rod("upper", axial, velocity=(0.0, -speed, 0.0), **start)
     lower = rod("lower", other, rotation=(0.0, 1.5707963, 0.0))
     slave, master = (mca.Surface(body=name, nodes="boundary") for name in ("upper", "lower"))
     return mca.Scene(
@@ -104,11 +111,17 @@ def crossed(axial: int, other: int, **contact) -> mca.Scene:
     )
 
 
+@pytest.mark.parametrize(("speed", "tilt"), [(5.0, 0.0), (0.0, 0.1), (-1.0, -0.1)])
 @pytest.mark.parametrize("two_way", [False, True])
-def test_bodies_that_could_cross_between_nodes_are_refused(two_way: bool):
+def test_bodies_that_could_cross_between_nodes_are_refused(two_way: bool, speed: float, tilt: float):
     pattern = r"slave\.body upper: distance between nodes \[m\] = 0\.02: body lower is 0\.010"
     with pytest.raises(mca.RequestError, match=pattern):
-        mca.run(crossed(10, 10, two_way=two_way))
+        prepared(crossed(10, 10, 0.01, speed, tilt, two_way=two_way))
+
+
+def test_a_row_of_nodes_where_bodies_meet_sees_the_other():
+    """Of the lower rod, whose nodes lie 20 mm apart, one row lies below the upper one."""
+    prepared(crossed(10, 10, two_way=True))
 
 
 def test_bodies_whose_finer_side_sees_the_other_are_run():

@@ -11,6 +11,7 @@ import pytest
 from impacts import begun
 
 import warp_mca as mca
+from warp_mca.runs.passing import DEPTH
 
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
 FLOOR = mca.RigidPlane()
@@ -33,7 +34,9 @@ def ball(nodes: str, **impact: float) -> mca.Scene:
 
 def test_nodes_that_a_contact_leaves_out_do_not_go_through_a_plane_unseen():
     (warning,) = said(mca.run(ball("pole")), "went below the rigid plane")
-    assert warning.startswith("nodes of ball that are not in its contact's surface went below the rigid plane, 0.00")
+    assert warning.startswith(
+        "nodes of ball that are not in its contact's surface went below the rigid plane from t = "
+    )
     assert not said(mca.run(ball("boundary")), "went below")
 
 
@@ -50,7 +53,7 @@ def boxes(element: str = "hex8", gap: float = 1e-3, speed: float = 20.0, **more:
 
 def test_bodies_without_a_contact_do_not_go_through_each_other_unseen():
     (warning,) = said(mca.run(boxes()), "went into each other")
-    assert warning.startswith("large and small went into each other, 0.0")
+    assert warning.startswith("large and small went into each other from t = 7.2e-05 s on, up to 0.004 m deep at (")
     assert warning.endswith("take all of the surface, such as nodes='boundary', in a Contact")
     sides = [mca.Surface(body=name, nodes="boundary") for name in ("small", "large")]
     scene = boxes(contacts=(mca.Contact(slave=sides[0], master=sides[1]),))
@@ -77,7 +80,7 @@ def test_what_was_seen_is_stored_with_the_state(tmp_path: Path):
     other.load(tmp_path / "state")
     for impact in (whole, other):
         impact.advance()
-    assert whole.state.scenes[0].passed.max() > 0.0
+    assert whole.state.scenes[0].passed[0, DEPTH] > 0.003
     assert other.state.differences(whole.state) == []
 
 
@@ -101,7 +104,7 @@ def test_velocities_that_a_joint_does_not_allow_are_told(rigid: bool):
     assert warning.startswith(f"{lost} J of the 0.02 J of kinetic energy that bodies were given are lost at the start")
     assert "joint W" in warning
     assert not said(mca.run(scene(1.0)), "contradict")
-    assert begun(scene(1.0)).scene_runs[0].pairs == []  # what is joined may lie in each other
+    assert not said(mca.run(scene(1.0)), "each other")  # what is joined may lie in each other there
 
 
 @pytest.mark.parametrize("rigid", [True, False])

@@ -95,7 +95,18 @@ class Axis:
 Builds = TypeVar("Builds", Trial, Direct)
 AXES: dict[str, Axis] = {}
 # In the order of the page.
-GROUPS = ("bars", "steps", "two bodies", "material", "contact", "options", "motion", "rotations", "arm")
+GROUPS = (
+    "bars",
+    "steps",
+    "two bodies",
+    "material",
+    "contact",
+    "through each other",
+    "options",
+    "motion",
+    "rotations",
+    "arm",
+)
 
 
 def ordered_axes() -> list[Axis]:

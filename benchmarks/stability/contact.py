@@ -142,7 +142,7 @@ def ball_size(value: float, element: str) -> Trial:
     group="contact",
     title="Ball on a block: Young's modulus of the ball over the block's",
     reference=f"{BALL}, on a block; at sqrt(ratio) m/s where the ball is soft.",
-    values=(1e-4, 1.0, 1e4),
+    values=(1e-2, 1.0, 1e2),
 )
 def ball_ratio(value: float, element: str) -> Trial:
     """As `ball`."""

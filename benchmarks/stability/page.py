@@ -41,6 +41,7 @@ WORDS = (
         "a contact nearly opened between two compressions: compare with a finer mesh",
     ),
     ("went into each other", "into each other", "bodies went into each other where no contact keeps them apart"),
+    ("through each other", "through itself", "parts of a body went through each other"),
     ("give a bar wave speed of", "units", "no solid has such a stiffness or density: give Pa and kg/m³"),
     ("in millimetres", "size", "size and mass are those of millimetres: give metres"),
     ("across the axis", "across", "friction acts across the axis of `F_t_N`: read the vectors of forces.npz"),

@@ -13,6 +13,7 @@ from benchmarks.stability import (  # noqa: F401  (they register axes)
     material,
     motion,
     options,
+    passing,
     turns,
 )
 from benchmarks.stability.axis import AXES, Level, ordered_axes

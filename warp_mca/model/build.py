@@ -44,7 +44,7 @@ def _contacts(
     for index, contact in enumerate(parts.scene.contacts):
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
-        check_spacing(contact, parts.X, velocity, slave, master)
+        check_spacing(contact, parts.X, slave, master)
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
         for item in contact_passes(contact, index, slave, master):

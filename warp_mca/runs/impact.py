@@ -17,9 +17,10 @@ from warp_mca.model.floating import with_floating_frames
 from warp_mca.model.layout import offsets
 from warp_mca.results.paths import join_probes
 from warp_mca.results.sensors import join_sensors
-from warp_mca.runs.bending import LOOKS
 from warp_mca.runs.division import divide_alike
 from warp_mca.runs.initial_overlap import settle_initial_overlap
+from warp_mca.runs.looks import Looks
+from warp_mca.runs.passing import Watch
 from warp_mca.runs.scene_run import SceneRun
 from warp_mca.solve.output import Output
 from warp_mca.solve.records import SceneRecords
@@ -102,13 +103,14 @@ class Impact:
         self.solver.start(self.state)
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
+        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span) for item in ready]
         self._begin_scenes()
 
     def _begin_scenes(self) -> None:
         first = offsets([len(item.probes.corner) for item in self.ready])
         channel = offsets([item.sensors.channels for item in self.ready])
         self.scene_runs = [
-            SceneRun(item, self.steps, self.solver, self.state, k, int(first[k]), int(channel[k]))
+            SceneRun(item, self.steps, self.solver, self.state, self._watches[k], k, int(first[k]), int(channel[k]))
             for k, item in enumerate(self.ready)
         ]
 
@@ -137,7 +139,7 @@ class Impact:
             What each scene has recorded so far.
         """
         earlier = self.state.scenes
-        self.state.scenes = [records.without_rows() for records in earlier]
+        self.state.scenes = [records.without_rows(self.state.steps * self.solver.dt) for records in earlier]
         self.state.steps = 0
         self.take(steps)
         return earlier
@@ -201,8 +203,7 @@ class _Loop:
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
-        looked_at = any(item.samples or item.pairs for item in impact.scene_runs)
-        self.looks = Transfer({"u": self.state.u}, self.solver.device) if looked_at else None
+        self.looks = Looks(self.solver, self.state, impact.scene_runs)
         self.written = 0
         if ended:  # each part of the ring is waited for
             self.solver.replay.note_ahead(self.state)
@@ -217,8 +218,9 @@ class _Loop:
         if until is None or self.state.steps >= self.steps.count:
             if self.written == ROWS:
                 self._send()
+            self.looks.watch(last=True)
             self._record(1, self.state.steps // self.steps.per_interval, True)
-        self._see()
+        self.looks.finish()
         if self.written:
             self._send()
         if self.impact.recording:
@@ -235,8 +237,8 @@ class _Loop:
     def _interval(self, interval: int, last: int) -> None:
         """The steps of an output interval that are not done yet, up to step `last`."""
         first = interval * self.steps.per_interval
-        if interval and interval % max(1, self.steps.intervals // LOOKS) == 0 and self.state.steps == first:
-            self._look()
+        if self.state.steps == first:
+            self.looks.row(interval, self.steps.intervals)
         for number, part in enumerate(self.steps.parts(interval)):
             end = first + part.count
             if self.state.steps < min(end, last):
@@ -245,17 +247,19 @@ class _Loop:
 
     def _part(self, part: Part, first: int, end: int, row: int | None) -> None:
         """Steps that follow each other without a look from outside, from the present one to `end`."""
-        if self.state.steps > first:  # interrupted in between
-            self.solver.step(self.state, end - self.state.steps)
-            return
-        if part.begins_check and self.written == ROWS:
-            self._send()
-        if part.begins_check:
-            self._record(end - first, row, part.begins_search)
-            return
-        if part.begins_search:
-            self.solver.search(self.state)
-        self.solver.step(self.state, end - first)
+        if self.state.steps == first:  # not interrupted in between
+            self.looks.watch()
+            if part.begins_check and self.written == ROWS:
+                self._send()
+            count = self.looks.until(end - first, part.count)
+            if part.begins_check:
+                self._record(count, row, part.begins_search)
+            elif part.begins_search:
+                self.solver.search(self.state)
+        while self.state.steps < end:
+            if self.state.steps > first:
+                self.looks.watch(part.count)
+            self.solver.step(self.state, self.looks.until(end - self.state.steps, part.count))
 
     def _record(self, count: int, row: int | None, searches: bool = False) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
@@ -285,15 +289,3 @@ class _Loop:
     def _receive(self) -> None:
         self.impact.read(*self.transfer.receive())
         self.told()
-
-    def _look(self) -> None:
-        """Have bodies looked at as they are now, once their shape has come, while the device goes on."""
-        self._see()
-        if self.looks:
-            self.looks.send(0)
-
-    def _see(self) -> None:
-        while self.looks and self.looks.pending:
-            _, shape = self.looks.receive()
-            for item in self.impact.scene_runs:
-                item.ledger.kept.stiffened, item.ledger.kept.passed = item.look(shape["u"])

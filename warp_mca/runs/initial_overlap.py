@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import triangulated
-from warp_mca.kernels.contact.inside import depths_inside
 from warp_mca.results.contact_history import contact_names
+from warp_mca.runs.skins import depths_below
 from warp_mca.scene import OVERLAP_CHOICES, RigidPlane
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Overlap:
         node: the deepest one, or a corner of the deepest cell.
         depth: of that node, or of that middle [m].
         energy: that springs of this pass would hold at the start [J].
-        kind: nodes or cells.
+        kind: nodes or cells; "behind" for nodes behind the master's faces that lie outside its body.
     """
 
     count: int
@@ -63,7 +63,10 @@ def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: Sta
         for scene, item in enumerate(stage.items):
             mine = slice(int(stage.springs[scene]), int(stage.springs[scene + 1]))
             if item.initial_overlap == "refuse":
-                found = _found(slaves[mine], depth[mine], energy[mine], _rounding(stage, scene, solver))
+                least = _rounding(stage, scene, solver)
+                found = _found(slaves[mine], depth[mine], energy[mine], least)
+                if found and not stage.on_plane:
+                    found = _or_behind(found, slaves[mine][depth[mine] > least], ready[scene], stage, scene, solver)
                 found = found or _deep_overlap(ready[scene], stage, scene, solver)
                 if found:
                     raise _refusal(ready, scene, item.contact, found, solver.model.X[found.node])
@@ -105,6 +108,20 @@ def _found(slaves: NDArray[np.int32], depth: Array, energy: Array, least: float)
     return Overlap(count, int(slaves[deepest]), float(depth[deepest]), float(energy.sum()))
 
 
+def _or_behind(
+    found: Overlap, nodes: NDArray[np.int32], ready: Prepared, stage: ContactStage, scene: int, solver: Solver
+) -> Overlap:
+    """What was found, named "behind" if none of the pressed nodes lies in the master's body."""
+    contact, sign = ready.scene.contacts[stage.items[scene].contact], stage.items[scene].sign
+    assert not isinstance(contact.master, RigidPlane)
+    name = contact.master.body if sign > 0.0 else contact.slave.body
+    first = int(solver.layout.nodes[scene]) + ready.model.node_start[name]
+    mesh = ready.meshes[name]
+    body = solver.model.X[first : first + len(mesh.points)]
+    inside = depths_below(solver.model.X[np.unique(nodes)], body, triangulated(mesh.boundary[0]))
+    return found if (inside > -_rounding(stage, scene, solver)).any() else replace(found, kind="behind")
+
+
 def _deep_overlap(ready: Prepared, stage: ContactStage, scene: int, solver: Solver) -> Overlap | None:
     """Slave nodes that lie inside the master's body too deep for its faces to reach them, if there are any."""
     if stage.on_plane:
@@ -121,7 +138,7 @@ def _deep_overlap(ready: Prepared, stage: ContactStage, scene: int, solver: Solv
     near = own[_in_box(X[own], body)]
     found = None
     if len(near):
-        depth = _depths_inside(X[near], body, mesh.boundary[0])
+        depth = depths_below(X[near], body, triangulated(mesh.boundary[0]))
         found = _found(near + first, depth, np.zeros(len(near)), DEEP * _edge(stage, scene))
     if found:
         return found
@@ -129,7 +146,7 @@ def _deep_overlap(ready: Prepared, stage: ContactStage, scene: int, solver: Solv
     near = np.flatnonzero(_in_box(middle, body))
     if not len(near):
         return None
-    depth = _depths_inside(middle[near], body, mesh.boundary[0])
+    depth = depths_below(middle[near], body, triangulated(mesh.boundary[0]))
     depth[depth <= WITHIN * radius[near]] = 0.0
     nodes = node[near] + model.node_start[slave.body] + first
     within = _found(nodes, depth, np.zeros(len(near)), 0.0)
@@ -157,31 +174,18 @@ def _in_box(points: Array, body: Array) -> NDArray[np.bool_]:
     return ((points > body.min(axis=0)) & (points < body.max(axis=0))).all(axis=1)
 
 
-def _depths_inside(points: Array, body: Array, quads: NDArray[np.int32]) -> Array:
-    """Depth of points below the surface of a body, negative outside [m], shape (point_count,), to float32's digits."""
-    origin = body.mean(axis=0)
-    reach = float(np.linalg.norm(np.ptp(body, axis=0)))
-    with wp.ScopedDevice("cpu"):
-        surface = wp.Mesh(
-            wp.array((body - origin).astype(np.float32), dtype=wp.vec3f),
-            wp.array(triangulated(quads).ravel(), dtype=wp.int32),
-            support_winding_number=True,
-        )
-        distance = wp.zeros(len(points), dtype=wp.float32)
-        inputs = [surface.id, wp.array((points - origin).astype(np.float32), dtype=wp.vec3f), reach]
-        wp.launch(depths_inside, len(points), inputs=inputs, outputs=[distance])
-        return distance.numpy().astype(np.float64)
-
-
 def _refusal(ready: Sequence[Prepared], scene: int, contact: int, found: Overlap, at: Array) -> RequestError:
     item: Contact = ready[scene].scene.contacts[contact]
     field = f"Contact {contact_names(ready[scene].scene.contacts)[contact]}: initial_overlap"
     others = ", ".join(repr(choice) for choice in OVERLAP_CHOICES[1:])
-    remedy = (
-        f"{found.kind} of one body lie inside the other before the first step ({found.count} of them, up to "
-        f"{found.depth:.3g} m deep at ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) m)"
-    )
-    if found.kind == "nodes":  # which springs press; the bodies of cells that only their middle shows are out of place
+    place = f"({found.count} of them, up to {found.depth:.3g} m deep at ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) m)"
+    remedy = f"{found.kind} of one body lie inside the other before the first step {place}"
+    if found.kind == "behind":
+        remedy = (
+            f"nodes of one body lie behind the other's faces in the contact, though outside of it {place}: faces press "
+            "towards their own side only; name the side of the body that the nodes come from, or nodes='boundary'"
+        )
+    elif found.kind == "nodes":  # which springs press; bodies of cells that only their middle shows are out of place
         springs = f"contact springs would hold {found.energy:.3g} J"
         remedy = f"{remedy}, and {springs}: move the bodies apart, or choose one of {others}"
     else:

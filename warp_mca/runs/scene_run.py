@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -24,7 +25,7 @@ from warp_mca.runs.history_rows import contact_histories, history_columns
 from warp_mca.runs.inertia_warnings import inertia_warnings
 from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import body_report, mass_report, mass_warnings
-from warp_mca.runs.passing import Pair, pairs_of, passed, passing_warnings
+from warp_mca.runs.passing import Watch
 from warp_mca.runs.rate_groups import rate_figures
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
 from warp_mca.runs.start_warnings import start_warnings
@@ -51,6 +52,7 @@ class SceneRun:
 
     Attributes:
         ledger: rows of its history, energy balance and guards.
+        watch: what may go into each other.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class SceneRun:
         steps: Steps,
         solver: Solver,
         state: State,
+        watch: Watch,
         index: int = 0,
         first_probe: int = 0,
         first_channel: int = 0,
@@ -70,11 +73,13 @@ class SceneRun:
             steps: of the run.
             solver: that runs it.
             state: that it advances.
+            watch: of what may go into each other.
             index: number of the scene in the solver's layout.
             first_probe: number of the scene's first probe of paths among the solver's.
             first_channel: number of the first channel of its probes and sections among the solver's.
         """
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
+        self.watch = watch
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         self.channels = slice(first_channel, first_channel + ready.sensors.channels)
         tolerance = ready.scene.impact.energy_tolerance
@@ -101,20 +106,27 @@ class SceneRun:
         """Cells that `runs.bending` looks at."""
         return samples_of(self.ready.model)
 
-    @cached_property
-    def pairs(self) -> list[Pair]:
-        """What `runs.passing` looks at."""
-        return pairs_of(self.ready.scene, self.ready.meshes, self.ready.model)
-
-    def look(self, u: Array) -> tuple[Array, Array]:
-        """What `runs.bending` and `runs.passing` have seen, with these displacements of all scenes [m] too.
-
-        See `SceneRecords.stiffened` and `passed`.
-        """
-        kept, model = self.ledger.kept, self.ready.model
+    def bent(self, u: Array) -> Array:
+        """What `runs.bending` has seen, with these displacements of all scenes [m] too: `SceneRecords.stiffened`."""
         first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        stiffened = seen(model, self.samples, u[first:end], kept.stiffened) if self.samples else kept.stiffened
-        return stiffened, passed(model, self.pairs, u[first:end], kept.passed) if self.pairs else kept.passed
+        before = self.ledger.kept.stiffened
+        return seen(self.ready.model, self.samples, u[first:end], before) if self.samples else before
+
+    def look_for_passing(self, steps: int, u: Array, found: Mapping[str, NDArray]) -> None:
+        """Keep what `runs.passing` sees after so many steps.
+
+        Args:
+            steps: since the start of the phase.
+            u: displacements of the nodes that it looks at [m], shape (node_count, 3), float64.
+            found: `speed_square` of the state, and the greatest depths of the springs of each contact pass.
+        """
+        kept, first, end = self.ledger.kept, *self.solver.layout.nodes[self.index : self.index + 2]
+        squares = found["speed_square"]
+        speed = math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
+        springs = [stage.springs[self.index : self.index + 2] for stage in self.solver.contacts]
+        pressed = np.array([found[str(k)][a:b].max(initial=0.0) for k, (a, b) in enumerate(springs)])
+        x = self.ready.model.X[self.watch.nodes] + u
+        kept.passed, kept.apart = self.watch.look(x, speed, pressed, steps * self.solver.dt, kept.passed)
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
@@ -138,7 +150,8 @@ class SceneRun:
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
         model = self.ready.model
         told = [*contact_warnings(contacts, model.contact_axes, symmetry_of(model)), *flutter_warnings(history, model)]
-        warnings = (*self._warnings(shares, stopped), *told, *said)
+        passed = self.watch.said(self.ledger.kept.passed, origin)
+        warnings = (*self._warnings(shares, stopped), *passed, *told, *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
         return Result(summary, history, None, warnings, paths, stopped, **own)
 
@@ -231,12 +244,10 @@ class SceneRun:
         found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
         if stopped is None:
             u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
-            stiffened, depths = self.look(u)
             nodes = slice(*self.solver.layout.nodes[self.index : self.index + 2])
             found += inertia_warnings(self.ready, u[nodes], v[nodes])
-            kept = ledger.kept
-            found += bending_warnings(self.ready.model, stiffened, kept.exchanged, kept.energy_scale, kept.touched)
-            found += passing_warnings(self.pairs, depths)
+            kept, bent = ledger.kept, self.bent(u)
+            found += bending_warnings(self.ready.model, bent, kept.exchanged, kept.energy_scale, kept.touched)
         tolerance = scene.impact.energy_tolerance
         if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
             found.append(

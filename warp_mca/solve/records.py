@@ -25,8 +25,11 @@ class SceneRecords:
             (pass_count, 2), float64.
         stiffened: of each body, when its strain energy [J] was greatest of a few looks, what `bent_cells` names of the
             bending of its cells, shape (body_count, COLUMNS), float64.
-        passed: of each pair that may go into each other, how deep it did in these looks [m], see `runs.passing`, shape
-            (pair_count,), float64.
+        passed: of each case that `runs.passing_cases` lists, how deep it was seen [m], when first [s], where deepest
+            [m] and how deep at the start [m], shape (case_count, 6), float64; empty before the first look.
+        due: step from which on the next of these looks is due [-].
+        apart: steps between two of them, by the latest one [-]; 0 before the first.
+        wait: steps from the latest one until the next is due [-].
         count: rows so far [-].
         records: check records so far, rows included [-].
         energy_error: greatest imbalance, as a share of initial energy and external work [-].
@@ -50,7 +53,10 @@ class SceneRecords:
     sensors: list[Array] = field(default_factory=list)
     peaks: Array = field(default_factory=lambda: np.zeros((0, 2)))
     stiffened: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    passed: Array = field(default_factory=lambda: np.zeros(0))
+    passed: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    due: int = 0
+    apart: int = 0
+    wait: int = 0
     count: int = 0
     records: int = 0
     energy_error: float = 0.0
@@ -71,11 +77,11 @@ class SceneRecords:
         lists = {name: list(getattr(self, name)) for name in _LISTS}
         return replace(self, **lists, **{name: getattr(self, name).copy() for name in _EXTREMES})
 
-    def without_rows(self) -> SceneRecords:
-        """What a run goes on with whose history begins anew: sums and extremes so far, no rows."""
-        return replace(
-            self, sums=[], velocities=[], path_stress=[], sensors=[], peaks=self.peaks.copy(), count=0, records=0
-        )
+    def without_rows(self, time: float) -> SceneRecords:
+        """What a run goes on with whose history begins anew at a time [s]: sums and extremes so far, no rows."""
+        rows = {name: [] for name in _LISTS}
+        passed = self.passed - np.array([0.0, time, 0.0, 0.0, 0.0, 0.0])
+        return replace(self, **rows, peaks=self.peaks.copy(), passed=passed, count=0, records=0, due=0)
 
     def arrays(self) -> dict[str, NDArray]:
         """All of it as arrays by name, for a file."""

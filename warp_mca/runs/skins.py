@@ -1,0 +1,252 @@
+"""Owns skins of bodies as closed triangle meshes on the host, and how deep edges of one lie in another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.geometry.cell_types import triangulated
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.kernels.contact import crossing
+from warp_mca.kernels.contact.inside import depths_inside
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+Found = tuple[float, Array]  # depth [m] and place [m], shape (3,)
+
+INWARD = 0.02  # of its shortest edge, by which a node is moved into its body: skins that only touch do not cross
+FLAT = 0.1  # of the body's thickness, which that does not exceed
+THIN = 0.05  # quantile of distances through a body that counts as its thickness: at sharp edges it has none
+SAMPLES = 2048  # points of a skin that are looked for in another body, evenly spread, where edges lie in it
+RAYS = 2048  # through a body and away from it, evenly spread over its triangles
+SHAPE_NODES = 1024  # of a body that tell how far it is out of shape, evenly spread
+NOWHERE: Found = (0.0, np.full(3, np.nan))
+
+
+class Skin:
+    """The closed surface of a body, which moves; computed on the host's CPU.
+
+    Attributes:
+        name: of the body.
+        nodes: of its surface, in the numbering of the scene's model, shape (node_count,), int32.
+        triangle: of faces and halves of faces, shape (triangle_count, 3), int32, by position in `nodes`.
+        edge: of the triangles, each once, shape (edge_count, 2), int32, by position in `nodes`.
+        width: of a face, median [m].
+        longest: longest edge [m].
+        thickness: of the thin parts of the body [m].
+        gap: least distance over which its faces see others of it from outside [m]; inf where they see none.
+        extents: of the body along its principal axes, from the least to the greatest [m], shape (3,), float64.
+        x: where the nodes are [m], shape (node_count, 3), float64.
+    """
+
+    def __init__(self, name: str, mesh: Mesh, X: Array, start: int) -> None:
+        """Take the skin of a mesh whose nodes begin at `start` in positions X [m], shape (node_count, 3), float64."""
+        faces = mesh.boundary[0]
+        self.name, own = name, np.unique(faces)
+        self.nodes = (own + start).astype(np.int32)
+        self.triangle = np.searchsorted(own, triangulated(faces)).astype(np.int32)
+        ends = np.sort(self.triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+        code = np.unique(ends[:, 0] * len(own) + ends[:, 1])
+        self.edge = np.stack([code // len(own), code % len(own)], axis=1).astype(np.int32)
+        self.X = X[self.nodes]
+        length = np.linalg.norm(self.X[self.edge[:, 0]] - self.X[self.edge[:, 1]], axis=1)
+        self.longest = float(length.max())
+        self._shortest = np.full(len(own), np.inf)
+        np.minimum.at(self._shortest, self.edge.ravel(), np.repeat(length, 2))
+        a, b, c = (self.X[self.triangle[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        self.width = float(np.sqrt(np.median(np.linalg.norm(normal, axis=1))))
+        centred = self.X - self.X.mean(axis=0)
+        self.extents = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
+        self._origin = self.X.mean(axis=0)
+        self.x, self._stale = self.X, False
+        some = slice(None, None, -(-len(normal) // RAYS))
+        self.thickness, self.gap = self._distances(((a + b + c) / 3.0)[some], normal[some])
+
+    @cached_property
+    def _mesh(self) -> wp.Mesh:
+        """The triangles at the start, whatever the body has become by then, so that stored runs go on alike."""
+        points = wp.array((self.X - self._origin).astype(np.float32), dtype=wp.vec3f, device="cpu")
+        return wp.Mesh(points, wp.array(self.triangle.ravel(), dtype=wp.int32, device="cpu"))
+
+    @cached_property
+    def _triangle(self) -> wp.array:
+        return wp.array(self.triangle, dtype=wp.int32, ndim=2, device="cpu")
+
+    @cached_property
+    def _inward(self) -> wp.array:
+        """How far each node is moved into the body [m], shape (node_count,), float32."""
+        distance = np.minimum(INWARD * self._shortest, FLAT * self.thickness)
+        return wp.array(distance.astype(np.float32), dtype=wp.float32, device="cpu")
+
+    @cached_property
+    def _inner(self) -> wp.array:
+        return wp.zeros(len(self.nodes), dtype=wp.vec3f, device="cpu")
+
+    @cached_property
+    def _normal(self) -> wp.array:
+        return wp.zeros(len(self.nodes), dtype=wp.vec3f, device="cpu")
+
+    def _distances(self, middle: Array, normal: Array) -> tuple[float, float]:
+        """Thickness and gap, by rays from the middles of triangles along their normals, inwards and outwards."""
+        reach = float(np.linalg.norm(self.extents))
+        unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        found = []
+        for sign in (-1.0, 1.0):
+            ahead = 1e-5 * reach * sign
+            origin = (middle - self._origin + ahead * unit).astype(np.float32)
+            start = wp.array(origin, dtype=wp.vec3f, device="cpu")
+            direction = wp.array((sign * unit).astype(np.float32), dtype=wp.vec3f, device="cpu")
+            length = wp.zeros(len(middle), dtype=wp.float32, device="cpu")
+            inputs = [self._mesh.id, start, direction, reach]
+            wp.launch(crossing.ray_lengths, len(middle), inputs=inputs, outputs=[length], device="cpu")
+            found.append(length.numpy().astype(float))
+        inward = min(float(np.quantile(found[0], THIN)), self.extents[0])
+        outward = float(found[1].min())
+        return inward, outward if outward < 0.99 * reach else np.inf  # in float32
+
+    def move(self, x: Array) -> None:
+        """Take the place of its nodes [m], shape (node_count, 3), float64."""
+        self.x, self._stale = x, True
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest coordinates [m], shape (2, 3), float64."""
+        columns = self.x.T  # numpy's extremes along the longer axis take many times as long
+        return np.array([[f(column) for column in columns] for f in (np.min, np.max)])
+
+    def bent(self) -> float:
+        """Greatest distance of a node from its place in the undeformed body, moved rigidly as fits best [m].
+
+        The best rotation by Kabsch, Acta Cryst. A 32 (1976) 922.
+        """
+        some = slice(None, None, -(-len(self.X) // SHAPE_NODES))
+        X, x = (points[some] - points[some].mean(axis=0) for points in (self.X, self.x))
+        left, _, right = np.linalg.svd(X.T @ x)
+        left[:, 2] *= np.sign(np.linalg.det(left @ right))
+        return float(np.sqrt(((x - X @ (left @ right)) ** 2).sum(axis=1).max()))
+
+    def settle(self, origin: Array) -> None:
+        """Make the mesh ready for `edges_in`, with coordinates from an origin near the body [m], shape (3,)."""
+        if not self._stale:
+            return
+        self._mesh.points.numpy()[:] = self.x - origin
+        self._mesh.refit()
+        self._normal.zero_()
+        points = self._mesh.points
+        inputs = [points, self._triangle]
+        wp.launch(crossing.add_normals, len(self.triangle), inputs=inputs, outputs=[self._normal], device="cpu")
+        inputs = [points, self._normal, self._inward]
+        wp.launch(crossing.move_inside, len(self.nodes), inputs=inputs, outputs=[self._inner], device="cpu")
+        self._origin, self._stale = origin, False
+
+    def edges_in(self, other: Skin, chosen: Index) -> tuple[Array, Array]:
+        """How deep chosen edges lie in another skin, or in others parts of this one, and where.
+
+        Both are settled with the same origin.
+
+        Returns:
+            Depths below planes of crossed faces [m], shape (chosen_count,), and places [m], shape (chosen_count, 3).
+        """
+        edge = wp.array(self.edge[chosen], dtype=wp.int32, ndim=2, device="cpu")
+        own = self._triangle if other is self else wp.zeros((0, 3), dtype=wp.int32, device="cpu")
+        depth = wp.zeros(len(chosen), dtype=wp.float32, device="cpu")
+        at = wp.zeros(len(chosen), dtype=wp.vec3f, device="cpu")
+        inputs = [other._mesh.id, self._inner, edge, own]
+        wp.launch(crossing.edges_inside, len(chosen), inputs=inputs, outputs=[depth, at], device="cpu")
+        return depth.numpy().astype(float), at.numpy() + self._origin
+
+    def near(self, box: Array) -> Index:
+        """Edges that may reach into a box, int32."""
+        near = ((self.x > box[0] - self.longest) & (self.x < box[1] + self.longest)).all(axis=1)
+        return np.flatnonzero(near[self.edge].any(axis=1)).astype(np.int32)
+
+    def samples(self, chosen: Index) -> Array:
+        """Ends and middles of chosen edges, moved into the body [m], shape (sample_count, 3), float64."""
+        inner = self._inner.numpy() + self._origin
+        ends = inner[self.edge[chosen]]
+        return np.concatenate([inner[np.unique(self.edge[chosen])], ends.mean(axis=1)])
+
+    def deepest(self, points: Array) -> Found:
+        """The deepest of some points that lie in the body; depth 0 where none does."""
+        (lower, upper) = self.box
+        points = points[((points > lower) & (points < upper)).all(axis=1)]
+        if not len(points):
+            return NOWHERE
+        points = points[:: -(-len(points) // SAMPLES)]
+        depth = depths_below(points, self.x, self.triangle)
+        best = int(depth.argmax())
+        return (float(depth[best]), points[best]) if depth[best] > 0.0 else NOWHERE
+
+
+@dataclass(frozen=True)
+class SkinPair:
+    """Two skins, or one and itself.
+
+    Attributes:
+        one, other: the skins.
+        edges: of each that count, as those near what binds the bodies do not; None for all.
+    """
+
+    one: Skin
+    other: Skin
+    edges: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None
+
+    def crossed(self, boxes: tuple[Array, Array], origin: Array, least: float) -> Found:
+        """How deep one lies in the other, where edges of one lie deeper than `least` [m] behind faces of the other.
+
+        Args:
+            boxes: around the two, each shape (2, 3) [m].
+            origin: a point near them, for coordinates in float32 [m], shape (3,).
+            least: as above.
+        """
+        if self.one is self.other:
+            return self._in_itself(boxes[0], origin, least)
+        crossing, points = False, []
+        for skin, other, k in ((self.one, self.other, 0), (self.other, self.one, 1)):
+            chosen = skin.near(boxes[1 - k])
+            chosen = chosen[self.edges[k][chosen]] if self.edges else chosen
+            if not len(chosen):
+                continue
+            skin.settle(origin)
+            other.settle(origin)
+            depth, at = skin.edges_in(other, chosen)
+            crossing |= bool((depth > least).any())
+            points.append((other, skin, chosen, at[depth > least]))
+        if not crossing:
+            return NOWHERE
+        found = [body.deepest(np.concatenate([at, skin.samples(chosen)])) for body, skin, chosen, at in points]
+        return max(found, key=lambda item: item[0])
+
+    def _in_itself(self, box: Array, origin: Array, least: float) -> Found:
+        skin = self.one
+        skin.settle(origin)
+        depth, at = skin.edges_in(skin, skin.near(box))
+        best = int(depth.argmax())
+        return (min(float(depth[best]), 0.5 * skin.thickness), at[best]) if depth[best] > least else NOWHERE
+
+
+def depths_below(points: Array, x: Array, triangle: Index) -> Array:
+    """Depth of points below a closed surface, negative outside [m], shape (point_count,), to float32's digits.
+
+    Args:
+        points: [m], shape (point_count, 3), float64.
+        x: nodes of the surface [m], shape (node_count, 3), float64.
+        triangle: their numbers, shape (triangle_count, 3), int32.
+    """
+    origin = x.mean(axis=0)
+    reach = float(np.linalg.norm(np.ptp(x, axis=0)))
+    with wp.ScopedDevice("cpu"):
+        surface = wp.Mesh(
+            wp.array((x - origin).astype(np.float32), dtype=wp.vec3f),
+            wp.array(triangle.ravel(), dtype=wp.int32),
+            support_winding_number=True,
+        )
+        distance = wp.zeros(len(points), dtype=wp.float32)
+        inputs = [surface.id, wp.array((points - origin).astype(np.float32), dtype=wp.vec3f), reach]
+        wp.launch(depths_inside, len(points), inputs=inputs, outputs=[distance])
+        return distance.numpy().astype(np.float64)
