@@ -22,7 +22,7 @@ from warp_mca.model.own_steps import OwnSteps
 from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.surfaces import ContactPass, contact_eigenvalues, contact_passes
-from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes
+from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import RigidPlane, Scene
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def build_model(
     """
     ties = tied_nodes(scene, meshes, X)
     parts = Assembly(scene, meshes, on_faces(ties, scene, X))
-    velocity = np.concatenate([V[body.name] for body in scene.bodies])
+    velocity = velocities(ties, scene, X, V)
     pairs, joints, couplings = join_bodies(parts)
     soft = flexible(couplings, pairs, own_nodes(parts))
     bases = movable_bases(parts, joints, soft, chain, start)
@@ -94,7 +94,7 @@ def build_model(
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
-    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**bodies, **_steps(parts, rigid.bodies, added, velocity), **held, **pairs}
     model = Model(
