@@ -11,7 +11,7 @@ energy are those of the cells as they then are, which differ by the share of the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.rotation import mean_spin
 from warp_mca.geometry.face_projection import project
+from warp_mca.model.layout import complete
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -117,17 +118,14 @@ class TiedNodes:
 
     def moved(self, start: int) -> TiedNodes:
         """The same with nodes that are counted from `start` on."""
-        return TiedNodes(
-            slave=(self.slave + start).astype(np.int32),
-            master=(self.master + start).astype(np.int32),
-            weight=self.weight,
-            facts=self.facts,
-        )
+        slave, master = (self.slave + start).astype(np.int32), (self.master + start).astype(np.int32)
+        return replace(self, slave=slave, master=master)
 
 
-def joined(items: Sequence[TiedNodes]) -> TiedNodes:
+def join_ties(items: Sequence[TiedNodes]) -> TiedNodes:
     """All of them."""
-    return TiedNodes(
+    return complete(
+        TiedNodes,
         slave=np.concatenate([np.zeros(0, np.int32), *(item.slave for item in items)]),
         master=np.concatenate([np.zeros((0, 4), np.int32), *(item.master for item in items)]),
         weight=np.concatenate([np.zeros((0, 4)), *(item.weight for item in items)]),
@@ -145,7 +143,7 @@ def tied_nodes(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     for body in scene.bodies:
         first[body.name] = start
         start += len(meshes[body.name].points)
-    found = joined([_tied(tie, meshes, X, first) for tie in scene.ties])
+    found = join_ties([_tied(tie, meshes, X, first) for tie in scene.ties])
     if len(np.unique(found.slave)) < len(found):
         raise RequestError("Scene.ties: a slave node is tied twice; give each tie slave nodes of its own")
     if np.isin(found.slave, found.carriers).any():
@@ -254,7 +252,7 @@ def _check_motion(
 def within_body(scene: Scene, meshes: Mapping[str, Mesh], body: str) -> tuple[Array, TiedNodes]:
     """Nodes of a body in its frame [m], slaves of ties within it on their faces, and these ties."""
     own, points = [tie for tie in scene.ties if tie.slave.body == tie.master.body == body], meshes[body].points
-    ties = joined([_tied(tie, meshes, {body: points}, {body: 0}) for tie in own])
+    ties = join_ties([_tied(tie, meshes, {body: points}, {body: 0}) for tie in own])
     return (ties.follow(points) if len(ties) else points), ties
 
 
