@@ -17,6 +17,7 @@ from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.bending import Sample, bending_warnings, samples_of, seen
 from warp_mca.runs.contact_warnings import resolution_warnings, symmetry_of
+from warp_mca.runs.creep_warnings import creep_warnings
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.flutter_warnings import flutter_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
@@ -25,6 +26,7 @@ from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import mass_report
 from warp_mca.runs.passing import Pair, pairs_of, passed, passing_warnings
 from warp_mca.runs.rate_groups import rate_figures
+from warp_mca.runs.ring_warnings import ring_warnings
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
 from warp_mca.runs.start_warnings import start_warnings
 from warp_mca.solve.state_figures import (
@@ -115,6 +117,11 @@ class SceneRun:
         stiffened = seen(model, self.samples, u[first:end], kept.stiffened) if self.samples else kept.stiffened
         return stiffened, passed(model, self.pairs, u[first:end], kept.passed) if self.pairs else kept.passed
 
+    def _displacements(self) -> Array:
+        """Of the scene's nodes [m], shape (node_count, 3), float64."""
+        first, end = self.solver.layout.nodes[self.index : self.index + 2]
+        return np.asarray(self.state.u.numpy(), dtype=np.float64)[first:end]
+
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
@@ -137,6 +144,8 @@ class SceneRun:
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
         model = self.ready.model
         told = [*contact_warnings(contacts, model.contact_axes, symmetry_of(model)), *flutter_warnings(history, model)]
+        told += ring_warnings(self.ready, contacts, self.steps.interval)
+        told += creep_warnings(self.ledger, model, names, self._displacements())
         warnings = (*self._warnings(shares, stopped), *told, *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
         return Result(summary, history, None, warnings, paths, stopped, **own)
@@ -238,6 +247,12 @@ class SceneRun:
                 f"energy imbalance is {ledger.exchange_error:.2%} of the {ledger.kept.exchanged:.3g} J that the bodies "
                 f"exchanged, though only {ledger.kept.energy_error:.2g} of all they have: {ledger.remedy}, if that is "
                 f"above what energy_tolerance = {tolerance:g} should allow"
+            )
+        if ledger.kept.made > tolerance:
+            found.append(
+                f"contact springs made or took up to {ledger.kept.made:.2%} of all energy as they closed and opened "
+                f"within steps, more than energy_tolerance = {tolerance:g}, and the bodies have as much more or less: "
+                f"{ledger.remedy}"
             )
         if ledger.kept.turned:
             found.append(
