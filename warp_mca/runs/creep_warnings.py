@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-PARTS = 4  # of the second half of a run: a body at rest presses and creeps alike in each
+PARTS = 4  # of the second half of a run, in which a body at rest presses alike
+CREEPING = 3  # of them, at least: a body that slides until it rests does not
 ROWS = 5  # of a part, at least
 STEADY = 0.3  # by which normal forces of the parts differ from their mean, at most
-EVEN = 3.0  # greatest over least friction work of a part, at most
 WITHIN = 0.95  # of mu F_n: friction below it in the mean does not slide
 ONE_WAY = 0.8  # of the friction of rows that their vector sum keeps, at least
-ELASTIC = 10.0  # times the energy of the springs: less friction work is what they give back
+ELASTIC = 1.0  # times the energy of the springs: less friction work in a part is what they give back
 WAY = 3.0  # times the creep: a body that moved further than so rolls or slides
 
 
@@ -61,25 +61,24 @@ def _creep(springs: Array, sign: Array, normal: Array, mu: float, dt: float) -> 
 
     In a body at rest friction takes what its mean force does: E = F_t v t. `springs`: columns of rows and passes.
     """
-    pressed = springs[:, :, NORMAL_IMPULSE].sum(axis=1)
+    ends = np.linspace(0, len(springs) - 1, PARTS + 1).astype(int)
+    # a row holds the impulse of the interval before it, and the work up to its end
+    pressed = _sums(springs[:, :, NORMAL_IMPULSE].sum(axis=1), ends)
     force = np.einsum("p,rpc->rc", sign, springs[:, :, IMPULSE])
     along = force - np.outer(force @ normal, normal)
-    size, total = float(np.linalg.norm(along, axis=1).sum()), float(np.linalg.norm(along.sum(axis=0)))
-    ends = np.linspace(0, len(springs) - 1, PARTS + 1).astype(int)
+    size, total = _sums(np.linalg.norm(along, axis=1), ends), np.linalg.norm(_sums(along, ends), axis=1)
     work = np.diff(springs[ends, :, FRICTION].sum(axis=1))
     held = float(springs[:, :, SPRING_ENERGY].sum(axis=1).mean())
-    parts = np.array([part.mean() for part in np.split(pressed, ends[1:-1])])
-    rests = (
-        parts.min() > 0.0
-        and np.abs(parts / parts.mean() - 1.0).max() < STEADY
-        and size < WITHIN * mu * pressed.sum()
-        and total > ONE_WAY * size
-        and work.max() < EVEN * work.min()
-        and work.sum() > ELASTIC * held
-    )
-    # the first row holds the impulse of the interval before it
-    moved = float(np.linalg.norm(along[1:].sum(axis=0))) * dt
-    return (float(work.sum()) / moved if rests and moved > 0.0 else 0.0), total / (mu * float(pressed.sum()) or 1.0)
+    creeps = (size < WITHIN * mu * pressed) & (total > ONE_WAY * size) & (work > ELASTIC * held)
+    mean = pressed / np.diff(ends)
+    if creeps.sum() < CREEPING or mean.min() <= 0.0 or np.abs(mean / mean.mean() - 1.0).max() > STEADY:
+        return 0.0, 0.0
+    return float(work.sum() / (dt * total.sum())), float(total.sum() / (mu * pressed.sum()))
+
+
+def _sums(values: Array, ends: NDArray[np.int_]) -> Array:
+    """Of the rows after each end up to the next, shape (PARTS, ...)."""
+    return np.add.reduceat(values[1:], ends[:-1], axis=0)
 
 
 def _way(model: Model, k: int, normal: Array, u: Array, time: float) -> float:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RING = 1.03  # times the greatest force of waves, from which on a word is said
+RING = 1.04  # times the greatest force of waves, from which on a word is said
 ACROSS = 0.1  # component of the normal along an axis, from which on a node that is fixed there is held along the normal
 HELD = 9.0 / 8.0  # times rho c A v: the most from a master that is held, whose wave comes back; docs/decisions.md
 
