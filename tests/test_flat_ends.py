@@ -11,6 +11,7 @@ from impacts import finished, result_of
 
 import warp_mca as mca
 from warp_mca.kernels.records.columns import MADE
+from warp_mca.runs import ledger
 
 E, RHO, SIDE = 70e9, 2700.0, 0.01
 C = math.sqrt(E / RHO)
@@ -30,29 +31,29 @@ def bar(
     along, across = cells
     box = mca.Box(size=(10.0 * SIDE, SIDE, SIDE), divisions=(along, across, across))
     material = mca.Elastic(E=E, nu=nu, rho=RHO)
-    own = {"geometry": box, "material": material, "element": element}
-    flying = mca.Body(name="bar", velocity=(-1.0, 0.4 * mu, 0.0), position=(gap, 0.0, 0.0), **own)
+    other = mca.Body(name="other", geometry=box, material=material, element=element, position=(-10.0 * SIDE, 0.0, 0.0))
+    place, velocity = (gap, 0.0, 0.0), (-1.0, 0.4 * mu, 0.0)
+    flying = dataclasses.replace(other, name="bar", velocity=velocity, position=place)
     master: mca.RigidPlane | mca.Surface = mca.RigidPlane(normal=(1.0, 0.0, 0.0))
     bodies = [flying]
     if two_way is not None:
-        bodies.append(mca.Body(name="other", position=(-10.0 * SIDE, 0.0, 0.0), **own))
+        bodies.append(other)
         master = mca.Surface(body="other", nodes="xmax")
-    more = {} if penalty is None else {"penalty": penalty}
     slave = mca.Surface(body="bar", nodes="xmin")
-    contact = mca.Contact(slave=slave, master=master, mu=mu, two_way=bool(two_way), **more)
+    contact = mca.Contact(slave=slave, master=master, mu=mu, two_way=bool(two_way), penalty=penalty)
     length = 10.0 * SIDE
     impact = mca.ImpactPhase(duration=3.0 * length / C, output_interval=0.05 * length / C)
     return mca.Scene(name="flat bar", bodies=tuple(bodies), contacts=(contact,), impact=impact)
 
 
-def cube(tolerance: float = 0.01, scale: float = 0.9) -> mca.Scene:
+def cube(tolerance: float = 0.01, scale: float = 0.9, penalty: float | None = None) -> mca.Scene:
     """A cube of eight cells that flies flat on a plane."""
     box = mca.Box(size=(0.02, 0.02, 0.02), divisions=(2, 2, 2))
     steel = mca.Elastic(E=200e9, nu=0.0, rho=7800.0)
     body = mca.Body(name="cube", geometry=box, material=steel, velocity=(0.0, 0.0, -2.0))
-    contact = mca.Contact(slave=mca.Surface(body="cube", nodes="zmin"), master=mca.RigidPlane(normal=(0.0, 0.0, 1.0)))
-    settings = {"energy_tolerance": tolerance, "time_step_scale": scale}
-    impact = mca.ImpactPhase(duration=3e-5, output_interval=1e-6, **settings)
+    bottom, plane = mca.Surface(body="cube", nodes="zmin"), mca.RigidPlane(normal=(0.0, 0.0, 1.0))
+    contact = mca.Contact(slave=bottom, master=plane, penalty=penalty)
+    impact = mca.ImpactPhase(duration=3e-5, output_interval=1e-6, energy_tolerance=tolerance, time_step_scale=scale)
     return mca.Scene(name="cube", bodies=(body,), contacts=(contact,), impact=impact)
 
 
@@ -78,12 +79,12 @@ def slope(angle: float, tolerance: float = 0.01, mu: float = 0.4) -> mca.Scene:
 def test_springs_book_what_they_make_as_they_close_and_open(given: dict):
     """All of the imbalance: other forces do the work of their energies to the square of a step's strain."""
     impact = finished(bar(**given), precision="float64")
-    ledger = impact.scene_runs[0].ledger
-    energy = ledger.energies()
+    own = impact.scene_runs[0].ledger
+    energy = own.energies()
     work = energy.pop("external_work")
-    net = sum(energy.values()) - work - ledger.initial_energy
-    made = ledger.springs(ledger.table())[..., MADE].sum(axis=1)
-    assert np.abs(made).max() > 1e-4 * ledger.initial_energy
+    net = sum(energy.values()) - work - own.initial_energy
+    made = own.springs(own.table())[..., MADE].sum(axis=1)
+    assert np.abs(made).max() > 1e-4 * own.initial_energy
     assert np.abs(net - (made - made[0])).max() < 0.01 * np.abs(made).max()
 
 
@@ -94,11 +95,18 @@ def test_a_cube_that_gains_energy_at_its_flat_end_runs_on_and_says_so():
     assert finer.summary["energy_error"] < 0.01 and not said[1]
 
 
-def test_more_than_ten_times_the_tolerance_is_stopped_with_its_cause():
-    with pytest.raises(
-        mca.GuardError, match=r"exceeds energy_tolerance = 0.001, of which contact springs made .* J as"
-    ):
-        mca.run(cube(tolerance=1e-3))
+@pytest.mark.parametrize(("tolerance", "penalty"), [(1e-3, None), (0.01, 10.0), (0.02, 30.0)])
+def test_a_strict_tolerance_or_a_given_penalty_has_no_allowance(tolerance: float, penalty: float | None):
+    """Springs of a penalty that was asked for can be made softer."""
+    scene = cube(tolerance=tolerance, penalty=penalty)
+    with pytest.raises(mca.GuardError, match=f"exceeds energy_tolerance = {tolerance}, of which contact springs made"):
+        mca.run(scene)
+
+
+def test_more_than_ten_times_the_tolerance_stops_the_run(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ledger, "MOST_MADE", 2.0)
+    with pytest.raises(mca.GuardError, match="of which contact springs made"):
+        mca.run(cube())
 
 
 @pytest.mark.parametrize(
@@ -120,12 +128,12 @@ def test_a_force_above_that_of_waves_is_said_to_ring(scene: mca.Scene, rings: bo
         pair = len(scene.bodies)
         c = scene.bodies[0].material.wave_speeds["dilatational"]  # type: ignore[union-attr]
         waves = RHO * c * SIDE**2 / pair
-        assert f"is {result.summary['F_n_max'] / (waves * (1.0 + 2.0 / c)):.2f} times" in said[0]
+        assert f"is {result.summary['F_n_max'] / waves:.2f} times" in said[0]
         inside = (result.time > 0.4 * 10.0 * SIDE / C) & (result.time < 1.6 * 10.0 * SIDE / C)
         assert result.F_n[inside].mean() == pytest.approx(RHO * C * SIDE**2 / pair, rel=0.05)  # as it says
 
 
-@pytest.mark.parametrize(("angle", "creeps"), [(0.25, True), (0.5, False), (0.0, False)])
+@pytest.mark.parametrize(("angle", "creeps"), [(0.25, True), (0.35, True), (0.5, False), (0.0, False)])
 def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
     """Below the angle of friction, 0.38, it should rest; above it slides, with g (sin - mu cos) t."""
     result = mca.run(slope(angle))
@@ -135,7 +143,7 @@ def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
     half = len(along) // 2
     speed = (along[-1] - along[half]) / (result.time[-1] - result.time[half])
     if creeps:
-        assert 1e-5 < speed < 1e-2
+        assert 1e-5 < speed < 5e-2
         assert float(said[0].split(" creeps at ")[1].split(" m/s")[0]) == pytest.approx(speed, rel=0.3)
         assert f"friction there is {math.tan(angle) / 0.4:.0%}" in said[0]
     elif angle:
@@ -143,9 +151,10 @@ def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
         assert speed == pytest.approx(expected, rel=0.1)
 
 
-def test_a_creeping_block_that_is_stopped_is_said_to_slide():
+def test_a_creeping_block_that_is_stopped_is_said_to_slide(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ledger, "MOST_MADE", 1.0)
     with pytest.raises(mca.GuardError, match=r"contact springs made .* whose nodes slide a little each time"):
-        mca.run(slope(0.3, tolerance=5e-4))
+        mca.run(slope(0.5, mu=0.9))
 
 
 @pytest.mark.parametrize("name", ["sticking_block", "stick_slip"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,6 +46,7 @@ def _contacts(
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
         check_spacing(contact, parts.X, velocity, slave, master)
+        given = contact.penalty not in (None, "auto")
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
         for item in contact_passes(contact, index, slave, master):
@@ -52,7 +54,7 @@ def _contacts(
             assert sides[0] is not None
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
-            passes.append(item)
+            passes.append(replace(item, penalty_given=given))
         axes[index] = contact_axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added, tuple(penalties)
 

@@ -22,7 +22,7 @@ ROWS = 5  # of a part, at least
 STEADY = 0.3  # by which normal forces of the parts differ from their mean, at most
 WITHIN = 0.95  # of mu F_n: friction below it in the mean does not slide
 ONE_WAY = 0.8  # of the friction of rows that their vector sum keeps, at least
-ELASTIC = 1.0  # times the energy of the springs: less friction work in a part is what they give back
+ELASTIC = 0.1  # of the energy of the springs: less friction work in a part is no creep
 WAY = 3.0  # times the creep: a body that moved further than so rolls or slides
 
 

@@ -45,9 +45,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MOST_MADE = 10.0  # times the tolerance: energy that contact springs may make or take as they close and open in a step
+# Energy that contact springs may make or take as they close and open within a step, in tolerances. With a tolerance
+# below the usual one, or a penalty that the scene gives and can lower, they have no such allowance.
+MOST_MADE, USUAL = 10.0, 0.01
 MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not counted
-SLIDING = 0.5  # share of the external work that friction takes, from which on a stop says that nodes slide
+SLIDING = 0.1  # share of the external work that friction takes, from which on a stop says that nodes slide
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 
 _FLAGS = (
@@ -65,6 +67,7 @@ class Ledger:
 
     Attributes:
         kept: what it has taken in so far, a part of the run's state.
+        most_made: share of all energy that contact springs may make or take as they close and open within steps [-].
     """
 
     def __init__(
@@ -79,6 +82,8 @@ class Ledger:
         if not len(kept.peaks):
             kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = spin(model)
+        given = any(item.penalty_given for item in model.passes)
+        self.most_made = 0.0 if given or tolerance < USUAL else MOST_MADE * tolerance
         self.rounding = rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
 
     @property
@@ -112,7 +117,7 @@ class Ledger:
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
         share, unexplained, made = self._balance(sums[:good])
-        over = (share > self.tolerance) & ((unexplained > self.tolerance) | (made > MOST_MADE * self.tolerance))
+        over = (share > self.tolerance) & ((unexplained > self.tolerance) | (made > self.most_made))
         end = int(np.argmax(over)) + 1 if over.any() else good
         self._note_peaks(sums[:end])
         rows = self.rows(end)

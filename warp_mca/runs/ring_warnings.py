@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RING = 1.04  # times the greatest force of waves, from which on a word is said
+RING = 1.05  # times the greatest force of waves, from which on a word is said
+LINEAR = 0.01  # strain v / c up to which bodies count as linear; beyond, twice of what is more may stiffen them
 ACROSS = 0.1  # component of the normal along an axis, from which on a node that is fixed there is held along the normal
 HELD = 9.0 / 8.0  # times rho c A v: the most from a master that is held, whose wave comes back; docs/decisions.md
 
@@ -88,7 +89,8 @@ def _greatest_force(ready: Prepared, contact: Contact, item: ContactPass, time: 
         elif not ready.scene.body(name).rigid:
             Z *= 1.0 / (1.0 + Z / _impedance(ready, name, normal)[0])
     speed = max(speed, 0.0)
-    return Z * speed * (1.0 + 2.0 * speed / c) + 2.0 * gravity * float(model.mass[nodes].sum())
+    stiffening = 1.0 + 2.0 * max(speed / c - LINEAR, 0.0)
+    return stiffening * Z * speed + 2.0 * gravity * float(model.mass[nodes].sum())
 
 
 def _nodes(ready: Prepared, body: str) -> slice:
