@@ -11,6 +11,7 @@ from warp_mca.kernels.records.columns import (
     FRICTION,
     IMPULSE,
     LOST,
+    MADE,
     NORMAL_ENERGY,
     NORMAL_FORCE,
     NORMAL_IMPULSE,
@@ -44,7 +45,8 @@ class Spring:
     stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
     became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free.
     normal_energy: the part of `energy` that the normal spring holds [J], only of laws that are not linear. parameters:
-    of the contact law [SI units], shape (spring_count, parameter_count).
+    of the contact law [SI units], shape (spring_count, parameter_count). made: energy that it made so far as it closed
+    or opened within a step, see `switch` [J].
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -64,6 +66,28 @@ class Spring:
     rest: wp.array(dtype=wp.float64)
     normal_energy: wp.array(dtype=wp.float64)
     parameters: wp.array2d(dtype=wp.float64)
+    made: wp.array(dtype=wp.float64)
+
+
+@wp.func
+def switch(
+    s: int, before: wp.vec3d, stored: wp.float64, after: wp.vec3d, kept: wp.float64, du: wp.vec3d, spring: Spring
+):
+    """Book the energy that a spring makes in a step in which its normal force begins or ends.
+
+    Central differences do the work (before + after) . du / 2 of the forces at both ends of the step, which is that of a
+    spring pressed all the way: it makes `kept` - `stored` + this work. A linear spring that closes from a gap a to a
+    depth b takes k a b / 2, one that opens as far makes as much.
+    """
+    spring.made[s] = spring.made[s] + (kept - stored + wp.float64(0.5) * wp.dot(before + after, du))
+
+
+@wp.func
+def normal_energy(s: int, pressed: wp.vec3d, k: wp.float64, spring: Spring):
+    """What a spring of stiffness k that was `pressed` along its normal holds of it [J]."""
+    if spring.normal_energy.shape[0] == 0:
+        return wp.float64(0.5) * wp.dot(pressed, pressed) / k
+    return wp.where(spring.face[s] < 0, wp.float64(0.0), spring.normal_energy[s])
 
 
 @cache
@@ -133,8 +157,15 @@ def spring_function(friction: bool, law: str) -> Any:
         impulse = spring.impulse[s]
         normal_impulse = spring.normal_impulse[s]
         depth = spring.depth[s]
+        closed = spring.face[s] >= 0
         Fn = law_force(-gap, k, spring.parameters, s)
         force = Fn * normal
+        if closed != (Fn > wp.float64(0.0)):
+            before = spring.force[s]
+            if wp.static(friction):
+                before -= spring.tangential[s]
+            kept = law_energy(-gap, k, spring.parameters, s)
+            switch(s, before, normal_energy(s, before, k_old, spring), force, kept, du, spring)
         squares = wp.float64(0.0)
         if wp.static(linear):
             squares = Fn * Fn
@@ -175,9 +206,12 @@ def open_function(friction: bool) -> Any:
 
     @wp.func
     def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):
+        pressed = spring.force[s]
         if wp.static(friction):
+            pressed -= spring.tangential[s]
             spring.friction[s] = spring.friction[s] + release(spring.tangential[s], du, k)
             spring.tangential[s] = wp.vec3d()
+        switch(s, pressed, normal_energy(s, pressed, k, spring), wp.vec3d(), wp.float64(0.0), du, spring)
         spring.energy[s] = wp.float64(0.0)
         spring.force[s] = wp.vec3d()
         spring.face[s] = -1
@@ -225,6 +259,7 @@ def sum_springs(
         sums[wp.static(NORMAL_IMPULSE)] += spring.normal_impulse[s]
         sums[wp.static(STICK_IMPULSE)] += spring.stick_impulse[s]
         sums[wp.static(LOST)] += spring.lost[s]
+        sums[wp.static(MADE)] += spring.made[s]
         if afresh:
             spring.impulse[s] = wp.vec3d()
             spring.normal_impulse[s] = wp.float64(0.0)

@@ -18,6 +18,7 @@ from warp_mca.kernels.elements.hexahedron import (
     framed_function,
     gauss_line_function,
     gradient_function,
+    history_place,
     store_function,
 )
 from warp_mca.kernels.elements.kinematics import kinematics
@@ -87,7 +88,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     gauss_lines = gauss_line_function(precision, scaled=True)
     load_in_frame = framed_function(precision, finite)
     point_gradient = gradient_function(precision)
-    read_plastic_strain, _ = history_functions(precision)
+    read_plastic_strain, _ = history_functions(precision, points=8)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
 
@@ -126,7 +127,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             eps_p = mat33()
             if wp.static(plastic):
                 if yielded[e] != 0:
-                    eps_p, p = read_plastic_strain(history, g, e)
+                    eps_p, p = read_plastic_strain(history, history_place(g), e)
                     dissipated += det * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
             elastic += det * law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
             smallest = wp.min(smallest, wp.determinant(identity + grad))
@@ -152,7 +153,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     gauss_lines = gauss_line_function(precision, scaled=True)
     load_in_frame = framed_function(precision, finite)
     point_gradient = gradient_function(precision)
-    read_plastic_strain, _ = history_functions(precision)
+    read_plastic_strain, _ = history_functions(precision, points=8)
     plastic = bool(law_name)
     write_stress = stress_function(precision)
     k = kinematics(precision, finite)
@@ -186,7 +187,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             p = R(0.0)
             if wp.static(plastic):
                 if yielded[e] != 0:
-                    eps_p, p = read_plastic_strain(history, g, e)
+                    eps_p, p = read_plastic_strain(history, history_place(g), e)
             strain, N, d = deviator(grad)
             local = cauchy(grad, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure)
             corner = g ^ ((g >> 1) & 1)  # corners run around the faces

@@ -10,6 +10,7 @@ from warp_mca.kernels.elements.hexahedron import (
     framed_function,
     gauss_line_function,
     gradient_function,
+    history_place,
     lines_of_point,
     node_force_function,
     store_function,
@@ -56,7 +57,7 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
     store_force = store_function(precision)
     keep_strain, keep_volume, _ = keep_functions(R)
     point_gradient = gradient_function(precision)
-    read_plastic_strain, write_plastic_strain = history_functions(precision)
+    read_plastic_strain, write_plastic_strain = history_functions(precision, points=8)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, True)
@@ -101,10 +102,10 @@ def finite_force_kernel(precision: str, law_name: str) -> Any:
                 eps_p = mat33()
                 p = R(0.0)
                 if flag != 0:
-                    eps_p, p = read_plastic_strain(history_out, g, e)
+                    eps_p, p = read_plastic_strain(history_out, history_place(g), e)
                 S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
                 if p_new > p:
-                    write_plastic_strain(history_out, g, e, eps_new, p_new)
+                    write_plastic_strain(history_out, history_place(g), e, eps_new, p_new)
                     flag_new = int(1)
             P = nominal(grad, S, N, d, pressure)
             Sx[jx] = Sx[jx] + P * wp.cross(gy[jy], gz[jz])

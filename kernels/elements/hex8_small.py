@@ -9,6 +9,7 @@ from warp_mca.kernels.elements.fused import NOTHING
 from warp_mca.kernels.elements.hexahedron import (
     LINE_SCALE,
     gauss_line_function,
+    history_place,
     line_functions,
     lines_of_point,
     node_force_function,
@@ -76,7 +77,7 @@ def flow_function(precision: str, law_name: str) -> Any:
     """
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    read_plastic_strain, write_plastic_strain = history_functions(precision)
+    read_plastic_strain, write_plastic_strain = history_functions(precision, points=8)
     functions = law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     scale = LINE_SCALE**3
@@ -97,10 +98,10 @@ def flow_function(precision: str, law_name: str) -> Any:
         p = R(0.0)
         yielded = flag_new
         if flag != 0:
-            eps_p, p = read_plastic_strain(history_out, g, e)
+            eps_p, p = read_plastic_strain(history_out, history_place(g), e)
         S_new, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(scale)))
         if p_new > p:
-            write_plastic_strain(history_out, g, e, eps_new, p_new)
+            write_plastic_strain(history_out, history_place(g), e, eps_new, p_new)
             yielded = int(1)
         return S_new, yielded
 

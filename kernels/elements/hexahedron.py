@@ -140,6 +140,12 @@ def lines_of_point(g: int):
     return j + 2 * k, i + 2 * k, i + 2 * j
 
 
+@wp.func
+def history_place(g: int):
+    """Place of Gauss point g in the history: g and g + 4 side by side, for a lane of `kernels.elements.hex8_patch`."""
+    return 2 * (g & 3) + (g >> 2)
+
+
 @cache
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
     """Functions that take an element to its rotated frame.

@@ -110,7 +110,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
     tet_gradient = gradient_function(precision, finite)
-    read_plastic_strain, write_plastic_strain = history_functions(precision)
+    read_plastic_strain, write_plastic_strain = history_functions(precision, points=1)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, return_map = functions.parameters, functions.return_map
     add_matrices = fused(precision).add_matrices
@@ -178,7 +178,7 @@ def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     tet_gradient = gradient_function(precision, finite)
-    read_plastic_strain, _ = history_functions(precision)
+    read_plastic_strain, _ = history_functions(precision, points=1)
     plastic, functions = bool(law_name), law_functions(law_name, precision)
     read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
     k = kinematics(precision, finite)
@@ -231,7 +231,7 @@ def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     tet_gradient = gradient_function(precision, finite)
-    read_plastic_strain, _ = history_functions(precision)
+    read_plastic_strain, _ = history_functions(precision, points=1)
     plastic = bool(law_name)
     write_stress = stress_function(precision)
     k = kinematics(precision, finite)

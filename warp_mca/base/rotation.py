@@ -54,7 +54,15 @@ def point_velocity(x: Array, v: Array, weights: Array, point: Array) -> Array:
         point: [m], shape (3,), float64.
     """
     centre = weights @ x / weights.sum()
-    r = x - centre
+    return weights @ v / weights.sum() + np.cross(mean_spin(x, v, weights), point - centre)
+
+
+def mean_spin(x: Array, v: Array, weights: Array) -> Array:
+    """Angular velocity that fits the motion of a cluster best [rad/s], shape (3,), float64; arguments as above.
+
+    omega = (tr(M) I - M)^-1 sum w r x v with M = sum w r r^T, r from the mean position.
+    """
+    r = x - weights @ x / weights.sum()
     moment = (weights[:, None] * r).T @ r
     spin = np.linalg.solve(np.trace(moment) * np.eye(3) - moment, weights @ np.cross(r, v))
-    return np.asarray(weights @ v / weights.sum() + np.cross(spin, point - centre), dtype=np.float64)
+    return np.asarray(spin, dtype=np.float64)

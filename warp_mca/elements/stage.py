@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.errors import bad_value
 from warp_mca.elements.state import ElementState
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
@@ -60,6 +61,9 @@ class ElementStage:
                 vectors follow the plastic strains in the history, if any do.
             points: integration points that keep a plastic strain.
             rows: of the history, where an element keeps more.
+
+        Raises:
+            RequestError: the history has fewer rows than the points and vectors need.
         """
         self.block, self.corners, self.index = block, block.conn.shape[0], 0
         self.conn = wp.array(block.conn, dtype=wp.int32)
@@ -68,8 +72,12 @@ class ElementStage:
         self.slot_node: Index = block.conn.ravel()
         self.slot_level: Index = np.tile(levels_of(block.level_ends), self.corners)
         self.slot = 0
-        self.points, self.rows = points, rows or points * HISTORY_SIZE
         self.vectors: int = getattr(kernels, "VECTORS", 0)
+        needed = points * HISTORY_SIZE + 3 * self.vectors
+        self.points, self.rows = points, needed if rows is None else rows
+        if points < 0 or self.rows < needed:
+            remedy = f"give at least {needed}, for {points} points of {HISTORY_SIZE} and {self.vectors} vectors of 3"
+            raise bad_value(f"Rows of the history of element {block.element}", self.rows, remedy)
         self.real = scalars(precision).real
         kind = (precision, block.law, block.finite)
         self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite)
@@ -186,7 +194,7 @@ class ElementStage:
 
     def max_plastic_strain(self, state: State, part: slice) -> float:
         """Greatest equivalent plastic strain of any point of a range of elements [-]."""
-        if not self.block.plastic or part.start == part.stop:
+        if not self.block.plastic or not self.points or part.start == part.stop:
             return 0.0
         history = state.elements[self.index].history
         last = history[HISTORY_SIZE - 1 : self.points * HISTORY_SIZE : HISTORY_SIZE, part]

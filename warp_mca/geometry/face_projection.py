@@ -28,12 +28,14 @@ class Projected(NamedTuple):
         distance: of the point from that place [m], shape (point_count,), float64.
         beyond: how far that place lies beyond the face's edges, as a share of the face's width [-], shape
             (point_count,), float64.
+        apart: distance of the point from the face, within its edges [m], shape (point_count,), float64.
     """
 
     face: NDArray[np.intp]
     weight: Array
     distance: Array
     beyond: Array
+    apart: Array
 
 
 def project(at: Array, points: Array, faces: Index) -> Projected:
@@ -63,7 +65,7 @@ def project(at: Array, points: Array, faces: Index) -> Projected:
     chosen = np.where(np.abs(chosen) < ROUNDING, 0.0, chosen)
     chosen /= chosen.sum(axis=1, keepdims=True)
     distance = np.linalg.norm(at - np.einsum("pc,pci->pi", chosen, corners), axis=-1)
-    return Projected(near[rows, best], chosen, distance, beyond[rows, best])
+    return Projected(near[rows, best], chosen, distance, beyond[rows, best], apart[rows, best])
 
 
 def shape(xi: Array, eta: Array) -> Array:

@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.model.absorbing import AbsorbingNodes
 from warp_mca.model.assembly import GROUND, Block
-from warp_mca.model.layout import Layout, offsets
+from warp_mca.model.layout import Layout, complete, offsets
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
-from warp_mca.model.tied_nodes import joined
+from warp_mca.model.tied_nodes import join_ties
 
 Index = NDArray[np.int32]
+
+_CONCATENATED = ("X", "V", "mass", "fixed_axes", "prescribed_axis", "joint_tied", "contact_axes", "gravity")
+_NODES = ("prescribed_node", "joint_first", "joint_second", "points")  # indices of nodes
 
 
 def join_models(models: Sequence[Model]) -> Model:
@@ -24,6 +26,10 @@ def join_models(models: Sequence[Model]) -> Model:
 
     Contact passes are not merged: they are listed scene by scene, and the solver launches the k-th passes of all scenes
     together.
+
+    Raises:
+        TypeError: a field has no rule here by which it is joined.
+        ValueError: a model has what no batch can.
     """
     if len(models) == 1:
         return models[0]
@@ -34,47 +40,37 @@ def join_models(models: Sequence[Model]) -> Model:
     fastest = int(np.argmin([model.stable.dt for model in models]))
     stable = models[fastest].stable
 
-    def shifted(name: str, start: Index) -> Index:
-        """Indices of a field of all scenes, raised by the `start` of each scene; GROUND is kept."""
-        values = [getattr(model, name) for model in models]
-        return np.concatenate([np.where(v == GROUND, v, v + s) for v, s in zip(values, start, strict=False)])
-
-    return Model(
-        X=np.concatenate([model.X for model in models]),
-        V=np.concatenate([model.V for model in models]),
-        mass=np.concatenate([model.mass for model in models]),
+    return complete(
+        type(models[0]),
+        **{name: np.concatenate([getattr(model, name) for model in models]) for name in _CONCATENATED},
         blocks=blocks,
         law=_laws(models),
-        fixed_axes=np.concatenate([model.fixed_axes for model in models]),
-        prescribed_node=shifted("prescribed_node", nodes),
-        prescribed_axis=np.concatenate([model.prescribed_axis for model in models]),
         **_tables(models),
-        joint_first=shifted("joint_first", nodes),
-        joint_second=shifted("joint_second", nodes),
-        joint_tied=np.concatenate([model.joint_tied for model in models]),
-        joint_slides=shifted("joint_slides", pairs),
+        **{name: _shifted(models, name, nodes) for name in _NODES},
+        joint_slides=_shifted(models, "joint_slides", pairs),
         **_joints(models, nodes, pairs),
-        absorbing=AbsorbingNodes(
+        absorbing=complete(
+            type(models[0].absorbing),
             node=np.concatenate([m.absorbing.node + start for m, start in zip(models, nodes, strict=False)]),
             damping=np.concatenate([model.absorbing.damping for model in models]),
             stiffness=np.concatenate([model.absorbing.stiffness for model in models]),
             velocity=np.concatenate([model.absorbing.velocity for model in models]),
         ),
-        ties=joined([model.ties.moved(int(start)) for model, start in zip(models, nodes, strict=False)]),
+        ties=join_ties([model.ties.moved(int(start)) for model, start in zip(models, nodes, strict=False)]),
         passes=tuple(
             replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
             for model, start in zip(models, nodes, strict=False)
             for item in model.passes
         ),
-        contact_axes=np.concatenate([model.contact_axes for model in models]),
         penalties=tuple(penalty for model in models for penalty in model.penalties),
-        gravity=np.concatenate([model.gravity for model in models]),
-        points=shifted("points", nodes),
         node_start=_starts(models, "node_start", nodes),
         element_start=_starts(models, "element_start", elements),
         element_of=order,
         stable=replace(stable, element=stable.element + int(elements[fastest])),
         scaling=_scaling(models),
+        rates=_none_of(models, "rates"),
+        floating=_none_of(models, "floating"),  # they are found for all scenes together
+        rigid_blocks=(),  # nothing shows the bodies of a batch
         batch=Layout(
             nodes=nodes,
             joints=offsets([len(model.joints) for model in models]),
@@ -82,6 +78,22 @@ def join_models(models: Sequence[Model]) -> Model:
         ),
         **_rigid(models, nodes, pairs),
     )
+
+
+def _shifted(models: Sequence[Model], name: str, start: Index) -> Index:
+    """Indices of a field of all scenes, raised by the `start` of each scene; GROUND is kept."""
+    values = [getattr(model, name) for model in models]
+    return np.concatenate([np.where(v == GROUND, v, v + s) for v, s in zip(values, start, strict=False)])
+
+
+def _none_of(models: Sequence[Model], name: str) -> None:
+    """Refuse models that have what no batch can: None.
+
+    Raises:
+        ValueError: one has it.
+    """
+    if any(getattr(model, name) is not None for model in models):
+        raise ValueError(f"Model.{name}: models of a batch have none")
 
 
 def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tuple[Block, ...], Index, Index]:
@@ -105,7 +117,8 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
             ranges[k, column, 1] = end
         _, law, element, finite = kind
         blocks.append(
-            Block(
+            complete(
+                Block,
                 element=element,
                 law=law,
                 finite=finite,
@@ -113,6 +126,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                 material=np.concatenate(material),
                 first=first,
                 ends=tuple((ranges[:, column, 1] - first).tolist()),
+                part_ends=(),  # of elements with steps of their own, which batches have not
             )
         )
         first = end
@@ -126,7 +140,8 @@ def _scaling(models: Sequence[Model]) -> MassScaling | None:
     ]
     if all(model.scaling is None for model in models):
         return None
-    return MassScaling(
+    return complete(
+        MassScaling,
         added=np.concatenate([item.added for item in found]),
         elements=sum(item.elements for item in found),
         plain_dt=min(item.plain_dt for item in found),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from warp_mca.model.own_steps import OwnSteps
 from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.surfaces import ContactPass, contact_eigenvalues, contact_passes
-from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes
+from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import RigidPlane, Scene
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def _contacts(
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
         check_spacing(contact, parts.X, slave, master)
+        given = contact.penalty not in (None, "auto")
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
         for item in contact_passes(contact, index, slave, master):
@@ -52,7 +54,7 @@ def _contacts(
             assert sides[0] is not None
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
-            passes.append(item)
+            passes.append(replace(item, penalty_given=given))
         axes[index] = contact_axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added, tuple(penalties)
 
@@ -80,7 +82,7 @@ def build_model(
     """
     ties = tied_nodes(scene, meshes, X)
     parts = Assembly(scene, meshes, on_faces(ties, scene, X))
-    velocity = np.concatenate([V[body.name] for body in scene.bodies])
+    velocity = velocities(ties, scene, X, V)
     pairs, joints, couplings = join_bodies(parts)
     soft = flexible(couplings, pairs, own_nodes(parts))
     bases = movable_bases(parts, joints, soft, chain, start)
@@ -94,7 +96,7 @@ def build_model(
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
-    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)], velocity)
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**bodies, **_steps(parts, rigid.bodies, added, velocity), **held, **pairs}
     model = Model(

@@ -14,7 +14,7 @@ from warp_mca.elements import ELEMENTS, Element, default_element
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.shape_volume import of_cells
-from warp_mca.model.tied_nodes import within_bodies
+from warp_mca.model.tied_nodes import within_body
 from warp_mca.scene import Body, Scene
 from warp_mca.scene.materials import Material
 
@@ -117,8 +117,9 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
     for body in scene.bodies:
         mesh = meshes[body.name]
         rho = densities(body, mesh)
-        total = np.zeros(len(mesh.points))
+        points, ties = within_body(scene, meshes, body.name)
+        total = np.zeros(len(points))
         for part in body_cells(body, mesh):
-            total += sum_to_nodes(part.conn, element_masses(part, mesh.points, rho), len(total))
-        masses[body.name] = total
-    return within_bodies(scene, meshes, masses)
+            total += sum_to_nodes(part.conn, element_masses(part, points, rho), len(total))
+        masses[body.name] = ties.carried(total)
+    return masses

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 Index = NDArray[np.int32]
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +44,18 @@ class Layout:
             "partial": records["partial"][:, scene],
             "point_velocity": records["point_velocity"][:, points * scene : points * (scene + 1)],
         }
+
+
+def complete(kind: type[Part], **values: Any) -> Part:
+    """An instance with a value for every field, those with defaults included.
+
+    Raises:
+        TypeError: a field has none, so that what the scenes of a batch have there would be lost.
+    """
+    lost = [item.name for item in fields(kind) if item.init and item.name not in values]  # pyright: ignore[reportArgumentType]
+    if lost:
+        raise TypeError(f"{kind.__name__}.{lost[0]}: a batch would lose it; join it in model/batch_model.py")
+    return kind(**values)
 
 
 def offsets(counts: list[int]) -> Index:

@@ -78,6 +78,7 @@ class ContactPass:
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
+        penalty_given: whether the scene gives a number for the penalty.
     """
 
     slave: Index
@@ -104,6 +105,7 @@ class ContactPass:
     room: int = LIST_LENGTH
     deepest: float = 0.0
     initial_overlap: str = "refuse"
+    penalty_given: bool = False
 
     @property
     def smallest_area(self) -> float:

@@ -1,21 +1,26 @@
 """Owns nodes tied to faces: where slaves lie on their masters' faces, and what of their mass the corners carry.
 
 With u_s = sum_k N_sk u_k the equations of motion of the masters are (M u'')_k = f_k + sum_s N_sk f_s. Their mass is
-lumped, M_k = m_k + sum_s N_sk m_s: as sum_k N_sk = 1 and x_s = sum_k N_sk x_k, the total mass, its centre, momentum and
-angular momentum are those of the nodes (Belytschko et al., Nonlinear Finite Elements, 2014, on explicit ties).
+lumped, M_k = m_k + sum_s N_sk m_s: as sum_k N_sk = 1, x_s = sum_k N_sk x_k and v_s = sum_k N_sk v_k, the total mass,
+its centre, momentum and angular momentum are those of the nodes (Belytschko et al., Nonlinear Finite Elements, 2014, on
+explicit ties). Slaves that lie a gap off their faces are moved there at the start, before masses are computed, and take
+the velocity of that place. Bodies that turn as one keep their rigid motion to the last digit; their mass, momentum and
+energy are those of the cells as they then are, which differ by the share of the gap in the slave's body.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.rotation import mean_spin
 from warp_mca.geometry.face_projection import project
+from warp_mca.model.layout import complete
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -25,7 +30,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 MOST_BEYOND = 0.25  # of a face's width: a fine mesh's nodes on a curved rim lie so far beyond the coarse one's chords
-MOVING = 1e-6  # of the greatest speed: difference of a slave's velocity from its place's at the start
+MOVING = 1e-6  # of a body's greatest speed: difference of velocities that is rounding
+TURNING = 1.01  # times what the rate of turn explains: links whose shape an impact left do not turn quite as rigid ones
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,17 +124,14 @@ class TiedNodes:
 
     def moved(self, start: int) -> TiedNodes:
         """The same with nodes that are counted from `start` on."""
-        return TiedNodes(
-            slave=(self.slave + start).astype(np.int32),
-            master=(self.master + start).astype(np.int32),
-            weight=self.weight,
-            facts=self.facts,
-        )
+        slave, master = (self.slave + start).astype(np.int32), (self.master + start).astype(np.int32)
+        return replace(self, slave=slave, master=master)
 
 
-def joined(items: Sequence[TiedNodes]) -> TiedNodes:
+def join_ties(items: Sequence[TiedNodes]) -> TiedNodes:
     """All of them."""
-    return TiedNodes(
+    return complete(
+        TiedNodes,
         slave=np.concatenate([np.zeros(0, np.int32), *(item.slave for item in items)]),
         master=np.concatenate([np.zeros((0, 4), np.int32), *(item.master for item in items)]),
         weight=np.concatenate([np.zeros((0, 4)), *(item.weight for item in items)]),
@@ -156,7 +159,7 @@ def tied_nodes(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
             if np.isin(item.slave, own.carriers).any():
                 what = f"slaves of {other.title} are tied to some of these nodes; tie both to the same master"
                 raise bad_value(f"{scene.ties[k].title}.slave", scene.ties[k].slave.nodes, what)
-    return joined(items)
+    return join_ties(items)
 
 
 def _tied(tie: Tie, meshes: Mapping[str, Mesh], X: Mapping[str, Array], first: Mapping[str, int]) -> TiedNodes:
@@ -171,14 +174,14 @@ def _tied(tie: Tie, meshes: Mapping[str, Mesh], X: Mapping[str, Array], first: M
     found = project(at, points, faces)
     corner = points[faces[found.face]]
     edge = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    off = np.hypot(found.distance, found.beyond * edge)
     bad = (found.distance > tie.gap * edge) | (found.beyond > MOST_BEYOND)
     if bad.any():
-        k = int(np.argmax(np.where(bad, off, -1.0)))
-        x, y, z = at[k]
+        k = int(np.argmax(np.where(bad, found.apart, -1.0)))
+        x, y, z = meshes[slave.body].points[nodes[k]]
         remedy = (
-            f"its node at ({x:.4g}, {y:.4g}, {z:.4g}) m lies {off[k]:.3g} m off the faces of {master.nodes} of "
-            f"{master.body}, whose edges are {edge[k]:.3g} m long; let the surfaces meet, or raise gap"
+            f"node {nodes[k]} of {slave.body}, at ({x:.4g}, {y:.4g}, {z:.4g}) m in the body's frame, lies "
+            f"{found.apart[k]:.3g} m off the faces of {master.nodes} of {master.body}, whose edges are {edge[k]:.3g} m "
+            "long; let the surfaces meet, or raise gap"
         )
         raise bad_value(f"{tie.title}.slave", slave.nodes, remedy)
     widths = (_edge(X[body], quads) for body, quads in ((slave.body, own), (master.body, faces)))
@@ -215,19 +218,57 @@ def on_faces(ties: TiedNodes, scene: Scene, X: Mapping[str, Array]) -> Mapping[s
     return {body.name: part for body, part in zip(scene.bodies, np.split(placed, ends), strict=True)}
 
 
-def within_bodies(scene: Scene, meshes: Mapping[str, Mesh], masses: Mapping[str, Array]) -> dict[str, Array]:
-    """Nodal masses by body [kg], those of slaves of ties within the body given to the masters."""
-    found = dict(masses)
-    for tie in scene.ties:
-        body = tie.slave.body
-        if body == tie.master.body:
-            points = {body: meshes[body].points}
-            found[body] = _tied(tie, meshes, points, {body: 0}).carried(found[body])
-    return found
+def velocities(ties: TiedNodes, scene: Scene, X: Mapping[str, Array], V: Mapping[str, Array]) -> Array:
+    """Velocities [m/s] of all nodes, shape (node_count, 3), float64; slaves have those of their places on the faces.
+
+    Arguments as of `tied_nodes`, before slaves are moved onto the faces.
+
+    Raises:
+        RequestError: a slave moves against its master.
+    """
+    velocity = np.concatenate([V[body.name] for body in scene.bodies])
+    if not len(ties):
+        return velocity
+    position = np.concatenate([X[body.name] for body in scene.bodies])
+    apart, off = (np.linalg.norm(own[ties.slave] - ties.place(own), axis=1) for own in (velocity, position))
+    node = np.concatenate([np.arange(len(X[body.name])) for body in scene.bodies])[ties.slave]
+    ends = np.cumsum(np.array([fact["nodes"] for fact in ties.facts], dtype=int))[:-1]
+    for tie, *own in zip(scene.ties, *(np.split(part, ends) for part in (node, apart, off)), strict=True):
+        _check_motion(tie, X, V, *own)
+    return ties.follow(velocity)
 
 
-def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Index], V: Array) -> None:
-    """Refuse slaves and masters that something else moves, as `moved` nodes, and slaves that leave their masters.
+def _check_motion(
+    tie: Tie, X: Mapping[str, Array], V: Mapping[str, Array], node: Index, apart: Array, off: Array
+) -> None:
+    """Refuse slaves that move against their masters.
+
+    In one rigid motion, which turns with omega, a slave at d from its place moves against it with omega x d, at most
+    |omega| |d|. Of `node` in the slave's body, `apart` is the difference of velocities [m/s] and `off` is |d| [m].
+    """
+    bodies = tie.slave.body, tie.master.body
+    turn = max(float(np.linalg.norm(mean_spin(X[name], V[name], np.ones(len(X[name]))))) for name in bodies)
+    speed = max(float(np.linalg.norm(V[name], axis=1).max()) for name in bodies)
+    over = apart - TURNING * turn * off
+    k = int(over.argmax())
+    if over[k] > MOVING * speed:
+        remedy = (
+            f"a slave moves against its master at the start: node {node[k]} of {tie.slave.body} by {apart[k]:.3g} m/s, "
+            f"where turning with {turn:.3g} rad/s at a gap of {off[k]:.3g} m explains {turn * off[k]:.3g} m/s; give "
+            "tied bodies one motion"
+        )
+        raise bad_value(f"{tie.title}.slave", tie.slave.nodes, remedy)
+
+
+def within_body(scene: Scene, meshes: Mapping[str, Mesh], body: str) -> tuple[Array, TiedNodes]:
+    """Nodes of a body in its frame [m], slaves of ties within it on their faces, and these ties."""
+    own, points = [tie for tie in scene.ties if tie.slave.body == tie.master.body == body], meshes[body].points
+    ties = join_ties([_tied(tie, meshes, {body: points}, {body: 0}) for tie in own])
+    return (ties.follow(points) if len(ties) else points), ties
+
+
+def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Index]) -> None:
+    """Refuse slaves and masters that something else moves, as `moved` nodes, and slaves that are fixed by themselves.
 
     A slave may be fixed along an axis where all of its masters are: it stays at rest with them.
 
@@ -246,9 +287,6 @@ def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Ind
     bad = (fixed[ties.slave] & ~shared) != 0
     if bad.any():
         raise RequestError(f"{ties.title(bad)}: a slave node is fixed where its masters are free; fix the masters, too")
-    speed = float(np.abs(V).max())
-    if np.abs(V[ties.slave] - ties.place(V)).max() > MOVING * speed:
-        raise RequestError("Scene.ties: a slave moves against its master at the start; give tied bodies one motion")
 
 
 def tie_warnings(ties: TiedNodes) -> list[str]:

@@ -19,6 +19,7 @@ from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.runs.bending import bending_warnings, samples_of, seen
 from warp_mca.runs.bent_cells import Cells
 from warp_mca.runs.contact_warnings import resolution_warnings, symmetry_of
+from warp_mca.runs.creep_warnings import creep_warnings
 from warp_mca.runs.element_warnings import element_warnings
 from warp_mca.runs.flutter_warnings import flutter_warnings
 from warp_mca.runs.history_rows import contact_histories, history_columns
@@ -27,6 +28,7 @@ from warp_mca.runs.ledger import Ledger
 from warp_mca.runs.mass_report import body_report, mass_report, mass_warnings
 from warp_mca.runs.passing import Watch
 from warp_mca.runs.rate_groups import rate_figures
+from warp_mca.runs.ring_warnings import ring_warnings
 from warp_mca.runs.spring_share import peak_losses, soft_springs, spring_shares
 from warp_mca.runs.start_warnings import start_warnings
 from warp_mca.solve.state_figures import (
@@ -128,6 +130,11 @@ class SceneRun:
         x = self.ready.model.X[self.watch.nodes] + u
         kept.passed, kept.apart = self.watch.look(x, speed, pressed, steps * self.solver.dt, kept.passed)
 
+    def _displacements(self) -> Array:
+        """Of the scene's nodes [m], shape (node_count, 3), float64."""
+        first, end = self.solver.layout.nodes[self.index : self.index + 2]
+        return np.asarray(self.state.u.numpy(), dtype=np.float64)[first:end]
+
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
@@ -150,6 +157,8 @@ class SceneRun:
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
         model = self.ready.model
         told = [*contact_warnings(contacts, model.contact_axes, symmetry_of(model)), *flutter_warnings(history, model)]
+        told += ring_warnings(self.ready, contacts, self.steps.interval)
+        told += creep_warnings(self.ledger, model, names, self._displacements())
         passed = self.watch.said(self.ledger.kept.passed, origin)
         warnings = (*self._warnings(shares, stopped), *passed, *told, *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
@@ -255,6 +264,12 @@ class SceneRun:
                 f"{ledger.kept.exchanged:.3g} J that the bodies exchanged, {ledger.kept.energy_error:.2g} of all that "
                 f"they have, where energy_tolerance is {tolerance:g}: {ledger.remedy}, or take what they exchange as "
                 "no more exact than that"
+            )
+        if ledger.kept.made > tolerance:
+            found.append(
+                f"contact springs made or took up to {ledger.kept.made:.2%} of all energy as they closed and opened "
+                f"within steps, more than energy_tolerance = {tolerance:g}, and the bodies have as much more or less: "
+                f"{ledger.remedy}"
             )
         if ledger.kept.turned:
             found.append(

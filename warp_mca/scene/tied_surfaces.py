@@ -21,7 +21,9 @@ class Tie:
         slave: surface whose nodes are tied.
         master: surface whose faces carry them, of another body or of another part of the same one (`Parts`).
         gap: largest distance of slave nodes from the faces at the start, as a share of the edge of the face [-]; they
-            are moved onto the faces.
+            are moved onto the faces, before masses are computed, and take the velocity there. Bodies in one motion keep
+            it exactly; mass, momentum and energy change by what the slave's cells gain or lose, of the order of the
+            distance over the thickness of the slave's body.
     """
 
     slave: Surface

@@ -1,0 +1,163 @@
+"""Flat ends that meet: energy of springs that close and open within steps, forces that ring, bodies that creep."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from impacts import finished, result_of
+
+import warp_mca as mca
+from warp_mca.kernels.records.columns import MADE
+from warp_mca.runs import ledger
+
+E, RHO, SIDE = 70e9, 2700.0, 0.01
+C = math.sqrt(E / RHO)
+
+
+def bar(
+    cells: tuple[int, int] = (10, 2),
+    *,
+    element: str = "hex8",
+    nu: float = 0.0,
+    mu: float = 0.0,
+    two_way: bool | None = None,
+    penalty: float | None = None,
+    gap: float = 0.0,
+) -> mca.Scene:
+    """A bar ten times as long as wide that flies flat on a plane, or on an equal one at rest if `two_way` is given."""
+    along, across = cells
+    box = mca.Box(size=(10.0 * SIDE, SIDE, SIDE), divisions=(along, across, across))
+    material = mca.Elastic(E=E, nu=nu, rho=RHO)
+    other = mca.Body(name="other", geometry=box, material=material, element=element, position=(-10.0 * SIDE, 0.0, 0.0))
+    place, velocity = (gap, 0.0, 0.0), (-1.0, 0.4 * mu, 0.0)
+    flying = dataclasses.replace(other, name="bar", velocity=velocity, position=place)
+    master: mca.RigidPlane | mca.Surface = mca.RigidPlane(normal=(1.0, 0.0, 0.0))
+    bodies = [flying]
+    if two_way is not None:
+        bodies.append(other)
+        master = mca.Surface(body="other", nodes="xmax")
+    slave = mca.Surface(body="bar", nodes="xmin")
+    contact = mca.Contact(slave=slave, master=master, mu=mu, two_way=bool(two_way), penalty=penalty)
+    length = 10.0 * SIDE
+    impact = mca.ImpactPhase(duration=3.0 * length / C, output_interval=0.05 * length / C)
+    return mca.Scene(name="flat bar", bodies=tuple(bodies), contacts=(contact,), impact=impact)
+
+
+def cube(tolerance: float = 0.01, scale: float = 0.9, penalty: float | None = None) -> mca.Scene:
+    """A cube of eight cells that flies flat on a plane."""
+    box = mca.Box(size=(0.02, 0.02, 0.02), divisions=(2, 2, 2))
+    steel = mca.Elastic(E=200e9, nu=0.0, rho=7800.0)
+    body = mca.Body(name="cube", geometry=box, material=steel, velocity=(0.0, 0.0, -2.0))
+    bottom, plane = mca.Surface(body="cube", nodes="zmin"), mca.RigidPlane(normal=(0.0, 0.0, 1.0))
+    contact = mca.Contact(slave=bottom, master=plane, penalty=penalty)
+    impact = mca.ImpactPhase(duration=3e-5, output_interval=1e-6, energy_tolerance=tolerance, time_step_scale=scale)
+    return mca.Scene(name="cube", bodies=(body,), contacts=(contact,), impact=impact)
+
+
+def slope(angle: float, tolerance: float = 0.01, mu: float = 0.4) -> mca.Scene:
+    """A soft block that lies on a slope."""
+    plane = mca.RigidPlane(normal=(math.sin(angle), math.cos(angle), 0.0))
+    box = mca.Box(size=(0.03, 0.01, 0.02), divisions=(5, 2, 4))
+    soft = mca.Elastic(E=5e7, nu=0.3, rho=1200.0)
+    block = mca.Body(name="block", geometry=box, material=soft, rotation=(0.0, 0.0, -angle)).place_on(plane)
+    return mca.Scene(
+        name="slope",
+        bodies=(block,),
+        gravity=(0.0, -80.0, 0.0),
+        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=plane, mu=mu),),
+        impact=mca.ImpactPhase(duration=0.02, output_interval=1e-4, energy_tolerance=tolerance),
+        probes=(mca.Probe(name="skin", body="block", nodes="boundary"),),
+    )
+
+
+@pytest.mark.parametrize(
+    "given", [{}, {"gap": 1.3e-7}, {"mu": 0.3}, {"two_way": True}, {"two_way": False, "mu": 0.2, "nu": 0.3}]
+)
+def test_springs_book_what_they_make_as_they_close_and_open(given: dict):
+    """All of the imbalance: other forces do the work of their energies to the square of a step's strain."""
+    impact = finished(bar(**given), precision="float64")
+    own = impact.scene_runs[0].ledger
+    energy = own.energies()
+    work = energy.pop("external_work")
+    net = sum(energy.values()) - work - own.initial_energy
+    made = own.springs(own.table())[..., MADE].sum(axis=1)
+    assert np.abs(made).max() > 1e-4 * own.initial_energy
+    assert np.abs(net - (made - made[0])).max() < 0.01 * np.abs(made).max()
+
+
+def test_a_cube_that_gains_energy_at_its_flat_end_runs_on_and_says_so():
+    result, finer = mca.run(cube()), mca.run(cube(scale=0.2))
+    said = [any("closed and opened within steps" in warning for warning in r.warnings) for r in (result, finer)]
+    assert 0.01 < result.summary["energy_error"] < 0.1 and said[0]
+    assert finer.summary["energy_error"] < 0.01 and not said[1]
+
+
+@pytest.mark.parametrize(("tolerance", "penalty"), [(1e-3, None), (0.01, 10.0), (0.02, 30.0)])
+def test_a_strict_tolerance_or_a_given_penalty_has_no_allowance(tolerance: float, penalty: float | None):
+    """Springs of a penalty that was asked for can be made softer."""
+    scene = cube(tolerance=tolerance, penalty=penalty)
+    with pytest.raises(mca.GuardError, match=f"exceeds energy_tolerance = {tolerance}, of which contact springs made"):
+        mca.run(scene)
+
+
+def test_more_than_ten_times_the_tolerance_stops_the_run(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ledger, "MOST_MADE", 2.0)
+    with pytest.raises(mca.GuardError, match="of which contact springs made"):
+        mca.run(cube())
+
+
+@pytest.mark.parametrize(
+    ("scene", "rings"),
+    [
+        (bar((20, 2)), True),
+        (bar((8, 1), element="tet4"), True),
+        (bar((15, 3), nu=0.3, two_way=True), True),
+        (bar((20, 2), penalty=0.1), False),  # so soft that the force rises slowly
+        (dataclasses.replace(bar((20, 2)), joints=(mca.Weld(name="W", body="bar", nodes="xmax"),)), False),
+    ],
+)
+def test_a_force_above_that_of_waves_is_said_to_ring(scene: mca.Scene, rings: bool):
+    """A flat bar presses with rho c v A on a wall, and with half of that on its like, until waves are back."""
+    result = mca.run(scene)
+    said = [warning for warning in result.warnings if "cells ring" in warning]
+    assert len(said) == rings
+    if rings:
+        pair = len(scene.bodies)
+        c = scene.bodies[0].material.wave_speeds["dilatational"]  # type: ignore[union-attr]
+        waves = RHO * c * SIDE**2 / pair
+        assert f"is {result.summary['F_n_max'] / waves:.2f} times" in said[0]
+        inside = (result.time > 0.4 * 10.0 * SIDE / C) & (result.time < 1.6 * 10.0 * SIDE / C)
+        assert result.F_n[inside].mean() == pytest.approx(RHO * C * SIDE**2 / pair, rel=0.05)  # as it says
+
+
+@pytest.mark.parametrize(("angle", "creeps"), [(0.25, True), (0.35, True), (0.5, False), (0.0, False)])
+def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
+    """Below the angle of friction, 0.38, it should rest; above it slides, with g (sin - mu cos) t."""
+    result = mca.run(slope(angle))
+    said = [warning for warning in result.warnings if "creeps at" in warning]
+    assert len(said) == creeps
+    along = result.probes[0].position @ np.array([math.cos(angle), -math.sin(angle), 0.0])
+    half = len(along) // 2
+    speed = (along[-1] - along[half]) / (result.time[-1] - result.time[half])
+    if creeps:
+        assert 1e-5 < speed < 5e-2
+        assert float(said[0].split(" creeps at ")[1].split(" m/s")[0]) == pytest.approx(speed, rel=0.3)
+        assert f"friction there is {math.tan(angle) / 0.4:.0%}" in said[0]
+    elif angle:
+        expected = 80.0 * (math.sin(angle) - 0.4 * math.cos(angle)) * 0.75 * 0.02
+        assert speed == pytest.approx(expected, rel=0.1)
+
+
+def test_a_creeping_block_that_is_stopped_is_said_to_slide(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ledger, "MOST_MADE", 1.0)
+    with pytest.raises(mca.GuardError, match=r"contact springs made .* whose nodes slide a little each time"):
+        mca.run(slope(0.5, mu=0.9))
+
+
+@pytest.mark.parametrize("name", ["sticking_block", "stick_slip"])
+def test_built_in_blocks_do_not_creep(name: str):
+    result = finished(mca.make_scene(name))
+    assert not any("creep" in warning for warning in result_of(result).warnings)
