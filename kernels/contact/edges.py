@@ -55,6 +55,35 @@ def is_edge(
 
 
 @wp.func
+def neighbour(face: wp.array2d(dtype=wp.int32), f: int, i: int, step: int) -> int:
+    """Node of face f that follows node i, or comes before it where step is 3."""
+    found = i
+    for c in range(4):
+        if face[f, c] == i:
+            other = face[f, (c + step) % 4]
+            if other == i:  # the last corner of a triangle, which it has twice
+                other = face[f, (c + 2 * step) % 4]
+            found = other
+    return found
+
+
+@wp.func
+def is_on_rim(slave_faces: SlaveFaces, s: int, i: int) -> bool:
+    """Whether slave s, node i, lies on the rim of an open surface: an edge from it belongs to one face alone."""
+    begin = slave_faces.offset[s]
+    end = slave_faces.offset[s + 1]
+    found = bool(False)
+    for j in range(begin, end):
+        after = neighbour(slave_faces.face, slave_faces.face_of_slave[j], i, 1)
+        shared = bool(False)
+        for k in range(begin, end):
+            if neighbour(slave_faces.face, slave_faces.face_of_slave[k], i, 3) == after:
+                shared = bool(True)
+        found = found or not shared
+    return found
+
+
+@wp.func
 def opposition(
     X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), slave_faces: SlaveFaces, s: int, normal: wp.vec3d
 ) -> wp.float64:
