@@ -37,6 +37,19 @@ def area_vector(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: 
 
 
 @wp.func
+def lies_below(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    g: int,
+    normal: wp.vec3d,
+) -> bool:
+    """Whether the middle of face f is behind face g, whose normal is `normal`: no fold where a node is near both."""
+    return wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
+
+
+@wp.func
 def is_edge(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
@@ -51,7 +64,7 @@ def is_edge(
         for b in range(4):
             if face[f, a] == face[g, b]:
                 shared = bool(True)
-    return shared and wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
+    return shared and lies_below(X, u, face, f, g, normal)
 
 
 @wp.func

@@ -45,7 +45,7 @@ class Nearest:
         beside: whether that point lies off the face, though within the reach of its edges.
         area: a quarter of the area of the face [m^2].
         front: distance to the nearest face that has the node in front of it, or FAR [m].
-        front_face: that face, or -1.
+        front_face: the nearest one that the node is not beside, else the nearest; -1 if there is none.
     """
 
     face: wp.int32
@@ -130,6 +130,8 @@ def nearest_of(
     best.face = -1
     best.front = wp.float64(FAR)
     best.front_face = -1
+    front_gap = wp.float64(FAR)  # of front_face
+    front_beside = bool(False)
     for c in range(first, master.count[s], stride):
         inside, at, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
         if inside:
@@ -153,8 +155,11 @@ def nearest_of(
                     best.beside = beside
                     best.area = area
             elif gap >= wp.float64(0.0):
-                if gap < best.front:
+                beside = is_beside(at, triangle, wp.float64(_RIM))
+                if best.front_face < 0 or (gap < front_gap if beside == front_beside else front_beside):
                     best.front_face = f
+                    front_gap = gap
+                    front_beside = beside
                 best.front = wp.min(best.front, gap)
         f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, lies_below, opposition
 from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, slides_at, usual_depth, way_back_function
@@ -50,6 +50,7 @@ class Choice:
         depth: depth behind that face before the step [m].
         approach: motion of the node into that face in this step [m].
         returns: whether the node comes to that face over an edge.
+        passed: springs, a bit for each side, that do not press the node, because another side of an edge does.
         begins: compression with which the newcomer may begin, if it is deeper than it can reach by itself [m].
     """
 
@@ -60,6 +61,7 @@ class Choice:
     depth: wp.float64
     approach: wp.float64
     returns: wp.bool
+    passed: wp.int32
     begins: wp.float64
 
 
@@ -92,7 +94,7 @@ def belongs_to_other_side(
     """Whether slave s, node i, meets face `other`, `gap` in front of which it is, not the nearest face across an edge."""
     across = area_vector(X, u, master.face, other)
     found = bool(False)
-    if is_edge(X, u, master.face, near.face, other, across):
+    if lies_below(X, u, master.face, near.face, other, across):
         mine = opposition(X, u, slave_faces, s, near.normal)
         its = opposition(X, u, slave_faces, s, across)
         if mine < wp.float64(OPPOSES) or (near.beside and mine < its + wp.float64(OPPOSES)):
@@ -272,6 +274,8 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         edge = wp.float64(2.0) * wp.sqrt(near.area)
         approach = -wp.dot(du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
+        if other >= 0 or way.spring >= 0:
+            chosen.passed = choice.passed | (1 << (e - node.begin))
         if way.spring >= 0:
             chosen.returns = bool(True)
             chosen.newcomer = way.spring
@@ -314,11 +318,9 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         presses = touches
         if e == choice.newcomer:
             presses = presses or choice.leaver >= 0 or choice.returns
-        elif e == choice.leaver:
+        elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
             presses = bool(False)
         elif spring.face[e] < 0:
-            if keeper(X, u, master, near.face, node.begin, spring) >= 0:
-                presses = bool(False)
             if choice.face >= 0:
                 if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
                     presses = bool(False)

@@ -81,7 +81,9 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
         for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
             for e in range(node.begin, node.begin + wp.static(sides)):
                 near = nearest_face(X, u, master, e, x, along)
-                in_front, elsewhere = near.front < wp.float64(FAR), node.holding and spring.face[e] < 0
+                # in front of the side, not pressed though below it, or pressed by another side
+                ends = near.front < wp.float64(FAR) or (near.face >= 0 and not near.beside)
+                ends = ends or (node.holding and spring.face[e] < 0)
                 front = wp.min(front, near.front)
                 near.front = front  # of every side so far
                 held = spring.held[e]
@@ -107,10 +109,10 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
                         total += settle(
                             e, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out
                         )
-                        note_way(e, touch.touches, in_front, elsewhere, spring)
+                        note_way(e, touch.touches, ends, spring)
                 elif step == 1:
                     let_go(e, i, v, master.face, dt, front, held, spring)
-                    note_way(e, bool(False), in_front, elsewhere, spring)
+                    note_way(e, bool(False), ends, spring)
         if node.active:
             contact_force_out[i] = contact_force_out[i] + total
             if wp.length_sq(total) > wp.float64(0.0):

@@ -5,9 +5,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, is_on_rim, opposition
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_on_rim, lies_below, opposition
 from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Master, Nearest, nearest_face
-from warp_mca.kernels.contact.spring import ANY_DEPTH, Spring
+from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
 wp.set_module_options({"enable_backward": False})
 
@@ -62,11 +62,11 @@ def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
 
 
 @wp.func
-def note_way(e: int, presses: bool, in_front: bool, elsewhere: bool, spring: Spring):
-    """Keep how deep a side pressed the node last, until it is in front of that side or another one presses it."""
+def note_way(e: int, presses: bool, ends: bool, spring: Spring):
+    """Keep how deep a side pressed the node last, until that way `ends`."""
     if presses:
         spring.left[e] = spring.held[e] - spring.rest[e]
-    elif in_front or elsewhere:
+    elif ends:
         spring.left[e] = wp.float64(0.0)
 
 
@@ -100,12 +100,13 @@ def way_back_function(sides: int) -> Any:
         """
         way = WayBack()
         way.spring = -1
+        shallowest = wp.float64(FAR)
         edge = wp.float64(2.0) * wp.sqrt(near.area)
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
                 home = nearest_face(X, u, master, q, X[i] + u[i], along)
                 if home.face >= 0 and not home.beside:
-                    if is_edge(X, u, master.face, near.face, home.face, home.normal):
+                    if lies_below(X, u, master.face, near.face, home.face, home.normal):
                         usual = usual_depth(master, i, home.face, home.normal, k, latest_force)
                         left = spring.left[q]
                         mine = opposition(X, u, slave_faces, s, near.normal)
@@ -118,7 +119,8 @@ def way_back_function(sides: int) -> Any:
                             limit = wp.float64(0.5) * edge
                         its = opposition(X, u, slave_faces, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)
-                        if its >= wp.float64(OPPOSES) and within:
+                        if its >= wp.float64(OPPOSES) and within and -home.gap < shallowest:
+                            shallowest = -home.gap
                             way.spring = q
                             way.face = home.face
                             way.normal = home.normal
