@@ -124,7 +124,7 @@ def way_back_function(sides: int) -> Any:
                             way.spring = q
                             way.face = home.face
                             way.normal = home.normal
-                            way.begins = wp.where(slid, left, usual)
+                            way.begins = left
         return way
 
     return way_back
