@@ -10,6 +10,7 @@ from warp_mca.kernels.contact.nearest import Master, nearest_face, passes_by, re
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.spring import Spring, open_function, rest_function, spring_function
+from warp_mca.kernels.contact.way_back import recent
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.shared_memory import shared_functions
@@ -34,7 +35,7 @@ def surface_kernel(
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
     `stress_free`: springs of bodies that overlap at the start begin without force. `law`: module of the contact law.
-    `noted`: keep the latest force on each node, for passes whose masters have several sides.
+    `noted`: keep the recent force on each node, for passes whose masters have several sides.
     """
     settle, let_go = settle_functions(friction, stress_free, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
@@ -57,7 +58,7 @@ def surface_kernel(
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
-        latest_force_out: wp.array(dtype=wp.vec3d),
+        recent_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -82,8 +83,7 @@ def surface_kernel(
             force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
             contact_force_out[i] = contact_force_out[i] + force
             if wp.static(noted):
-                if wp.length_sq(force) > wp.float64(0.0):
-                    latest_force_out[i] = force
+                recent_force_out[i] = recent(recent_force_out[i], force)
         else:
             let_go(s, i, v, master.face, dt, near.front, held, spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
@@ -117,7 +117,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
         margin: Real,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
-        latest_force_out: wp.array(dtype=wp.vec3d),
+        recent_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -149,7 +149,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
             if touched > wp.float64(0.0):
                 contact_force_out[i] = contact_force_out[i] + total
                 if wp.static(noted):
-                    latest_force_out[i] = total
+                    recent_force_out[i] = recent(recent_force_out[i], total)
             if moved_too_far(u[i], u_search[i], of(margin, k)):
                 flag_out[k, STALE] = 1
 

@@ -89,7 +89,7 @@ def belongs_to_other_side(
     near: Nearest,
     other: int,
     gap: wp.float64,
-    latest_force: wp.array(dtype=wp.vec3d),
+    recent_force: wp.array(dtype=wp.vec3d),
 ) -> bool:
     """Whether slave s, node i, meets face `other`, `gap` in front of which it is, not the nearest face across an edge."""
     across = area_vector(X, u, master.face, other)
@@ -101,7 +101,7 @@ def belongs_to_other_side(
             found = bool(True)
         elif its >= wp.float64(OPPOSES):
             edge = wp.float64(2.0) * wp.sqrt(near.area)
-            usual = usual_depth(master, i, other, wp.normalize(across), k, latest_force)
+            usual = usual_depth(master, i, other, wp.normalize(across), k, recent_force)
             found = slides_at(gap, usual, edge)
     return found
 
@@ -206,14 +206,14 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         node: NodeSprings,
         front_gap: Gaps,
         front_face: Faces,
-        latest_force: wp.array(dtype=wp.vec3d),
+        recent_force: wp.array(dtype=wp.vec3d),
     ) -> bool:
         edge = wp.float64(2.0) * wp.sqrt(near.area)
         found = in_reach(near, node, held, fold, approach)
         for p in range(wp.static(sides)):
             if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
                 if belongs_to_other_side(
-                    X, u, master, slave_faces, s, i, k, near, front_face[p], front_gap[p], latest_force
+                    X, u, master, slave_faces, s, i, k, near, front_face[p], front_gap[p], recent_force
                 ):
                     found = bool(False)
         return found
@@ -256,7 +256,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         node: NodeSprings,
         choice: Choice,
         spring: Spring,
-        latest_force: wp.array(dtype=wp.vec3d),
+        recent_force: wp.array(dtype=wp.vec3d),
     ) -> Choice:
         """A free node goes to the side that it was least behind before the step; ties go to the fastest approach.
 
@@ -270,7 +270,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
             if node.holding:
                 other = keeper(X, u, master, near.face, node.begin, spring)
             if touches and other < 0:
-                way = way_back(X, u, master, slave_faces, s, i, k, node.begin, e, near, along, spring, latest_force)
+                way = way_back(X, u, master, slave_faces, s, i, k, node.begin, e, near, along, spring, recent_force)
         edge = wp.float64(2.0) * wp.sqrt(near.area)
         approach = -wp.dot(du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))

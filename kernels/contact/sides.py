@@ -23,7 +23,7 @@ from warp_mca.kernels.contact.side_choice import (
     springs_function,
 )
 from warp_mca.kernels.contact.spring import FAR, Spring
-from warp_mca.kernels.contact.way_back import note_way
+from warp_mca.kernels.contact.way_back import note_way, recent
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
@@ -63,7 +63,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
-        latest_force_out: wp.array(dtype=wp.vec3d),
+        recent_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -93,12 +93,12 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
                     fold = wp.where(spring.face[e] >= 0, front, wp.float64(0.0))
                     touches = may_press(
                         X, u, master, slave_faces, s, i, stiffness[s], near, held, fold, approach, node, front_gap,
-                        front_face, latest_force_out,
+                        front_face, recent_force_out,
                     )  # fmt: skip
                     if step == 0:
                         choice = choose(
                             X, u, master, slave_faces, s, i, stiffness[s], e, near, touch.du, touches, along, node,
-                            choice, spring, latest_force_out,
+                            choice, spring, recent_force_out,
                         )  # fmt: skip
                     else:
                         touch.touches = confirm(X, u, master, e, near, touches, node, choice, spring)
@@ -115,8 +115,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
                     note_way(e, bool(False), ends, spring)
         if node.active:
             contact_force_out[i] = contact_force_out[i] + total
-            if wp.length_sq(total) > wp.float64(0.0):
-                latest_force_out[i] = total
+            recent_force_out[i] = recent(recent_force_out[i], total)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 

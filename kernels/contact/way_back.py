@@ -12,7 +12,8 @@ from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 wp.set_module_options({"enable_backward": False})
 
 OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
-_USUAL = 4.0  # depth at which a node may come over an edge, over that at which a spring bears the latest force
+_USUAL = 4.0  # depth at which a node may come over an edge, over that at which a spring bears the recent force
+_FADES = 0.99  # share that a recent force keeps from step to step
 _ALONG = 0.7  # least cosine between that force and the normal
 
 
@@ -34,6 +35,16 @@ class WayBack:
 
 
 @wp.func
+def recent(before: wp.vec3d, force: wp.vec3d) -> wp.vec3d:
+    """The force that a contact pass gives a node now, or what has faded of a greater one before [N].
+
+    Springs of a sliding node tremble, and their depth of a single step may be next to none.
+    """
+    faded = wp.float64(_FADES) * before
+    return wp.where(wp.length_sq(force) > wp.length_sq(faded), force, faded)
+
+
+@wp.func
 def along_normal(force: wp.vec3d, normal: wp.vec3d) -> wp.float64:
     """Component of a force along a unit normal [N]; 0 where it points elsewhere."""
     component = wp.dot(force, normal)
@@ -42,16 +53,16 @@ def along_normal(force: wp.vec3d, normal: wp.vec3d) -> wp.float64:
 
 @wp.func
 def usual_depth(
-    master: Master, i: int, face: int, normal: wp.vec3d, k: wp.float64, latest_force: wp.array(dtype=wp.vec3d)
+    master: Master, i: int, face: int, normal: wp.vec3d, k: wp.float64, recent_force: wp.array(dtype=wp.vec3d)
 ) -> wp.float64:
-    """Depth at which a spring of stiffness k bears the latest contact force on node i, or on a corner of the face [m].
+    """Depth at which a spring of stiffness k bears the recent contact force on node i, or on a corner of the face [m].
 
     That of node i may come from another master, flush with this one. The corners know of a slave that is pressed by
     other nodes, where node i has not been touched before.
     """
-    force = along_normal(latest_force[i], normal)
+    force = along_normal(recent_force[i], normal)
     for c in range(4):
-        force = wp.max(force, along_normal(-latest_force[master.face[face, c]], normal))
+        force = wp.max(force, along_normal(-recent_force[master.face[face, c]], normal))
     return force / wp.min(k, master.stiffness[face])
 
 
@@ -88,7 +99,7 @@ def way_back_function(sides: int) -> Any:
         near: Nearest,
         along: wp.vec3f,
         spring: Spring,
-        latest_force: wp.array(dtype=wp.vec3d),
+        recent_force: wp.array(dtype=wp.vec3d),
     ) -> WayBack:
         """The side across an edge of the nearest face of spring e, which slave s, node i, has run into.
 
@@ -107,7 +118,7 @@ def way_back_function(sides: int) -> Any:
                 home = nearest_face(X, u, master, q, X[i] + u[i], along)
                 if home.face >= 0 and not home.beside:
                     if lies_below(X, u, master.face, near.face, home.face, home.normal):
-                        usual = usual_depth(master, i, home.face, home.normal, k, latest_force)
+                        usual = usual_depth(master, i, home.face, home.normal, k, recent_force)
                         left = spring.left[q]
                         mine = opposition(X, u, slave_faces, s, near.normal)
                         slid = left > wp.float64(0.0)

@@ -254,7 +254,7 @@ class ContactStage:
             threads = lanes * (part.stop - part.start)
             outputs: list[Any] = [work.contact_force, state.flag]
             if not self.on_plane:
-                outputs.insert(1, state.latest_force)
+                outputs.insert(1, state.recent_force)
             if kernel is self.kernel:  # a row of sums for each range of slaves
                 outputs.insert(1, state.normal_force[next(first)])
             wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)

@@ -129,7 +129,7 @@ class Solver:
                 # threads of a GPU share an entry: few of them exceed it
                 speed_square=wp.zeros(1 if single else self.model.node_count, dtype=wp.float32),
                 normal_force=self.normal_force.new_state(),
-                latest_force=wp.zeros(self.model.node_count if has_sides(self.model) else 0, dtype=wp.vec3d),
+                recent_force=wp.zeros(self.model.node_count if has_sides(self.model) else 0, dtype=wp.vec3d),
                 flag=wp.zeros((self.layout.count, len(FLAGS)), dtype=wp.int32),
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],
