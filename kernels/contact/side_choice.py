@@ -5,14 +5,14 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, lies_below, opposition
 from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
+from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, slides_at, usual_depth, way_back_function
 
 wp.set_module_options({"enable_backward": False})
 
 _ROUNDING = 1e-6  # fraction of an edge by which a node may be behind a side before it penetrates that
-_OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
 
 
 @wp.struct
@@ -49,6 +49,9 @@ class Choice:
         normal: the normal of that face.
         depth: depth behind that face before the step [m].
         approach: motion of the node into that face in this step [m].
+        returns: whether the node comes to that face over an edge.
+        passed: springs, a bit for each side, that do not press the node, because another side of an edge does.
+        begins: compression with which the newcomer may begin, if it is deeper than it can reach by itself [m].
     """
 
     newcomer: wp.int32
@@ -57,6 +60,9 @@ class Choice:
     normal: wp.vec3d
     depth: wp.float64
     approach: wp.float64
+    returns: wp.bool
+    passed: wp.int32
+    begins: wp.float64
 
 
 @wp.func
@@ -67,6 +73,7 @@ def first_choice(node: NodeSprings) -> Choice:
     choice.leaver = -1
     choice.face = -1
     choice.depth = wp.float64(FAR)
+    choice.begins = wp.float64(FAR)
     return choice
 
 
@@ -77,17 +84,25 @@ def belongs_to_other_side(
     master: Master,
     slave_faces: SlaveFaces,
     s: int,
+    i: int,
+    k: wp.float64,
     near: Nearest,
     other: int,
+    gap: wp.float64,
+    recent_force: wp.array(dtype=wp.vec3d),
 ) -> bool:
-    """Whether slave node s meets face `other`, in front of which it is, rather than the nearest face across an edge."""
+    """Whether slave s, node i, meets face `other`, `gap` in front of which it is, not the nearest face across an edge."""
     across = area_vector(X, u, master.face, other)
     found = bool(False)
-    if is_edge(X, u, master.face, near.face, other, across):
+    if lies_below(X, u, master.face, near.face, other, across):
         mine = opposition(X, u, slave_faces, s, near.normal)
         its = opposition(X, u, slave_faces, s, across)
-        if mine < wp.float64(_OPPOSES) or (near.beside and mine < its + wp.float64(_OPPOSES)):
+        if mine < wp.float64(OPPOSES) or (near.beside and mine < its + wp.float64(OPPOSES)):
             found = bool(True)
+        elif its >= wp.float64(OPPOSES):
+            edge = wp.float64(2.0) * wp.sqrt(near.area)
+            usual = usual_depth(master, i, other, wp.normalize(across), k, recent_force)
+            found = slides_at(gap, usual, edge)
     return found
 
 
@@ -182,6 +197,8 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         master: Master,
         slave_faces: SlaveFaces,
         s: int,
+        i: int,
+        k: wp.float64,
         near: Nearest,
         held: wp.float64,
         fold: wp.float64,
@@ -189,12 +206,15 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         node: NodeSprings,
         front_gap: Gaps,
         front_face: Faces,
+        recent_force: wp.array(dtype=wp.vec3d),
     ) -> bool:
         edge = wp.float64(2.0) * wp.sqrt(near.area)
         found = in_reach(near, node, held, fold, approach)
         for p in range(wp.static(sides)):
             if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
-                if belongs_to_other_side(X, u, master, slave_faces, s, near, front_face[p]):
+                if belongs_to_other_side(
+                    X, u, master, slave_faces, s, i, k, near, front_face[p], front_gap[p], recent_force
+                ):
                     found = bool(False)
         return found
 
@@ -202,9 +222,9 @@ def front_functions(sides: int) -> tuple[Any, Any]:
 
 
 @cache
-def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
+def choice_functions(sides: int) -> tuple[Any, Any]:
     """The functions (choose: the choice after one more side; confirm: whether a side presses the node, given it)."""
-    pressure = pressure_function(friction)
+    way_back = way_back_function(sides)
 
     @wp.func
     def keeper(
@@ -214,7 +234,8 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         found = int(-1)
         for e in range(begin, begin + wp.static(sides)):
             if spring.face[e] >= 0:  # Warp evaluates both sides of `and`
-                if is_edge(X, u, master.face, f, spring.face[e], pressure(e, spring)):
+                g = spring.face[e]
+                if is_edge(X, u, master.face, f, g, area_vector(X, u, master.face, g)):
                     found = e
         return found
 
@@ -225,19 +246,46 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         master: Master,
         slave_faces: SlaveFaces,
         s: int,
+        i: int,
+        k: wp.float64,
         e: int,
         near: Nearest,
-        approach: wp.float64,
+        du: wp.vec3d,
         touches: bool,
+        along: wp.vec3f,
         node: NodeSprings,
         choice: Choice,
         spring: Spring,
+        recent_force: wp.array(dtype=wp.vec3d),
     ) -> Choice:
-        """A free node goes to the side that it was least behind before the step; ties go to the fastest approach."""
+        """A free node goes to the side that it was least behind before the step; ties go to the fastest approach.
+
+        One that comes over an edge goes to the side that it slides on.
+        """
         chosen = choice
+        other = int(-1)
+        way = WayBack()
+        way.spring = -1
+        if spring.face[e] < 0:
+            if node.holding:
+                other = keeper(X, u, master, near.face, node.begin, spring)
+            if touches and other < 0:
+                way = way_back(X, u, master, slave_faces, s, i, k, node.begin, e, near, along, spring, recent_force)
         edge = wp.float64(2.0) * wp.sqrt(near.area)
+        approach = -wp.dot(du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
-        if not node.holding:
+        if other >= 0 or way.spring >= 0:
+            chosen.passed = choice.passed | (1 << (e - node.begin))
+        if way.spring >= 0:
+            chosen.returns = bool(True)
+            chosen.newcomer = way.spring
+            chosen.leaver = -1
+            chosen.face = way.face
+            chosen.normal = way.normal
+            chosen.begins = way.begins
+        elif choice.returns:
+            pass
+        elif not node.holding:
             faster = before == choice.depth and approach > choice.approach
             if touches and (before < choice.depth or faster):
                 chosen.depth = before
@@ -245,14 +293,14 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
                 chosen.newcomer = e
                 chosen.face = near.face
                 chosen.normal = near.normal
-        elif spring.face[e] < 0:
-            other = keeper(X, u, master, near.face, node.begin, spring)
-            if other >= 0:
-                better = opposition(X, u, slave_faces, s, near.normal)
-                better -= opposition(X, u, slave_faces, s, pressure(other, spring))
-                if better > wp.float64(-_OPPOSES) and -near.gap <= spring.held[other] and not near.beside:
-                    chosen.newcomer = e
-                    chosen.leaver = other
+        elif other >= 0:
+            across = area_vector(X, u, master.face, spring.face[other])
+            better = opposition(X, u, slave_faces, s, near.normal) - opposition(X, u, slave_faces, s, across)
+            enters = approach > -wp.dot(du, wp.normalize(across))
+            if not enters and better > wp.float64(-OPPOSES) and -near.gap <= spring.held[other] and not near.beside:
+                chosen.newcomer = e
+                chosen.leaver = other
+                chosen.begins = spring.held[other] - spring.rest[other]
         return chosen
 
     @wp.func
@@ -269,12 +317,10 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
     ) -> bool:
         presses = touches
         if e == choice.newcomer:
-            presses = presses or choice.leaver >= 0
-        elif e == choice.leaver:
+            presses = presses or choice.leaver >= 0 or choice.returns
+        elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
             presses = bool(False)
         elif spring.face[e] < 0:
-            if keeper(X, u, master, near.face, node.begin, spring) >= 0:
-                presses = bool(False)
             if choice.face >= 0:
                 if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
                     presses = bool(False)

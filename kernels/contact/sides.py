@@ -22,7 +22,8 @@ from warp_mca.kernels.contact.side_choice import (
     pressure_function,
     springs_function,
 )
-from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.spring import FAR, Spring
+from warp_mca.kernels.contact.way_back import note_way, recent
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
@@ -30,15 +31,15 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = False, law: str = LINEAR) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master with several sides.
 
     Springs and lists are those of slave 0 with each side, then of slave 1, and so on. A node that no side presses goes
     to the side that it was least behind before the step; ties go to the side with the greatest approach speed. There
     it may be as deep as in the side that released it, for it may have slid over an edge.
     """
-    settle, let_go = settle_functions(friction, stress_free, law)
-    choose, confirm = choice_functions(friction, sides)
+    settle, let_go = settle_functions(friction, True, law)
+    choose, confirm = choice_functions(sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
@@ -62,6 +63,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
+        recent_force_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -79,6 +81,9 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
         for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
             for e in range(node.begin, node.begin + wp.static(sides)):
                 near = nearest_face(X, u, master, e, x, along)
+                # in front of the side, not pressed though below it, or pressed by another side
+                ends = near.front < wp.float64(FAR) or (near.face >= 0 and not near.beside)
+                ends = ends or (node.holding and spring.face[e] < 0)
                 front = wp.min(front, near.front)
                 near.front = front  # of every side so far
                 held = spring.held[e]
@@ -87,21 +92,30 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
                     approach = -wp.dot(touch.du, near.normal)
                     fold = wp.where(spring.face[e] >= 0, front, wp.float64(0.0))
                     touches = may_press(
-                        X, u, master, slave_faces, s, near, held, fold, approach, node, front_gap, front_face
-                    )
+                        X, u, master, slave_faces, s, i, stiffness[s], near, held, fold, approach, node, front_gap,
+                        front_face, recent_force_out,
+                    )  # fmt: skip
                     if step == 0:
-                        choice = choose(X, u, master, slave_faces, s, e, near, approach, touches, node, choice, spring)
+                        choice = choose(
+                            X, u, master, slave_faces, s, i, stiffness[s], e, near, touch.du, touches, along, node,
+                            choice, spring, recent_force_out,
+                        )  # fmt: skip
                     else:
                         touch.touches = confirm(X, u, master, e, near, touches, node, choice, spring)
                         touch.own = stiffness[s]
                         touch.limit = master.stiffness[near.face]
+                        if e == choice.newcomer and not (choice.returns and touches):
+                            touch.begins = choice.begins
                         total += settle(
                             e, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out
                         )
+                        note_way(e, touch.touches, ends, spring)
                 elif step == 1:
                     let_go(e, i, v, master.face, dt, front, held, spring)
+                    note_way(e, bool(False), ends, spring)
         if node.active:
             contact_force_out[i] = contact_force_out[i] + total
+            recent_force_out[i] = recent(recent_force_out[i], total)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 

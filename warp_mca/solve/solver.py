@@ -20,7 +20,7 @@ from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
-from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.contact_stage import ContactStage, has_sides
 from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
@@ -129,6 +129,7 @@ class Solver:
                 # threads of a GPU share an entry: few of them exceed it
                 speed_square=wp.zeros(1 if single else self.model.node_count, dtype=wp.float32),
                 normal_force=self.normal_force.new_state(),
+                recent_force=wp.zeros(self.model.node_count if has_sides(self.model) else 0, dtype=wp.vec3d),
                 flag=wp.zeros((self.layout.count, len(FLAGS)), dtype=wp.int32),
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],
