@@ -124,6 +124,8 @@ LEFT_OUT = [
     ("*NSET, NSET=n\n1, 77\n", "1 numbers in sets that nothing has"),
     ("*ELEMENT, TYPE=CPS4, ELSET=Surface1\n3, 1,2,4,3\n", "^$"),  # as gmsh marks a face
     ("*ELEMENT, TYPE=CPS4, ELSET=Surface1\n3, 1,2,12,11\n", "1 CPS4"),
+    ("*ELEMENT, TYPE=T3D2, ELSET=Line1\n3, 1,2\n*ELEMENT, TYPE=T3D2, ELSET=Line2\n4, 1,12\n", "are 1 T3D2"),
+    ("*ELEMENT, TYPE=T3D2, ELSET=tie\n3, 1,2\n", "1 T3D2"),
     ("*HEADING\na\n*SOLID SECTION, ELSET=all\n*TRANSFORM, NSET=n\n0.,0.,1.,1.,0.,0.\n*SYSTEM\n*NODE PRINT\nU\n", "^$"),
 ]
 

@@ -32,7 +32,7 @@ _FACES = re.compile(r"(?:S|DS|STRI|M3D|R3D|SFM3D|CP[SE]|CPEG|CAX|DC2D|DCAX)([346
 _LINES = re.compile(r"(?:T3D|T2D|DC1D|R2D)[23]|B[23][123]")
 _QUADRATIC_LINES = re.compile(r"(?:T3D|T2D|DC1D)3|B[23]2")
 _CORNERS = {3: 3, 4: 4, 6: 3, 8: 4, 9: 4}  # of faces, by their nodes
-_MARKS = re.compile(r"CP[SE]\d")  # plane elements, as gmsh writes named surfaces
+_MARKS = re.compile(r"CP[SE]\d.*|T3D\d LINE\d+")  # plane elements and trusses with their set, as gmsh marks places
 _LONGEST = 16  # numbers in a line
 _FLAGS = {"GENERATE", "INTERNAL", "UNSORTED"}
 Parameters = dict[str, str]
@@ -168,12 +168,13 @@ class _Reader:
         if kind is None:
             raise ValueError(f"elements of the type {name} are not read")
         count, corners = (int(solid[1]), 0) if solid else _shape(name)
+        mark = _MARKS.fullmatch(f"{name} {parameters.get('ELSET', '').upper()}") is not None
         for number, nodes in self._elements(data, count) if count else self._unknown(data):
             members.append(number)
             if kind:
                 self.deck.add_cell(number, kind, nodes)
             else:
-                self.deck.add_face(number, name, nodes[:corners], mark=bool(_MARKS.match(name)))
+                self.deck.add_face(number, name, nodes[:corners], mark)
 
     def _elements(self, data: Data, count: int) -> Iterator[tuple[int, list[int]]]:
         """Number and nodes of each element of `count` nodes, which may go on in further lines.

@@ -78,5 +78,10 @@ def compact(mesh: Mesh) -> Mesh:
     index = np.full(len(mesh.points), -1, dtype=np.int32)
     index[used] = np.arange(len(used), dtype=np.int32)
     node_sets = {name: index[nodes][index[nodes] >= 0] for name, nodes in mesh.node_sets.items()}
-    cells = {"hexahedra": index[mesh.hexahedra], "tetrahedra": index[mesh.tetrahedra]}
-    return replace(mesh, points=mesh.points[used], node_sets=node_sets, **cells)
+    return replace(
+        mesh,
+        points=mesh.points[used],
+        hexahedra=index[mesh.hexahedra],
+        node_sets=node_sets,
+        tetrahedra=index[mesh.tetrahedra],
+    )
