@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
 import warp_mca as mca
+from warp_mca.accuracy import measure
 from warp_mca.accuracy.combine import combinations, merged, spread
 from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import NAMES
@@ -209,9 +211,10 @@ def test_cost_is_foreseen_from_counts():
     assert bench.foreseen(Variant(mass_scaling=2.0)) == pytest.approx(4.0 + 1.0)
 
 
-def test_a_scene_from_end_to_end(here: Path, capsys: pytest.CaptureFixture[str]):
-    """A budget of next to nothing leaves the scene as written and its reference."""
-    command = ["tradeoff", "block.py", "--budget", "0.01", "--threads", "1", "--out", "found"]
+def test_a_scene_from_end_to_end(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    """A budget that no variant fits in leaves the scene as written and its reference."""
+    monkeypatch.setattr(Bench, "foreseen", lambda self, variant: 1e9)
+    command = ["tradeoff", "block.py", "--budget", "1e6", "--threads", "1", "--out", "found"]
     assert main(command) == 0
     found = json.loads((here / "found" / "tradeoff.json").read_text(encoding="utf-8"))
     assert (here / "found" / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
@@ -301,11 +304,61 @@ def test_a_scene_of_one_mesh_has_no_reference():
         find_reference(bench, 1.0, {}, 1.0, lambda trial: measured("reference", trial.variant, 1.0, 1.0))
 
 
+def refused_for_its_budget(budget: float, seen: list[Measured]) -> str:
+    with pytest.raises(mca.RequestError, match=rf"^budget = {budget}: ") as caught:
+        mca.tradeoff(block(), budget=budget, threads=1, progress=lambda found, so_far: seen.append(found))
+    return str(caught.value)
+
+
+def test_a_budget_that_the_scene_as_written_exceeds_stops_it_and_says_so():
+    """The scene and its reference were run all the same, hours for a budget of minutes."""
+    seen: list[Measured] = []
+    assert "steps take about" in (said := refused_for_its_budget(1e-3, seen)) and "several times as much" in said
+    assert not seen
+
+
+def test_a_budget_that_the_coarsest_reference_exceeds_says_what_is_needed(monkeypatch: pytest.MonkeyPatch):
+    """By the steps of the scene as written: meshes 1.96, 1.4 and 1 times as coarse, in float64 and several rates."""
+    seen: list[Measured] = []
+    monkeypatch.setattr(measure, "MULTI_RATE", 4e5)  # a reference that takes hours
+    said = refused_for_its_budget(50.0, seen)
+    (base,) = seen
+    least = 4e5 * 1.1 * base.wall["fe"] * (0.51**4 + 0.714**4 + 1.0)
+    wanted = float(said.rpartition("give at least ")[2].removesuffix(" s"))
+    assert wanted == pytest.approx(1.5 * (base.wall["fe"] + least), rel=0.1)
+
+
+def test_a_run_that_would_not_end_in_the_budget_is_stopped():
+    """Only what was foreseen kept the budget: a variant that took ten times as long took it."""
+    bench = Bench(block(), "cpu", 1, None)
+    bench.run(BASE)
+    bench.end = time.perf_counter() + 1e-3
+    late = bench.run(Trial("time step", Variant(time_step_scale=0.5)))
+    assert "the budget would end about" in late.stopped and not late.figures
+
+
+@pytest.mark.parametrize(("lap", "more"), [(1.0, 0.0), (30.0, 30.0)])
+def test_compiling_kernels_is_not_of_the_budget_and_loading_them_is(
+    monkeypatch: pytest.MonkeyPatch, lap: float, more: float
+):
+    now = [100.0]
+    monkeypatch.setattr(measure.time, "perf_counter", lambda: now[0])
+    watch = measure._Watch(end=110.0)
+    for stage, seconds in (("mesh", 1.0), ("compile", lap), ("impact", 0.0)):
+        watch(stage, 0.0)
+        now[0] += seconds
+    assert watch.end == 110.0 + more
+    now[0] = watch.end + 0.1
+    with pytest.raises(measure.OutOfTimeError):
+        watch("impact", 0.01)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["block.py", "--budget", "0"], "budget = 0.0: give a finite time above 0 s"),
         (["block.py", "--budget", "nan"], "budget = nan: give a finite time above 0 s"),
+        (["block.py", "--budget", "1e-320"], "budget = 1e-320: give a finite time above 0 s"),
         (["block.py", "--set", "apart=true"], "a run of it has none of the figures"),
         (["two_link", "--set", "t_end=0.5"], "variants are compared by one impact"),
         (["hertz_sphere", "--set", "rigid_sphere=true"], "scene = 'hertz_sphere': all its bodies are rigid"),

@@ -15,6 +15,7 @@ from warp_mca.accuracy.knobs import BASE, Trial
 from warp_mca.accuracy.same_mesh import Meshes
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import McaError
+from warp_mca.base.progress import duration_words
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.results.result import Result
 from warp_mca.runs.advice import LOGGER
@@ -26,7 +27,13 @@ FIXED = 20_000  # elements that a GPU computes in the time that a step costs in 
 SPRINGS = 1.3  # penalty whose springs shorten the stable step by the square root of 2
 AUTO_PENALTY = 4.0  # about what "auto" chooses for links and balls, to foresee its cost
 MULTI_RATE = 0.4  # share of element steps that steps of several rates compute, about
+COMPILING = 2.0  # what takes longer before the first step is compiling kernels, which happens once [s]
+FORESEEN = 0.05  # share of the steps from which on these tell how long all will take
 ELEMENTS = {"hex8r": 0.5}  # time of an element over that of hex8, on a CPU
+
+
+class OutOfTimeError(McaError):
+    """A run would not end, or did not, before the time of the bench is over."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +66,15 @@ class Bench:
         base: the scene as written, once it was run.
         name: of the device, once that was run.
         beside: least time that a run took beside its steps and compiling, for each element [s].
+        budget: time for all runs [s], from the first step of the scene as written on, without compiling kernels.
+        end: of that time, by `time.perf_counter` [s]; a run that would not end by then is stopped.
     """
 
     def __init__(self, scene: Scene, device: str, threads: int | None, duration: float | None) -> None:
         self.scene, self.device, self.threads, self.duration = scene, device, threads, duration
         self.base: Measured | None = None
         self.name = device
-        self.beside = math.inf
+        self.beside, self.budget, self.end = math.inf, math.inf, math.inf
         self._made: dict[object, Mesh] = {}
         self._meshes = Meshes(scene)
 
@@ -87,9 +96,9 @@ class Bench:
         """Run a variant; what it refuses and what guards stop is part of the measurement.
 
         Raises:
-            McaError: the scene as written cannot be run.
+            McaError: the scene as written cannot be run; OutOfTimeError in the time that is left.
         """
-        watch, begun = _Watch(), time.perf_counter()
+        watch, begun = _Watch(self.budget if trial is BASE else math.inf, self.end), time.perf_counter()
         try:
             scene = trial.variant.applied(self.scene)
             options = {"threads": self.threads, "duration": self.duration, **trial.variant.options}
@@ -100,6 +109,8 @@ class Bench:
             if trial is BASE:
                 raise
             return Measured(trial=trial, stopped=str(error) or type(error).__name__)
+        finally:
+            self.end = watch.end
         summary = result.summary
         whole = time.perf_counter() - begun - summary["wall"]["compile"]
         wall = {"fe": summary["wall"]["fe"], "whole": whole, "cpu": watch.processor or summary["wall"]["fe"]}
@@ -114,6 +125,7 @@ class Bench:
         self.beside = min(self.beside, (whole - wall["fe"]) / found.elements)
         if trial is BASE:
             self.base, self.name = found, str(summary["device"])
+            self.end = time.perf_counter() + self.budget - wall["fe"]
         return found
 
     def time_of(self, found: Measured) -> float:
@@ -126,7 +138,17 @@ class Bench:
         return work + (FIXED * found.steps if self.device != "cpu" else 0.0)
 
     def foreseen(self, variant: Variant) -> float:
-        """What running a variant will take, all of it [s]: its work over that of the scene as written, times its time.
+        """What running a variant will take, all of it [s]: its steps, and what the mesh takes.
+
+        Raises:
+            ValueError: the scene as written was not run yet.
+        """
+        steps, finer = self.foreseen_steps(variant), (variant.refine or self.scene.refine) / self.scene.refine
+        assert self.base is not None
+        return steps + self.beside * self.base.elements * max(1.0, finer**3)
+
+    def foreseen_steps(self, variant: Variant) -> float:
+        """What the steps of a variant will take [s]: its work over that of the scene as written, times its time.
 
         Raises:
             ValueError: the scene as written was not run yet.
@@ -137,8 +159,7 @@ class Bench:
         steps = finer * _steps(variant, self.scene)
         share = (MULTI_RATE if variant.multi_rate is not None else 1.0) * self._share(variant)
         fixed = FIXED if self.device != "cpu" else 0.0
-        work = steps * (fixed + share * finer**3 * base.elements) / (fixed + base.elements)
-        return base.wall["fe"] * work + self.beside * base.elements * max(1.0, finer**3)
+        return base.wall["fe"] * steps * (fixed + share * finer**3 * base.elements) / (fixed + base.elements)
 
     def _share(self, variant: Variant) -> float:
         """Time of an element over that of the scene as written [-]."""
@@ -184,20 +205,42 @@ def _steps(variant: Variant, scene: Scene) -> float:
 
 
 class _Watch:
-    """Told of a run's progress; measures the processor time of its steps.
+    """Told of a run's progress; measures the processor time of its steps, and stops it where time is over.
 
     The first report comes after some rows; the time until then is taken in proportion.
     """
 
-    def __init__(self) -> None:
-        self._first: tuple[float, float] | None = None
-        self._last = (0.0, 0.0)
+    def __init__(self, steps: float = math.inf, end: float = math.inf) -> None:
+        """Of a run whose steps may take so long [s], and which must end by then, by `time.perf_counter` [s].
+
+        Compiling kernels does not count; loading them does.
+        """
+        self.steps, self.end = steps, end
+        self._stage, self._told = "", 0.0
+        self._first: tuple[float, float, float] | None = None
+        self._last = (0.0, 0.0, 0.0)
 
     def __call__(self, stage: str, done: float) -> None:
-        """Note how far the steps are, and the processor time."""
+        """Note how far the steps are, and the times.
+
+        Raises:
+            OutOfTimeError: the run does not end in time, as far as its steps until now tell.
+        """
+        now = time.perf_counter()
+        if self._stage == "compile" and now > self._told + COMPILING:
+            self.end += now - self._told
+        self._stage, self._told = stage, now
+        ahead = 0.0
         if stage == "impact":
-            self._last = (done, time.process_time())
+            self._last = (done, time.process_time(), now)
             self._first = self._first or self._last
+            share, spent = done - self._first[0], now - self._first[2]
+            if done > FORESEEN and share > 0.0:
+                ahead = spent * (1.0 - done) / share
+                if spent / share > self.steps:
+                    raise OutOfTimeError(f"its steps take about {duration_words(spent / share)}")
+        if now + ahead > self.end:
+            raise OutOfTimeError(f"the budget would end about {duration_words(now + ahead - self.end)} before it")
 
     @property
     def processor(self) -> float:

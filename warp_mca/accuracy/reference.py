@@ -110,12 +110,7 @@ def find_reference(
     Raises:
         RequestError: fewer than two meshes gave a result, or the runs have none of the figures.
     """
-    name, trials = bench.scene.name, list[Trial]()
-    for finest in FINEST:
-        found = list(_levels(bench, finest, penalty))
-        trials = found if len(found) > 1 or not trials else trials
-        if len(trials) > 1 and sum(bench.foreseen(trial.variant) for trial in trials) <= allowed:
-            break
+    name, trials = bench.scene.name, _meshes_of(bench, penalty, allowed)
     if len(trials) < 2:
         remedy = "it has no reference, for its cells are so few that other values of refine mesh it alike; make more"
         raise bad_value("scene", name, remedy)
@@ -132,6 +127,22 @@ def find_reference(
         remedy = f"a run of it has none of the figures {', '.join(NAMES)}; give a scene with a contact, paths or yield"
         raise bad_value("scene", name, remedy)
     return Reference(limits=found, levels=levels, penalty=penalty, springs=springs)
+
+
+def least_cost(bench: Bench, penalty: float | str | None) -> float:
+    """Time of the steps of the coarsest reference [s], as far as it can be foreseen."""
+    return sum(bench.foreseen_steps(trial.variant) for trial in _meshes_of(bench, penalty, 0.0))
+
+
+def _meshes_of(bench: Bench, penalty: float | str | None, allowed: float) -> list[Trial]:
+    """The finest meshes of the reference that take no longer than that [s]; the coarsest in any case."""
+    trials: list[Trial] = []
+    for finest in FINEST:
+        found = list(_levels(bench, finest, penalty))
+        trials = found if len(found) > 1 or not trials else trials
+        if len(trials) > 1 and sum(bench.foreseen(trial.variant) for trial in trials) <= allowed:
+            break
+    return trials
 
 
 def _levels(bench: Bench, finest: float, penalty: float | str | None) -> Iterator[Trial]:

@@ -11,12 +11,13 @@ from warp_mca.accuracy.combine import combinations, spread
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.files import write_tradeoff, writing_to
 from warp_mca.accuracy.findings import TradeOff
-from warp_mca.accuracy.knobs import BASE, Trial, one_at_a_time
-from warp_mca.accuracy.measure import Bench, Measured
-from warp_mca.accuracy.reference import Reference, choose_penalty, find_reference
+from warp_mca.accuracy.knobs import BASE, Trial, one_at_a_time, penalty_of
+from warp_mca.accuracy.measure import Bench, Measured, OutOfTimeError
+from warp_mca.accuracy.reference import Reference, choose_penalty, find_reference, least_cost
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.base.progress import duration_words
 from warp_mca.runs.arguments import check_scene, span_of
 from warp_mca.runs.settings import settings_of
 from warp_mca.scene import Scene
@@ -24,6 +25,8 @@ from warp_mca.scene import Scene
 REFERENCE_SHARE = 0.45  # of the budget left after the first runs
 COMBINED_SHARE = 0.3  # of the budget left after the reference
 COMBINED = 10  # combinations at most
+LEAST = 1e-3  # budget that can be asked for [s]
+WRITING = 2.0  # of the budget, for the files at the end, or a tenth of it [s]
 
 Progress = Callable[[Measured, str], None]  # what was measured, and what comes next
 
@@ -46,14 +49,16 @@ def tradeoff(
 
     Args:
         scene: what to run, one impact of it.
-        budget: wall-clock time for all runs [s], kept as far as their cost can be foreseen; None for all variants.
+        budget: wall-clock time for all runs [s], from the first step on and without compiling kernels; a run that would
+            not end in it is stopped. None for all variants.
         device, threads, duration: as in `warp_mca.run`.
         out: folder for tradeoff.json and tradeoff.png; nothing is written if None.
         force: replace those that `out` holds already.
         progress: called after each run with what was measured and with what comes next.
 
     Raises:
-        RequestError: the request cannot be carried out; nothing was written.
+        RequestError: the request cannot be carried out, or the budget is less than the scene as written and the
+            coarsest reference take; nothing was written.
         GuardError: a guard stopped the scene as written.
     """
     check_scene("scene", scene)
@@ -63,8 +68,9 @@ def tradeoff(
     if all(body.rigid for body in scene.bodies):
         remedy = "all its bodies are rigid, whose forces have no limit as contact springs stiffen; make one deformable"
         raise bad_value("scene", scene.name, remedy)
-    if budget is not None and not (validate.is_number(budget) and budget > 0.0):
-        raise bad_value("budget", validate.brief(budget), "give a finite time above 0 s, or leave it out")
+    if budget is not None and not (validate.is_number(budget) and LEAST <= budget <= validate.LONGEST):
+        remedy = f"give a finite time above 0 s, at least {LEAST:g} s, or leave it out"
+        raise bad_value("budget", validate.brief(budget), remedy)
     settings_of(device, "mixed", threads)
     with writing_to(out, force) as folder:
         found = _Study(Bench(scene, device, threads, duration), budget, progress).run()
@@ -94,9 +100,21 @@ class _Study:
     same: list[tuple[Trial, Trial]] = field(default_factory=list)
 
     def run(self) -> TradeOff:
-        """All of it, in order."""
-        self.note(BASE)
-        penalty, springs = choose_penalty(self.bench, lambda variant: self.affords(variant, 0.15), self.note)
+        """All of it, in order.
+
+        Raises:
+            RequestError: the budget does not allow for the least that has to be run.
+        """
+        if self.budget is not None:
+            self.bench.budget = self.budget - min(WRITING, 0.1 * self.budget)
+        try:
+            self.note(BASE)
+        except OutOfTimeError as error:
+            remedy = f"the scene as written alone does not end in it ({error}): give several times as much"
+            raise bad_value("budget", self.budget, remedy) from error
+        least = self.check_least(penalty_of(self.bench.scene))
+        penalty, springs = choose_penalty(self.bench, lambda variant: self.affords(variant, 0.15, least), self.note)
+        self.check_least(penalty)
         reference = find_reference(self.bench, penalty, springs, REFERENCE_SHARE * self.left, self.note)
         reserve = COMBINED_SHARE * self.left if self.budget is not None else 0.0
         single = [BASE, *one_at_a_time(self.bench.scene)]
@@ -155,11 +173,27 @@ class _Study:
         self.left_out.append((trial, foreseen))
         return False
 
-    def affords(self, variant: Variant, share: float) -> bool:
-        """Whether a variant takes no more than a share of what is left of the budget."""
-        return self.bench.foreseen(variant) <= share * self.left
+    def check_least(self, penalty: float | str | None) -> float:
+        """The time that the coarsest reference takes with a penalty [s]; 0 without a budget.
+
+        Raises:
+            RequestError: less is left of the budget.
+        """
+        if self.budget is None:
+            return 0.0
+        least = least_cost(self.bench, penalty)
+        if least > self.left:
+            base = self.runs[self.bench.key(BASE.variant)].wall["fe"]
+            took = f"steps of the scene as written took {duration_words(base)}, those of the coarsest reference about"
+            remedy = f"{took} {duration_words(least)}; give at least {1.5 * (base + least):.2g} s"
+            raise bad_value("budget", self.budget, remedy)
+        return least
+
+    def affords(self, variant: Variant, share: float, reserve: float) -> bool:
+        """Whether a variant takes no more than a share of what is left of the budget, less a reserve [s]."""
+        return self.bench.foreseen(variant) <= share * (self.left - reserve)
 
     @property
     def left(self) -> float:
         """Time that is left [s]."""
-        return float("inf") if self.budget is None else self.budget - (time.perf_counter() - self.begun)
+        return self.bench.end - time.perf_counter()
