@@ -46,6 +46,31 @@ def test_overlap_deeper_than_faces_reach_is_refused(nodes: str):
         mca.run(falling(6e-3, nodes=nodes, master="ymax" if nodes == "ymin" else "boundary"))
 
 
+@pytest.mark.parametrize("two_way", [False, True])
+@pytest.mark.parametrize(("thick", "cells"), [(2e-3, 6), (1e-3, 12)])
+def test_a_ball_on_the_far_side_of_a_one_sided_master_is_not_said_to_lie_inside(
+    thick: float, cells: int, two_way: bool
+):
+    """It hangs 1 mm below a thin plate, whose upper faces are the master; those of both sides do not press it."""
+    ball = mca.Body(
+        name="ball", geometry=mca.Sphere(radius=0.01, section=4, ring=2), material=STEEL, position=(0.0, -0.011, 0.0)
+    )
+    plate = mca.Box(size=(0.06, thick, 0.06), divisions=(cells, 1, cells), origin=(-0.03, 0.0, -0.03))
+
+    def scene(nodes: str) -> mca.Scene:
+        sides = [mca.Surface(body="ball", nodes="boundary"), mca.Surface(body="plate", nodes=nodes)]
+        return mca.Scene(
+            name="below",
+            bodies=(ball, mca.Body(name="plate", geometry=plate, material=STEEL)),
+            contacts=(mca.Contact(slave=sides[0], master=sides[1], two_way=two_way),),
+            impact=mca.ImpactPhase(duration=1e-6, output_interval=1e-7),
+        )
+
+    with pytest.raises(mca.RequestError, match=r"nodes of one body lie behind the other's faces .* outside of it"):
+        mca.run(scene("ymax"))
+    assert mca.run(scene("boundary")).summary["max_penetration"] == 0.0
+
+
 def test_overlap_of_one_scene_of_a_batch_names_the_scene():
     with pytest.raises(mca.RequestError, match=r"^scenes\[1\]: Contact block–plate: initial_overlap"):
         mca.run_batch([falling(0.0), falling(1e-4)])

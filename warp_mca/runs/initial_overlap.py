@@ -183,7 +183,7 @@ def _refusal(ready: Sequence[Prepared], scene: int, contact: int, found: Overlap
     if found.kind == "behind":
         remedy = (
             f"nodes of one body lie behind the other's faces in the contact, though outside of it {place}: faces press "
-            "towards their own side only; name the side of the body that the nodes come from, or nodes='boundary'"
+            "towards their own side only; take the faces on the side where the nodes lie, or nodes='boundary'"
         )
     elif found.kind == "nodes":  # which springs press; bodies of cells that only their middle shows are out of place
         springs = f"contact springs would hold {found.energy:.3g} J"

@@ -194,16 +194,19 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
     """What can go into each other of a scene's model, `skins` being those of its bodies."""
     number = {skin.name: k for k, skin in enumerate(skins)}
     passes: dict[frozenset[str], tuple[int, ...]] = {}
+    planes: dict[tuple[str, RigidPlane], tuple[int, ...]] = {}
     for k, item in enumerate(model.passes):
-        contact = scene.contacts[item.contact]
-        skin = skins[number[contact.slave.body]]
-        if isinstance(contact.master, RigidPlane):
-            kept_out = np.isin(skin.nodes, item.slave)
-            if not kept_out.all():
-                yield BelowPlane(skin, kept_out, contact.master, (k,))
+        slave, master = scene.contacts[item.contact].slave.body, scene.contacts[item.contact].master
+        if isinstance(master, RigidPlane):
+            planes[slave, master] = (*planes.get((slave, master), ()), k)
         else:
-            names = frozenset((skin.name, contact.master.body))
+            names = frozenset((slave, master.body))
             passes[names] = (*passes.get(names, ()), k)
+    for (name, plane), own in planes.items():
+        skin = skins[number[name]]
+        kept_out = np.isin(skin.nodes, np.concatenate([model.passes[k].slave for k in own]))
+        if not kept_out.all():
+            yield BelowPlane(skin, kept_out, plane, own)
     bound = _bound_nodes(scene, meshes, model)
     for numbers in combinations(range(len(skins)), 2):
         one, other = (skins[k] for k in numbers)
