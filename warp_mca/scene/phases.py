@@ -183,7 +183,9 @@ class ImpactPhase:
         duration: simulated time [s].
         output_interval: time between rows of the history [s].
         time_step_scale: share of the stable time step that is used [-], in (0, 1].
-        energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-].
+        energy_tolerance: imbalance, as a share of initial energy and external work, that stops the run [-]. From 0.01
+            on and with penalties left to the program, ten times as much is allowed of what contact springs make as
+            they close and open within a step, with a warning.
         mass_scaling: None, or what elements that are too small gain mass for: a factor above 1 by which the stable step
             grows [-], or the stable step itself, as "2e-8s".
         open_time: how long all contacts must be open for an impact to end, in a run of many phases [s]; None takes the
