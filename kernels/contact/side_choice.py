@@ -120,8 +120,7 @@ def springs_function(friction: bool, sides: int) -> Any:
 
 @cache
 def choice_functions(sides: int) -> tuple[Any, Any]:
-    """The functions (choose: the choice after one more side; confirm: whether a side presses the node, given it, and how
-    its spring begins)."""
+    """The functions (choose: the choice after one more side; confirm: how a side meets the node, given it)."""
     way_back = way_back_function(sides)
 
     @wp.func
