@@ -58,7 +58,7 @@ def surface_kernel(
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
-        recent_force_out: wp.array(dtype=wp.vec3d),
+        recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -83,7 +83,7 @@ def surface_kernel(
             force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
             contact_force_out[i] = contact_force_out[i] + force
             if wp.static(noted):
-                recent_force_out[i] = recent(recent_force_out[i], force)
+                recent_out[i] = recent(recent_out[i], force)
         else:
             let_go(s, i, v, master.face, dt, near.front, held, spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
@@ -117,7 +117,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
         margin: Real,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
-        recent_force_out: wp.array(dtype=wp.vec3d),
+        recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -149,7 +149,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
             if touched > wp.float64(0.0):
                 contact_force_out[i] = contact_force_out[i] + total
                 if wp.static(noted):
-                    recent_force_out[i] = recent(recent_force_out[i], total)
+                    recent_out[i] = recent(recent_out[i], total)
             if moved_too_far(u[i], u_search[i], of(margin, k)):
                 flag_out[k, STALE] = 1
 

@@ -7,14 +7,18 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class SlaveFaces:
-    """Faces of the slave surface around each slave node, as compressed rows.
+    """Slave nodes, and the faces of the slave surface around each, as compressed rows.
 
     Attributes:
+        node: shape (slave_count,), int32.
+        stiffness: penalty stiffness of each [N/m], shape (slave_count,), float64.
         face: nodes, shape (face_count, 4), int32; a triangle has its last node twice.
         offset: first entry of each slave node in face_of_slave, shape (slave_count + 1,), int32.
         face_of_slave: faces around the slave nodes, one after the other, int32.
     """
 
+    node: wp.array(dtype=wp.int32)
+    stiffness: wp.array(dtype=wp.float64)
     face: wp.array2d(dtype=wp.int32)
     offset: wp.array(dtype=wp.int32)
     face_of_slave: wp.array(dtype=wp.int32)
@@ -81,8 +85,9 @@ def neighbour(face: wp.array2d(dtype=wp.int32), f: int, i: int, step: int) -> in
 
 
 @wp.func
-def is_on_rim(slave_faces: SlaveFaces, s: int, i: int) -> bool:
-    """Whether slave s, node i, lies on the rim of an open surface: an edge from it belongs to one face alone."""
+def is_on_rim(slave_faces: SlaveFaces, s: int) -> bool:
+    """Whether slave node s lies on the rim of an open surface: an edge from it belongs to one face alone."""
+    i = slave_faces.node[s]
     begin = slave_faces.offset[s]
     end = slave_faces.offset[s + 1]
     found = bool(False)

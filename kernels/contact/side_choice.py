@@ -5,10 +5,11 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, lies_below, opposition
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
+from warp_mca.kernels.contact.nearest import Master, Nearest
+from warp_mca.kernels.contact.settle import Touch
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
-from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, slides_at, usual_depth, way_back_function
+from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -77,48 +78,6 @@ def first_choice(node: NodeSprings) -> Choice:
     return choice
 
 
-@wp.func
-def belongs_to_other_side(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    master: Master,
-    slave_faces: SlaveFaces,
-    s: int,
-    i: int,
-    k: wp.float64,
-    near: Nearest,
-    other: int,
-    gap: wp.float64,
-    recent_force: wp.array(dtype=wp.vec3d),
-) -> bool:
-    """Whether slave s, node i, meets face `other`, `gap` in front of which it is, not the nearest face across an edge."""
-    across = area_vector(X, u, master.face, other)
-    found = bool(False)
-    if lies_below(X, u, master.face, near.face, other, across):
-        mine = opposition(X, u, slave_faces, s, near.normal)
-        its = opposition(X, u, slave_faces, s, across)
-        if mine < wp.float64(OPPOSES) or (near.beside and mine < its + wp.float64(OPPOSES)):
-            found = bool(True)
-        elif its >= wp.float64(OPPOSES):
-            edge = wp.float64(2.0) * wp.sqrt(near.area)
-            usual = usual_depth(master, i, other, wp.normalize(across), k, recent_force)
-            found = slides_at(gap, usual, edge)
-    return found
-
-
-@wp.func
-def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float64, approach: wp.float64) -> bool:
-    """Whether the node can have come to its depth in the nearest face, from this side or from one that released it.
-
-    `fold` is the distance to the nearest face in front of the node, or 0 for a side that did not press it before.
-    """
-    edge = wp.float64(2.0) * wp.sqrt(near.area)
-    found = reachable(-near.gap, held, fold, approach, edge)
-    if node.released > wp.float64(0.0) and not node.holding:  # it may have slid over an edge
-        found = found or reachable(-near.gap, node.released, wp.float64(0.0), approach, edge)
-    return found
-
-
 @cache
 def pressure_function(friction: bool) -> Any:
     """The function that gives the normal force of a spring on its node [N]."""
@@ -160,70 +119,8 @@ def springs_function(friction: bool, sides: int) -> Any:
 
 
 @cache
-def front_functions(sides: int) -> tuple[Any, Any]:
-    """The functions of the faces that have a node in front of them.
-
-    front_faces: of each side the nearest such face; distances [m], numbers, and the least distance. FAR where only one
-    side has candidates. may_press: whether the nearest face can press the node, given those of the other sides.
-    """
-    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
-
-    @wp.func
-    def front_faces(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        node: NodeSprings,
-        x: wp.vec3d,
-        along: wp.vec3f,
-    ):
-        gaps = Gaps()
-        faces = Faces()
-        front = wp.float64(FAR)
-        for p in range(wp.static(sides)):
-            gaps[p] = wp.float64(FAR)
-        if node.listed > 1:
-            for e in range(node.begin, node.begin + wp.static(sides)):
-                near = nearest_face(X, u, master, e, x, along)
-                gaps[e - node.begin] = near.front
-                faces[e - node.begin] = near.front_face
-                front = wp.min(front, near.front)
-        return gaps, faces, front
-
-    @wp.func
-    def may_press(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slave_faces: SlaveFaces,
-        s: int,
-        i: int,
-        k: wp.float64,
-        near: Nearest,
-        held: wp.float64,
-        fold: wp.float64,
-        approach: wp.float64,
-        node: NodeSprings,
-        front_gap: Gaps,
-        front_face: Faces,
-        recent_force: wp.array(dtype=wp.vec3d),
-    ) -> bool:
-        edge = wp.float64(2.0) * wp.sqrt(near.area)
-        found = in_reach(near, node, held, fold, approach)
-        for p in range(wp.static(sides)):
-            if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
-                if belongs_to_other_side(
-                    X, u, master, slave_faces, s, i, k, near, front_face[p], front_gap[p], recent_force
-                ):
-                    found = bool(False)
-        return found
-
-    return front_faces, may_press
-
-
-@cache
 def choice_functions(sides: int) -> tuple[Any, Any]:
-    """The functions (choose: the choice after one more side; confirm: whether a side presses the node, given it)."""
+    """The functions (choose: the choice after one more side; confirm: how a side meets the node, given it)."""
     way_back = way_back_function(sides)
 
     @wp.func
@@ -240,17 +137,34 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         return found
 
     @wp.func
+    def takes_over(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slave_faces: SlaveFaces,
+        s: int,
+        near: Nearest,
+        du: wp.vec3d,
+        other: int,
+        spring: Spring,
+    ) -> bool:
+        """Whether the nearest face takes the node from spring `other`: it is no deeper there, and not on its way in."""
+        across = area_vector(X, u, master.face, spring.face[other])
+        better = opposition(X, u, slave_faces, s, near.normal) - opposition(X, u, slave_faces, s, across)
+        enters = -wp.dot(du, near.normal) > -wp.dot(du, wp.normalize(across))
+        shallower = -near.gap <= spring.held[other] and not near.beside
+        return shallower and not enters and better > wp.float64(-OPPOSES)
+
+    @wp.func
     def choose(
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
         master: Master,
         slave_faces: SlaveFaces,
         s: int,
-        i: int,
-        k: wp.float64,
         e: int,
         near: Nearest,
-        du: wp.vec3d,
+        touch: Touch,
         touches: bool,
         along: wp.vec3f,
         node: NodeSprings,
@@ -270,9 +184,9 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
             if node.holding:
                 other = keeper(X, u, master, near.face, node.begin, spring)
             if touches and other < 0:
-                way = way_back(X, u, master, slave_faces, s, i, k, node.begin, e, near, along, spring, recent_force)
+                way = way_back(X, u, master, slave_faces, s, node.begin, e, near, along, spring, recent_force)
         edge = wp.float64(2.0) * wp.sqrt(near.area)
-        approach = -wp.dot(du, near.normal)
+        approach = -wp.dot(touch.du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
         if other >= 0 or way.spring >= 0:
             chosen.passed = choice.passed | (1 << (e - node.begin))
@@ -294,10 +208,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
                 chosen.face = near.face
                 chosen.normal = near.normal
         elif other >= 0:
-            across = area_vector(X, u, master.face, spring.face[other])
-            better = opposition(X, u, slave_faces, s, near.normal) - opposition(X, u, slave_faces, s, across)
-            enters = approach > -wp.dot(du, wp.normalize(across))
-            if not enters and better > wp.float64(-OPPOSES) and -near.gap <= spring.held[other] and not near.beside:
+            if takes_over(X, u, master, slave_faces, s, near, touch.du, other, spring):
                 chosen.newcomer = e
                 chosen.leaver = other
                 chosen.begins = spring.held[other] - spring.rest[other]
@@ -310,20 +221,23 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         master: Master,
         e: int,
         near: Nearest,
+        touch: Touch,
         touches: bool,
         node: NodeSprings,
         choice: Choice,
         spring: Spring,
-    ) -> bool:
-        presses = touches
+    ) -> Touch:
+        found = touch
+        found.touches = touches
         if e == choice.newcomer:
-            presses = presses or choice.leaver >= 0 or choice.returns
+            if not (choice.returns and touches):
+                found.begins = choice.begins
+            found.touches = touches or choice.leaver >= 0 or choice.returns
         elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
-            presses = bool(False)
-        elif spring.face[e] < 0:
-            if choice.face >= 0:
-                if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
-                    presses = bool(False)
-        return presses
+            found.touches = bool(False)
+        elif spring.face[e] < 0 and choice.face >= 0:
+            if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
+                found.touches = bool(False)
+        return found
 
     return choose, confirm

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_on_rim, lies_below, opposition
+from warp_mca.kernels.contact.edges import SlaveFaces, is_on_rim, lies_below, opposition
 from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Master, Nearest, nearest_face
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
@@ -53,17 +53,22 @@ def along_normal(force: wp.vec3d, normal: wp.vec3d) -> wp.float64:
 
 @wp.func
 def usual_depth(
-    master: Master, i: int, face: int, normal: wp.vec3d, k: wp.float64, recent_force: wp.array(dtype=wp.vec3d)
+    master: Master,
+    slave_faces: SlaveFaces,
+    s: int,
+    face: int,
+    normal: wp.vec3d,
+    recent_force: wp.array(dtype=wp.vec3d),
 ) -> wp.float64:
-    """Depth at which a spring of stiffness k bears the recent contact force on node i, or on a corner of the face [m].
+    """Depth at which the spring of slave node s bears its recent contact force, or that on a corner of the face [m].
 
-    That of node i may come from another master, flush with this one. The corners know of a slave that is pressed by
-    other nodes, where node i has not been touched before.
+    That of the node may come from another master, flush with this one. The corners know of a slave that is pressed by
+    other nodes, where this one has not been touched before.
     """
-    force = along_normal(recent_force[i], normal)
+    force = along_normal(recent_force[slave_faces.node[s]], normal)
     for c in range(4):
         force = wp.max(force, along_normal(-recent_force[master.face[face, c]], normal))
-    return force / wp.min(k, master.stiffness[face])
+    return force / wp.min(slave_faces.stiffness[s], master.stiffness[face])
 
 
 @wp.func
@@ -73,8 +78,15 @@ def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
 
 
 @wp.func
+def way_ends(near: Nearest, elsewhere: bool) -> bool:
+    """Whether a node that a side does not press is no more on its way over the edge: it is in front of the side, or
+    below it without being pressed, or another side presses it `elsewhere`."""
+    return elsewhere or near.front < wp.float64(FAR) or (near.face >= 0 and not near.beside)
+
+
+@wp.func
 def note_way(e: int, presses: bool, ends: bool, spring: Spring):
-    """Keep how deep a side pressed the node last, until that way `ends`."""
+    """Keep how deep a side pressed the node last, until its way over the edge ends."""
     if presses:
         spring.left[e] = spring.held[e] - spring.rest[e]
     elif ends:
@@ -92,8 +104,6 @@ def way_back_function(sides: int) -> Any:
         master: Master,
         slave_faces: SlaveFaces,
         s: int,
-        i: int,
-        k: wp.float64,
         begin: int,
         e: int,
         near: Nearest,
@@ -101,7 +111,7 @@ def way_back_function(sides: int) -> Any:
         spring: Spring,
         recent_force: wp.array(dtype=wp.vec3d),
     ) -> WayBack:
-        """The side across an edge of the nearest face of spring e, which slave s, node i, has run into.
+        """The side across an edge of the nearest face of spring e, which slave node s has run into.
 
         A node that slid off a side lies below that side as it comes back: by the depth of its spring, and by what the
         slave sagged meanwhile. So does one that slides from another master, flush with this one. The face across the
@@ -109,6 +119,7 @@ def way_back_function(sides: int) -> Any:
         slave oppose the side, and it lies no deeper below it than usual; or than a node in front of it counts as above
         it, where it slid off that side or where no face of the slave opposes the face that it runs into.
         """
+        i = slave_faces.node[s]
         way = WayBack()
         way.spring = -1
         shallowest = wp.float64(FAR)
@@ -118,7 +129,7 @@ def way_back_function(sides: int) -> Any:
                 home = nearest_face(X, u, master, q, X[i] + u[i], along)
                 if home.face >= 0 and not home.beside:
                     if lies_below(X, u, master.face, near.face, home.face, home.normal):
-                        usual = usual_depth(master, i, home.face, home.normal, k, recent_force)
+                        usual = usual_depth(master, slave_faces, s, home.face, home.normal, recent_force)
                         left = spring.left[q]
                         mine = opposition(X, u, slave_faces, s, near.normal)
                         slid = left > wp.float64(0.0)
@@ -126,7 +137,7 @@ def way_back_function(sides: int) -> Any:
                         if mine >= wp.float64(OPPOSES):
                             if slid:
                                 limit = wp.float64(ABOVE) * edge
-                        elif slid or not is_on_rim(slave_faces, s, i):
+                        elif slid or not is_on_rim(slave_faces, s):
                             limit = wp.float64(0.5) * edge
                         its = opposition(X, u, slave_faces, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)

@@ -109,7 +109,10 @@ class ContactStage:
             else sides.sided_kernel(friction, self.each, self.sides, self.law)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
-        self.react, self.bounds = contact.react_kernel(self.each, self.lanes, self.noted), search.bounds_kernel(self.each)
+        self.react, self.bounds = (
+            contact.react_kernel(self.each, self.lanes, self.noted),
+            search.bounds_kernel(self.each),
+        )
         self.find = search.candidates_kernel(self.each, self.sides)
         self.clear = search.clear_kernel(self.each, self.sides)
         self._make_faces(model)
@@ -188,6 +191,7 @@ class ContactStage:
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         if self.sides > 1:
             self.slave_faces = edges.SlaveFaces()
+            self.slave_faces.node, self.slave_faces.stiffness = self.slave, self.stiffness
             self.slave_faces.face = wp.array(self._join("slave_face"), dtype=wp.int32)
             rows = self._rows("slave_face", "slave_offset", "face_of_slave")
             self.slave_faces.offset, self.slave_faces.face_of_slave = rows
@@ -276,7 +280,7 @@ class ContactStage:
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         if self.sides > 1:
-            slaves = [self.slave, self.slave_faces, self.stiffness]
+            slaves = [self.slave_faces]
         inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
