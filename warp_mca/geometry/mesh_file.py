@@ -100,7 +100,8 @@ class MeshFile:
         }
         for note in notes:
             logging.getLogger("warp_mca").warning("%s", note)
-        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
+        mesh = Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes))
+        mesh = compact(replace(mesh, **arrays))
         return with_selections(mesh, self.select)
 
     def _read(self) -> tuple[meshio.Mesh, list[str]]:
