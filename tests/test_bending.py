@@ -70,7 +70,7 @@ def sagging(mesh: Mesh, nu: float, element: str = "hex8", load: float = 1e-3, **
 def told(result: mca.Result) -> float:
     """Deflection over the right one that the warning of bending gives; 1 without."""
     (text,) = [w for w in result.warnings if "in bending, its deflections" in w] or ["about 0% too large flexible"]
-    share, way = re.search(r"about (\d+)% too (large|small)", text).groups()
+    share, way = re.findall(r"about (\d+)% too (large|small)", text)[0]
     assert ("flexible" in text) == (way == "large") and ("stiff" in text) == (way == "small")
     return 1.0 + (1 if way == "large" else -1) * int(share) / 100.0
 

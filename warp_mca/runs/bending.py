@@ -170,11 +170,10 @@ def _said(model: Model, name: str, sums: Array, struck: bool) -> str:
 
 def _remedy(elements: set[str], wedge: bool, yields: bool) -> str:
     """What makes a body of such cells bend right: hex8r only where nothing yields."""
-    if yields:
-        return "take four or more cells over the thickness, no longer than deep"
+    layers = "four or more cells over the thickness, no longer than deep"
     if wedge or "tet4" in elements:
-        return "choose hexahedra of hex8r, or smaller cells"
-    return "choose hex8r, or four or more cells over the thickness, no longer than deep"
+        return f"choose smaller cells, or hexahedra, {layers if yields else 'with hex8r'}"
+    return f"take {layers}" if yields else f"choose hex8r, or {layers}"
 
 
 def _kinds(model: Model, name: str) -> tuple[set[str], bool, bool]:
