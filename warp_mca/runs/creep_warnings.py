@@ -23,7 +23,7 @@ STEADY = 0.3  # by which normal forces of the parts differ from their mean, at m
 WITHIN = 0.95  # of mu F_n: friction below it in the mean does not slide
 ONE_WAY = 0.8  # of the friction of rows that their vector sum keeps, at least
 ELASTIC = 0.1  # of the energy of the springs: less friction work in a part is no creep
-WAY = 3.0  # times the creep: a body that moved further than so rolls or slides
+WAY = 30.0  # times the creep: a body that moved further than so rolls, with a creep of less than a hundredth, or slid
 
 
 def creep_warnings(ledger: Ledger, model: Model, names: Sequence[str], u: Array) -> list[str]:
