@@ -10,6 +10,7 @@ from warp_mca.kernels.contact.nearest import Master, nearest_face, passes_by, re
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.spring import Spring, open_function, rest_function, spring_function
+from warp_mca.kernels.contact.way_back import recent
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.shared_memory import shared_functions
@@ -22,7 +23,9 @@ LANES = 4  # of a GPU for each master: faces that it looks at side by side
 
 
 @cache
-def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR) -> Any:
+def surface_kernel(
+    friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR, noted: bool = False
+) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
     `nearest_face` says which face, `reachable` whether the node can have come to that depth. Slaves are those from
@@ -32,6 +35,7 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: s
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
     `stress_free`: springs of bodies that overlap at the start begin without force. `law`: module of the contact law.
+    `noted`: keep the recent force on each node, for passes whose masters have several sides.
     """
     settle, let_go = settle_functions(friction, stress_free, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
@@ -54,6 +58,7 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: s
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
+        recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -75,9 +80,10 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: s
                 touch.touches = bool(False)
             touch.own = stiffness[s]
             touch.limit = master.stiffness[near.face]
-            contact_force_out[i] = contact_force_out[i] + settle(
-                s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out
-            )
+            force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
+            contact_force_out[i] = contact_force_out[i] + force
+            if wp.static(noted):
+                recent_out[i] = recent(recent_out[i], force)
         else:
             let_go(s, i, v, master.face, dt, near.front, held, spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
@@ -87,15 +93,16 @@ def surface_kernel(friction: bool, each: bool, stress_free: bool = False, law: s
 
 
 @cache
-def react_kernel(each: bool, lanes: int) -> Any:
+def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
     """Kernel: each master node gathers its share of the reactions on the faces around it, in a fixed order.
 
     Masters are those from `first` on; with more `lanes`, on a GPU, each looks at so many faces side by side.
+    `noted`: as of `surface_kernel`.
     """
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     _, exchange = shared_functions("float64")
 
-    @wp.kernel(enable_backward=False, module="unique" if each or lanes > 1 else None, grid_stride=False)
+    @wp.kernel(enable_backward=False, module="unique" if each or lanes > 1 or noted else None, grid_stride=False)
     def react(
         first: int,
         u: wp.array(dtype=wp.vec3d),
@@ -110,6 +117,7 @@ def react_kernel(each: bool, lanes: int) -> Any:
         margin: Real,
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
+        recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
@@ -140,6 +148,8 @@ def react_kernel(each: bool, lanes: int) -> Any:
         if lane == 0:
             if touched > wp.float64(0.0):
                 contact_force_out[i] = contact_force_out[i] + total
+                if wp.static(noted):
+                    recent_out[i] = recent(recent_out[i], total)
             if moved_too_far(u[i], u_search[i], of(margin, k)):
                 flag_out[k, STALE] = 1
 

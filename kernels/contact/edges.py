@@ -7,14 +7,18 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class SlaveFaces:
-    """Faces of the slave surface around each slave node, as compressed rows.
+    """Slave nodes, and the faces of the slave surface around each, as compressed rows.
 
     Attributes:
+        node: shape (slave_count,), int32.
+        stiffness: penalty stiffness of each [N/m], shape (slave_count,), float64.
         face: nodes, shape (face_count, 4), int32; a triangle has its last node twice.
         offset: first entry of each slave node in face_of_slave, shape (slave_count + 1,), int32.
         face_of_slave: faces around the slave nodes, one after the other, int32.
     """
 
+    node: wp.array(dtype=wp.int32)
+    stiffness: wp.array(dtype=wp.float64)
     face: wp.array2d(dtype=wp.int32)
     offset: wp.array(dtype=wp.int32)
     face_of_slave: wp.array(dtype=wp.int32)
@@ -37,6 +41,19 @@ def area_vector(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: 
 
 
 @wp.func
+def lies_below(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    g: int,
+    normal: wp.vec3d,
+) -> bool:
+    """Whether the middle of face f is behind face g, whose normal is `normal`: no fold where a node is near both."""
+    return wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
+
+
+@wp.func
 def is_edge(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
@@ -51,7 +68,37 @@ def is_edge(
         for b in range(4):
             if face[f, a] == face[g, b]:
                 shared = bool(True)
-    return shared and wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
+    return shared and lies_below(X, u, face, f, g, normal)
+
+
+@wp.func
+def neighbour(face: wp.array2d(dtype=wp.int32), f: int, i: int, step: int) -> int:
+    """Node of face f that follows node i, or comes before it where step is 3."""
+    found = i
+    for c in range(4):
+        if face[f, c] == i:
+            other = face[f, (c + step) % 4]
+            if other == i:  # the last corner of a triangle, which it has twice
+                other = face[f, (c + 2 * step) % 4]
+            found = other
+    return found
+
+
+@wp.func
+def is_on_rim(slave_faces: SlaveFaces, s: int) -> bool:
+    """Whether slave node s lies on the rim of an open surface: an edge from it belongs to one face alone."""
+    i = slave_faces.node[s]
+    begin = slave_faces.offset[s]
+    end = slave_faces.offset[s + 1]
+    found = bool(False)
+    for j in range(begin, end):
+        after = neighbour(slave_faces.face, slave_faces.face_of_slave[j], i, 1)
+        shared = bool(False)
+        for k in range(begin, end):
+            if neighbour(slave_faces.face, slave_faces.face_of_slave[k], i, 3) == after:
+                shared = bool(True)
+        found = found or not shared
+    return found
 
 
 @wp.func

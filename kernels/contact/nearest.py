@@ -9,8 +9,8 @@ wp.set_module_options({"enable_backward": False})
 
 # Lengths, as fractions of the edges of a face
 _FOLD = 0.01  # how much deeper a node may be at once in a neighbour that rises, past the edge between them
-_SLACK = 1e-4  # by how much more than its motion in a step the depth of a node may grow
-_ABOVE = 0.04  # a node that arrives beside a face, but nearer than this above another one, passes by
+SLACK = 1e-4  # by how much more than its motion in a step the depth of a node may grow
+ABOVE = 0.04  # a node that arrives beside a face, but nearer than this above another one, passes by
 
 _RIM = 1e-4  # fraction of half an edge by which a node may lie off a face and still count as above it
 _OPPOSED = -0.9  # least cosine between a node's last contact force and the normal of the face that presses it next
@@ -45,7 +45,7 @@ class Nearest:
         beside: whether that point lies off the face, though within the reach of its edges.
         area: a quarter of the area of the face [m^2].
         front: distance to the nearest face that has the node in front of it, or FAR [m].
-        front_face: that face, or -1.
+        front_face: the nearest one that the node is not beside, else the nearest; -1 if there is none.
     """
 
     face: wp.int32
@@ -80,7 +80,7 @@ def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.
         moved: along the face's normal in this step, relative to the face [m].
         edge: length of the face's edges [m].
     """
-    slack = wp.float64(_SLACK) * edge
+    slack = wp.float64(SLACK) * edge
     if depth < front and held > wp.float64(0.0):  # inside already, and maybe past a fold since
         slack = held + wp.float64(_FOLD) * edge
     return depth <= held + wp.float64(2.0) * wp.abs(moved) + slack
@@ -97,7 +97,7 @@ def is_beside(at: wp.vec2d, triangle: bool, rim: wp.float64) -> bool:
 @wp.func
 def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float64) -> bool:
     """Whether a node that arrives beside a face flies above another one instead; arguments as of `reachable`."""
-    return beside and held == wp.float64(0.0) and front < wp.float64(_ABOVE) * edge
+    return beside and held == wp.float64(0.0) and front < wp.float64(ABOVE) * edge
 
 
 @wp.func
@@ -130,6 +130,8 @@ def nearest_of(
     best.face = -1
     best.front = wp.float64(FAR)
     best.front_face = -1
+    front_gap = wp.float64(FAR)  # of front_face
+    front_beside = bool(False)
     for c in range(first, master.count[s], stride):
         inside, at, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
         if inside:
@@ -153,8 +155,11 @@ def nearest_of(
                     best.beside = beside
                     best.area = area
             elif gap >= wp.float64(0.0):
-                if gap < best.front:
+                beside = is_beside(at, triangle, wp.float64(_RIM))
+                if best.front_face < 0 or (gap < front_gap if beside == front_beside else front_beside):
                     best.front_face = f
+                    front_gap = gap
+                    front_beside = beside
                 best.front = wp.min(best.front, gap)
         f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best

@@ -28,6 +28,7 @@ class Touch:
         along: contact force of the last step, of any length; float32.
         own: penalty stiffness of the node [N/m].
         limit: penalty stiffness of the face [N/m].
+        begins: greatest compression with which the spring begins, FAR without a limit [m].
     """
 
     touches: wp.bool
@@ -37,6 +38,7 @@ class Touch:
     along: wp.vec3f
     own: wp.float64
     limit: wp.float64
+    begins: wp.float64
 
 
 @wp.func
@@ -55,6 +57,7 @@ def meet(
     touch.du = dt * (v[i] - master_velocity(v, face, near.face, touch.weight))
     touch.held = held
     touch.along = along
+    touch.begins = wp.float64(FAR)
     return touch
 
 
@@ -81,6 +84,9 @@ def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, 
         # a spring with neither gap nor normal has no force, and is released as an open one
         gap_kept = wp.where(touch.touches, near.gap, wp.float64(0.0))
         normal_kept = wp.where(touch.touches, near.normal, wp.vec3d())
+        if wp.static(stress_free):
+            if touch.touches and spring.face[s] < 0 and touch.begins < wp.float64(FAR):
+                spring.rest[s] = wp.max(-near.gap - touch.begins, wp.float64(0.0))
         gap_pressed = gap_from_rest(s, gap_kept, spring)
         k_old = wp.where(spring.face[s] < 0, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)

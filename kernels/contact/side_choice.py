@@ -6,13 +6,14 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, Nearest
+from warp_mca.kernels.contact.settle import Touch
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
+from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function
 
 wp.set_module_options({"enable_backward": False})
 
 _ROUNDING = 1e-6  # fraction of an edge by which a node may be behind a side before it penetrates that
-_OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
 
 
 @wp.struct
@@ -49,6 +50,9 @@ class Choice:
         normal: the normal of that face.
         depth: depth behind that face before the step [m].
         approach: motion of the node into that face in this step [m].
+        returns: whether the node comes to that face over an edge.
+        passed: springs, a bit for each side, that do not press the node, because another side of an edge does.
+        begins: compression with which the newcomer may begin, if it is deeper than it can reach by itself [m].
     """
 
     newcomer: wp.int32
@@ -57,6 +61,9 @@ class Choice:
     normal: wp.vec3d
     depth: wp.float64
     approach: wp.float64
+    returns: wp.bool
+    passed: wp.int32
+    begins: wp.float64
 
 
 @wp.func
@@ -67,41 +74,8 @@ def first_choice(node: NodeSprings) -> Choice:
     choice.leaver = -1
     choice.face = -1
     choice.depth = wp.float64(FAR)
+    choice.begins = wp.float64(FAR)
     return choice
-
-
-@wp.func
-def belongs_to_other_side(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    master: Master,
-    slave_faces: SlaveFaces,
-    s: int,
-    near: Nearest,
-    other: int,
-) -> bool:
-    """Whether slave node s meets face `other`, in front of which it is, rather than the nearest face across an edge."""
-    across = area_vector(X, u, master.face, other)
-    found = bool(False)
-    if is_edge(X, u, master.face, near.face, other, across):
-        mine = opposition(X, u, slave_faces, s, near.normal)
-        its = opposition(X, u, slave_faces, s, across)
-        if mine < wp.float64(_OPPOSES) or (near.beside and mine < its + wp.float64(_OPPOSES)):
-            found = bool(True)
-    return found
-
-
-@wp.func
-def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float64, approach: wp.float64) -> bool:
-    """Whether the node can have come to its depth in the nearest face, from this side or from one that released it.
-
-    `fold` is the distance to the nearest face in front of the node, or 0 for a side that did not press it before.
-    """
-    edge = wp.float64(2.0) * wp.sqrt(near.area)
-    found = reachable(-near.gap, held, fold, approach, edge)
-    if node.released > wp.float64(0.0) and not node.holding:  # it may have slid over an edge
-        found = found or reachable(-near.gap, node.released, wp.float64(0.0), approach, edge)
-    return found
 
 
 @cache
@@ -145,66 +119,9 @@ def springs_function(friction: bool, sides: int) -> Any:
 
 
 @cache
-def front_functions(sides: int) -> tuple[Any, Any]:
-    """The functions of the faces that have a node in front of them.
-
-    front_faces: of each side the nearest such face; distances [m], numbers, and the least distance. FAR where only one
-    side has candidates. may_press: whether the nearest face can press the node, given those of the other sides.
-    """
-    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
-
-    @wp.func
-    def front_faces(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        node: NodeSprings,
-        x: wp.vec3d,
-        along: wp.vec3f,
-    ):
-        gaps = Gaps()
-        faces = Faces()
-        front = wp.float64(FAR)
-        for p in range(wp.static(sides)):
-            gaps[p] = wp.float64(FAR)
-        if node.listed > 1:
-            for e in range(node.begin, node.begin + wp.static(sides)):
-                near = nearest_face(X, u, master, e, x, along)
-                gaps[e - node.begin] = near.front
-                faces[e - node.begin] = near.front_face
-                front = wp.min(front, near.front)
-        return gaps, faces, front
-
-    @wp.func
-    def may_press(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slave_faces: SlaveFaces,
-        s: int,
-        near: Nearest,
-        held: wp.float64,
-        fold: wp.float64,
-        approach: wp.float64,
-        node: NodeSprings,
-        front_gap: Gaps,
-        front_face: Faces,
-    ) -> bool:
-        edge = wp.float64(2.0) * wp.sqrt(near.area)
-        found = in_reach(near, node, held, fold, approach)
-        for p in range(wp.static(sides)):
-            if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
-                if belongs_to_other_side(X, u, master, slave_faces, s, near, front_face[p]):
-                    found = bool(False)
-        return found
-
-    return front_faces, may_press
-
-
-@cache
-def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
-    """The functions (choose: the choice after one more side; confirm: whether a side presses the node, given it)."""
-    pressure = pressure_function(friction)
+def choice_functions(sides: int) -> tuple[Any, Any]:
+    """The functions (choose: the choice after one more side; confirm: how a side meets the node, given it)."""
+    way_back = way_back_function(sides)
 
     @wp.func
     def keeper(
@@ -214,9 +131,29 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         found = int(-1)
         for e in range(begin, begin + wp.static(sides)):
             if spring.face[e] >= 0:  # Warp evaluates both sides of `and`
-                if is_edge(X, u, master.face, f, spring.face[e], pressure(e, spring)):
+                g = spring.face[e]
+                if is_edge(X, u, master.face, f, g, area_vector(X, u, master.face, g)):
                     found = e
         return found
+
+    @wp.func
+    def takes_over(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slave_faces: SlaveFaces,
+        s: int,
+        near: Nearest,
+        du: wp.vec3d,
+        other: int,
+        spring: Spring,
+    ) -> bool:
+        """Whether the nearest face takes the node from spring `other`: it is no deeper there, and not on its way in."""
+        across = area_vector(X, u, master.face, spring.face[other])
+        better = opposition(X, u, slave_faces, s, near.normal) - opposition(X, u, slave_faces, s, across)
+        enters = -wp.dot(du, near.normal) > -wp.dot(du, wp.normalize(across))
+        shallower = -near.gap <= spring.held[other] and not near.beside
+        return shallower and not enters and better > wp.float64(-OPPOSES)
 
     @wp.func
     def choose(
@@ -227,17 +164,42 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         s: int,
         e: int,
         near: Nearest,
-        approach: wp.float64,
+        touch: Touch,
         touches: bool,
+        along: wp.vec3f,
         node: NodeSprings,
         choice: Choice,
         spring: Spring,
+        recent_force: wp.array(dtype=wp.vec3d),
     ) -> Choice:
-        """A free node goes to the side that it was least behind before the step; ties go to the fastest approach."""
+        """A free node goes to the side that it was least behind before the step; ties go to the fastest approach.
+
+        One that comes over an edge goes to the side that it slides on.
+        """
         chosen = choice
+        other = int(-1)
+        way = WayBack()
+        way.spring = -1
+        if spring.face[e] < 0:
+            if node.holding:
+                other = keeper(X, u, master, near.face, node.begin, spring)
+            if touches and other < 0:
+                way = way_back(X, u, master, slave_faces, s, node.begin, e, near, along, spring, recent_force)
         edge = wp.float64(2.0) * wp.sqrt(near.area)
+        approach = -wp.dot(touch.du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
-        if not node.holding:
+        if other >= 0 or way.spring >= 0:
+            chosen.passed = choice.passed | (1 << (e - node.begin))
+        if way.spring >= 0:
+            chosen.returns = bool(True)
+            chosen.newcomer = way.spring
+            chosen.leaver = -1
+            chosen.face = way.face
+            chosen.normal = way.normal
+            chosen.begins = way.begins
+        elif choice.returns:
+            pass
+        elif not node.holding:
             faster = before == choice.depth and approach > choice.approach
             if touches and (before < choice.depth or faster):
                 chosen.depth = before
@@ -245,14 +207,11 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
                 chosen.newcomer = e
                 chosen.face = near.face
                 chosen.normal = near.normal
-        elif spring.face[e] < 0:
-            other = keeper(X, u, master, near.face, node.begin, spring)
-            if other >= 0:
-                better = opposition(X, u, slave_faces, s, near.normal)
-                better -= opposition(X, u, slave_faces, s, pressure(other, spring))
-                if better > wp.float64(-_OPPOSES) and -near.gap <= spring.held[other] and not near.beside:
-                    chosen.newcomer = e
-                    chosen.leaver = other
+        elif other >= 0:
+            if takes_over(X, u, master, slave_faces, s, near, touch.du, other, spring):
+                chosen.newcomer = e
+                chosen.leaver = other
+                chosen.begins = spring.held[other] - spring.rest[other]
         return chosen
 
     @wp.func
@@ -262,22 +221,23 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         master: Master,
         e: int,
         near: Nearest,
+        touch: Touch,
         touches: bool,
         node: NodeSprings,
         choice: Choice,
         spring: Spring,
-    ) -> bool:
-        presses = touches
+    ) -> Touch:
+        found = touch
+        found.touches = touches
         if e == choice.newcomer:
-            presses = presses or choice.leaver >= 0
-        elif e == choice.leaver:
-            presses = bool(False)
-        elif spring.face[e] < 0:
-            if keeper(X, u, master, near.face, node.begin, spring) >= 0:
-                presses = bool(False)
-            if choice.face >= 0:
-                if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
-                    presses = bool(False)
-        return presses
+            if not (choice.returns and touches):
+                found.begins = choice.begins
+            found.touches = touches or choice.leaver >= 0 or choice.returns
+        elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
+            found.touches = bool(False)
+        elif spring.face[e] < 0 and choice.face >= 0:
+            if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
+                found.touches = bool(False)
+        return found
 
     return choose, confirm

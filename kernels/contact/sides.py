@@ -18,11 +18,12 @@ from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.side_choice import (
     choice_functions,
     first_choice,
-    front_functions,
     pressure_function,
     springs_function,
 )
+from warp_mca.kernels.contact.side_reach import front_functions
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
@@ -30,15 +31,16 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = False, law: str = LINEAR) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master with several sides.
 
     Springs and lists are those of slave 0 with each side, then of slave 1, and so on. A node that no side presses goes
     to the side that it was least behind before the step; ties go to the side with the greatest approach speed. There
-    it may be as deep as in the side that released it, for it may have slid over an edge.
+    it may be as deep as in the side that released it, for it may have slid over an edge. Where several sides have
+    candidates, step 0 chooses among them; step 1 presses the node.
     """
-    settle, let_go = settle_functions(friction, stress_free, law)
-    choose, confirm = choice_functions(friction, sides)
+    settle, let_go = settle_functions(friction, True, law)
+    choose, confirm = choice_functions(sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
@@ -50,9 +52,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
         u: wp.array(dtype=wp.vec3d),
         v: wp.array(dtype=wp.vec3d),
         u_search: wp.array(dtype=wp.vec3d),
-        slave: wp.array(dtype=wp.int32),
-        slave_faces: SlaveFaces,
-        stiffness: wp.array(dtype=wp.float64),
+        slaves: SlaveFaces,
         master: Master,
         scene: Index,
         mu: Real,
@@ -62,46 +62,48 @@ def sided_kernel(friction: bool, each: bool, sides: int, stress_free: bool = Fal
         spring: Spring,
         contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
+        recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         wait_for_previous()
         let_next_begin()
         s = first + wp.tid()
-        i = slave[s]
+        i = slaves.node[s]
         k = of(scene, s)
         x = X[i] + u[i]
         node = springs_of_node(s, master.count, spring)
         along = wp.vec3f(node.pressed)
-        front_gap, front_face, front = front_faces(X, u, master, node, x, along)
+        fronts, front_face, front = front_faces(X, u, master, node, x, along)
         choice = first_choice(node)
-        total = wp.vec3d()
-        # where several sides have candidates, pass 0 chooses among them; pass 1 presses the node
+        total, scale = wp.vec3d(), of(per_newton, k)
         for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
             for e in range(node.begin, node.begin + wp.static(sides)):
                 near = nearest_face(X, u, master, e, x, along)
+                ends = way_ends(near, node.holding and spring.face[e] < 0)
                 front = wp.min(front, near.front)
                 near.front = front  # of every side so far
-                held = spring.held[e]
+                held, pressed = spring.held[e], spring.face[e] >= 0
                 if near.face >= 0:
                     touch = meet(v, master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
-                    approach = -wp.dot(touch.du, near.normal)
-                    fold = wp.where(spring.face[e] >= 0, front, wp.float64(0.0))
                     touches = may_press(
-                        X, u, master, slave_faces, s, near, held, fold, approach, node, front_gap, front_face
+                        X, u, master, slaves, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out
                     )
                     if step == 0:
-                        choice = choose(X, u, master, slave_faces, s, e, near, approach, touches, node, choice, spring)
-                    else:
-                        touch.touches = confirm(X, u, master, e, near, touches, node, choice, spring)
-                        touch.own = stiffness[s]
-                        touch.limit = master.stiffness[near.face]
-                        total += settle(
-                            e, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out
+                        choice = choose(
+                            X, u, master, slaves, s, e, near, touch, touches, along, node, choice, spring, recent_out
                         )
+                    else:
+                        touch = confirm(X, u, master, e, near, touch, touches, node, choice, spring)
+                        touch.own = slaves.stiffness[s]
+                        touch.limit = master.stiffness[near.face]
+                        total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
+                        note_way(e, touch.touches, ends, spring)
                 elif step == 1:
                     let_go(e, i, v, master.face, dt, front, held, spring)
+                    note_way(e, bool(False), ends, spring)
         if node.active:
             contact_force_out[i] = contact_force_out[i] + total
+            recent_out[i] = recent(recent_out[i], total)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 

@@ -42,9 +42,11 @@ class Spring:
     penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
     in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
     stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
-    became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free.
-    normal_energy: the part of `energy` that the normal spring holds [J], only of laws that are not linear. parameters:
-    of the contact law [SI units], shape (spring_count, parameter_count).
+    became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free,
+    and of masters with several sides. normal_energy: the part of `energy` that the normal spring holds [J], only of
+    laws that are not linear. parameters: of the contact law [SI units], shape (spring_count, parameter_count). left:
+    compression with which the side pressed the node last, until it is in front of that side, below it without being
+    pressed, or pressed by another [m]; only of masters with several sides.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -64,6 +66,7 @@ class Spring:
     rest: wp.array(dtype=wp.float64)
     normal_energy: wp.array(dtype=wp.float64)
     parameters: wp.array2d(dtype=wp.float64)
+    left: wp.array(dtype=wp.float64)
 
 
 @cache

@@ -42,6 +42,11 @@ def _vectors(values: Sequence[Any]) -> Any:
     return wp.vec3d(*values[0]) if len(values) == 1 else wp.array(np.asarray(values), dtype=wp.vec3d)
 
 
+def has_sides(model: Model) -> bool:
+    """Whether a master of the model has several sides, which need the latest forces on nodes."""
+    return any(item.sides > 1 for item in model.passes)
+
+
 @dataclass(eq=False)
 class ContactState:
     """State of a contact pass; lists are those of the latest search, and empty on a rigid plane.
@@ -81,6 +86,7 @@ class ContactStage:
         self.per_newton, self.node_count = normal_force.per_newton, model.node_count
         self.each = len(items) > 1
         self.sides = max(item.sides for item in items)
+        self.noted = has_sides(model)
         slaves = offsets([len(item.slave) for item in items])
         self.springs = self.sides * slaves
         self.first = wp.array(self.springs, dtype=wp.int32)
@@ -98,12 +104,15 @@ class ContactStage:
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free, self.law)
+            contact.surface_kernel(friction, self.each, self.stress_free, self.law, self.noted)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides, self.stress_free, self.law)
+            else sides.sided_kernel(friction, self.each, self.sides, self.law)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
-        self.react, self.bounds = contact.react_kernel(self.each, self.lanes), search.bounds_kernel(self.each)
+        self.react, self.bounds = (
+            contact.react_kernel(self.each, self.lanes, self.noted),
+            search.bounds_kernel(self.each),
+        )
         self.find = search.candidates_kernel(self.each, self.sides)
         self.clear = search.clear_kernel(self.each, self.sides)
         self._make_faces(model)
@@ -144,7 +153,8 @@ class ContactStage:
             setattr(found, name, wp.zeros(count, dtype=wp.float64))
         found.normal_energy = wp.zeros(0 if self.law == LINEAR else count, dtype=wp.float64)
         found.parameters = self.parameters
-        found.rest = wp.zeros(count if self.stress_free else 0, dtype=wp.float64)
+        found.rest = wp.zeros(count if self.stress_free or self.sides > 1 else 0, dtype=wp.float64)
+        found.left = wp.zeros(count if self.sides > 1 else 0, dtype=wp.float64)
         found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
         found.face = wp.full(count, -1, dtype=wp.int32)
         found.weight = wp.zeros(count, dtype=wp.vec4d)
@@ -171,6 +181,7 @@ class ContactStage:
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         if self.sides > 1:
             self.slave_faces = edges.SlaveFaces()
+            self.slave_faces.node, self.slave_faces.stiffness = self.slave, self.stiffness
             self.slave_faces.face = wp.array(self._join("slave_face"), dtype=wp.int32)
             rows = self._rows("slave_face", "slave_offset", "face_of_slave")
             self.slave_faces.offset, self.slave_faces.face_of_slave = rows
@@ -246,6 +257,8 @@ class ContactStage:
         def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
             threads = lanes * (part.stop - part.start)
             outputs: list[Any] = [work.contact_force, state.flag]
+            if not self.on_plane:
+                outputs.insert(1, state.recent_force)
             if kernel is self.kernel:  # a row of sums for each range of slaves
                 outputs.insert(1, state.normal_force[next(first)])
             wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)
@@ -257,7 +270,7 @@ class ContactStage:
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
         if self.sides > 1:
-            slaves = [self.slave, self.slave_faces, self.stiffness]
+            slaves = [self.slave_faces]
         inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)

@@ -20,7 +20,7 @@ from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
 from warp_mca.solve.absorbing_stage import AbsorbingStage
 from warp_mca.solve.constraint_stage import ConstraintStage
-from warp_mca.solve.contact_stage import ContactStage
+from warp_mca.solve.contact_stage import ContactStage, has_sides
 from warp_mca.solve.coupling_stage import CouplingStage
 from warp_mca.solve.device import check_device
 from warp_mca.solve.extremes import NormalForce
@@ -108,8 +108,7 @@ class Solver:
         self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, touched)
         self.rigid = RigidStage(model, self.nodes, self.precision)
         self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
-        self.ties = TieStage(model, self.nodes, self.precision)
-        self.floating = FloatingStage(model, self.work)
+        self.ties, self.floating = TieStage(model, self.nodes, self.precision), FloatingStage(model, self.work)
         self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
         self.sensors = SensorStage(self, ())
         self.groups = step_groups(self)
@@ -129,6 +128,7 @@ class Solver:
                 # threads of a GPU share an entry: few of them exceed it
                 speed_square=wp.zeros(1 if single else self.model.node_count, dtype=wp.float32),
                 normal_force=self.normal_force.new_state(),
+                recent_force=wp.zeros(self.model.node_count if has_sides(self.model) else 0, dtype=wp.vec3d),
                 flag=wp.zeros((self.layout.count, len(FLAGS)), dtype=wp.int32),
                 elements=[stage.new_state() for stage in self.elements],
                 contacts=[stage.new_state() for stage in self.contacts],

@@ -49,6 +49,8 @@ class State:
             (node_count,) or (1,), float32.
         normal_force: greatest sum of the normal forces of each scene in any step, then sums of the present step, zero
             between steps, in units of `extremes.NormalForce` [-], shape (1 + range_count, column_count), int64.
+        recent_force: contact force on each node, of one pass, the greatest of late [N], shape (node_count,), vec3d;
+            empty where no master has several sides.
         flag: guards that kernels raised, by scene, `kernels.contact.search.FLAGS` [-], shape (scene_count, 4), int32.
         elements: of each block, `ElementState`.
         contacts: of each contact pass, `ContactState`.
@@ -66,6 +68,7 @@ class State:
     v: wp.array
     speed_square: wp.array
     normal_force: wp.array
+    recent_force: wp.array
     flag: wp.array
     elements: list[ElementState]
     contacts: list[ContactState]

@@ -1,0 +1,152 @@
+"""Owns how a slave node comes back over an edge to the side of a master that it slides on."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.edges import SlaveFaces, is_on_rim, lies_below, opposition
+from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Master, Nearest, nearest_face
+from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
+
+wp.set_module_options({"enable_backward": False})
+
+OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
+_USUAL = 4.0  # depth at which a node may come over an edge, over that at which a spring bears the recent force
+_FADES = 0.99  # share that a recent force keeps from step to step
+_ALONG = 0.7  # least cosine between that force and the normal
+
+
+@wp.struct
+class WayBack:
+    """The side to which a slave node comes over an edge.
+
+    Attributes:
+        spring: of that side, or -1 if there is none.
+        face: below which the node lies there.
+        normal: of that face.
+        begins: compression with which the spring may begin [m].
+    """
+
+    spring: wp.int32
+    face: wp.int32
+    normal: wp.vec3d
+    begins: wp.float64
+
+
+@wp.func
+def recent(before: wp.vec3d, force: wp.vec3d) -> wp.vec3d:
+    """The force that a contact pass gives a node now, or what has faded of a greater one before [N].
+
+    Springs of a sliding node tremble, and their depth of a single step may be next to none.
+    """
+    faded = wp.float64(_FADES) * before
+    return wp.where(wp.length_sq(force) > wp.length_sq(faded), force, faded)
+
+
+@wp.func
+def along_normal(force: wp.vec3d, normal: wp.vec3d) -> wp.float64:
+    """Component of a force along a unit normal [N]; 0 where it points elsewhere."""
+    component = wp.dot(force, normal)
+    return wp.where(component > wp.float64(_ALONG) * wp.length(force), component, wp.float64(0.0))
+
+
+@wp.func
+def usual_depth(
+    master: Master,
+    slave_faces: SlaveFaces,
+    s: int,
+    face: int,
+    normal: wp.vec3d,
+    recent_force: wp.array(dtype=wp.vec3d),
+) -> wp.float64:
+    """Depth at which the spring of slave node s bears its recent contact force, or that on a corner of the face [m].
+
+    That of the node may come from another master, flush with this one. The corners know of a slave that is pressed by
+    other nodes, where this one has not been touched before.
+    """
+    force = along_normal(recent_force[slave_faces.node[s]], normal)
+    for c in range(4):
+        force = wp.max(force, along_normal(-recent_force[master.face[face, c]], normal))
+    return force / wp.min(slave_faces.stiffness[s], master.stiffness[face])
+
+
+@wp.func
+def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
+    """Whether a node this far from a face, on either side, may slide on it, if `usual_depth` is usual."""
+    return wp.abs(depth) <= wp.float64(_USUAL) * usual + wp.float64(SLACK) * edge
+
+
+@wp.func
+def way_ends(near: Nearest, elsewhere: bool) -> bool:
+    """Whether a node that a side does not press is no more on its way over the edge: it is in front of the side, or
+    below it without being pressed, or another side presses it `elsewhere`."""
+    return elsewhere or near.front < wp.float64(FAR) or (near.face >= 0 and not near.beside)
+
+
+@wp.func
+def note_way(e: int, presses: bool, ends: bool, spring: Spring):
+    """Keep how deep a side pressed the node last, until its way over the edge ends."""
+    if presses:
+        spring.left[e] = spring.held[e] - spring.rest[e]
+    elif ends:
+        spring.left[e] = wp.float64(0.0)
+
+
+@cache
+def way_back_function(sides: int) -> Any:
+    """The function that finds the side to which a slave node comes over an edge."""
+
+    @wp.func
+    def way_back(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slave_faces: SlaveFaces,
+        s: int,
+        begin: int,
+        e: int,
+        near: Nearest,
+        along: wp.vec3f,
+        spring: Spring,
+        recent_force: wp.array(dtype=wp.vec3d),
+    ) -> WayBack:
+        """The side across an edge of the nearest face of spring e, which slave node s has run into.
+
+        A node that slid off a side lies below that side as it comes back: by the depth of its spring, and by what the
+        slave sagged meanwhile. So does one that slides from another master, flush with this one. The face across the
+        edge is the one that it then runs into, though it slides on the side. It belongs to that side if faces of the
+        slave oppose the side, and it lies no deeper below it than usual; or than a node in front of it counts as above
+        it, where it slid off that side or where no face of the slave opposes the face that it runs into.
+        """
+        i = slave_faces.node[s]
+        way = WayBack()
+        way.spring = -1
+        shallowest = wp.float64(FAR)
+        edge = wp.float64(2.0) * wp.sqrt(near.area)
+        for q in range(begin, begin + wp.static(sides)):
+            if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
+                home = nearest_face(X, u, master, q, X[i] + u[i], along)
+                if home.face >= 0 and not home.beside:
+                    if lies_below(X, u, master.face, near.face, home.face, home.normal):
+                        usual = usual_depth(master, slave_faces, s, home.face, home.normal, recent_force)
+                        left = spring.left[q]
+                        mine = opposition(X, u, slave_faces, s, near.normal)
+                        slid = left > wp.float64(0.0)
+                        limit = wp.float64(0.0)
+                        if mine >= wp.float64(OPPOSES):
+                            if slid:
+                                limit = wp.float64(ABOVE) * edge
+                        elif slid or not is_on_rim(slave_faces, s):
+                            limit = wp.float64(0.5) * edge
+                        its = opposition(X, u, slave_faces, s, home.normal)
+                        within = -home.gap <= limit or slides_at(home.gap, usual, edge)
+                        if its >= wp.float64(OPPOSES) and within and -home.gap < shallowest:
+                            shallowest = -home.gap
+                            way.spring = q
+                            way.face = home.face
+                            way.normal = home.normal
+                            way.begins = left
+        return way
+
+    return way_back
