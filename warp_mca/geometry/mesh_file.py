@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import textwrap
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -92,7 +93,7 @@ class MeshFile:
             if len(block) and (block.min() < 0 or block.max() >= len(points)):
                 raise self._bad(f"its elements use nodes beyond its {len(points)} points; repair the mesh")
         node_sets, cell_sets = _sets(read, self._physical_names())
-        arrays = {
+        arrays: dict[str, Any] = {
             kept.field: np.concatenate(
                 [stored(points, cells[name], name) for name, cell in CELL_TYPES.items() if cell.stored_as == kept.name]
             )
@@ -100,8 +101,7 @@ class MeshFile:
         }
         for note in notes:
             logging.getLogger("warp_mca").warning("%s", note)
-        mesh = Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes))
-        mesh = compact(replace(mesh, **arrays))
+        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
         return with_selections(mesh, self.select)
 
     def _read(self) -> tuple[meshio.Mesh, list[str]]:
