@@ -11,7 +11,8 @@ import pytest
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.runs.sweep_columns import FIGURES, OTHERS, RESERVED, parameter_column
-from warp_mca.runs.sweep_table import CSV, SweepTable, read_rows
+from warp_mca.runs.sweep_lines import read_lines
+from warp_mca.runs.sweep_table import CSV, SweepTable
 
 OUTPUTS = Path(__file__).parents[1] / "docs" / "outputs.md"
 
@@ -41,7 +42,7 @@ def test_parameters_named_as_figures_have_columns_of_their_own(tmp_path: Path, s
     assert {key: rows[1][key] for key in expected} == expected
     assert rows[0]["energy.kinetic"] == summary["energy"]["kinetic"]  # type: ignore[index]
     assert "theta" not in rows[0] and "multi_rate" not in rows[0]
-    assert read_rows(tmp_path / "all" / CSV) == rows
+    assert read_lines(tmp_path / "all" / CSV)[0] == rows
     assert mca.sweep(scenes, out=tmp_path / "all", workers=1, threads=1) == rows
 
 
@@ -78,6 +79,6 @@ def test_the_command_line_sweeps_such_a_parameter(tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     words = ["--set", "duration=2e-5", "--set", "output_interval=1e-6", "--workers", "1", "--threads", "1"]
     assert main(["sweep", "single_link", "--grid", "theta=85,90", *words, "--out", "all"]) == 0
-    rows = read_rows(tmp_path / "all" / CSV)
+    rows = read_lines(tmp_path / "all" / CSV)[0]
     assert [row["parameter.theta"] for row in rows] == [85.0, 90.0]
     assert json.loads((tmp_path / "all/sweep.json").read_text(encoding="utf-8"))["grid"] == {"theta": [85.0, 90.0]}

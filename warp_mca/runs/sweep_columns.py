@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-OWN = ("index", "status", "reason", "warnings", "wall")
+OWN = ("index", "status", "reason", "warnings", "wall", "checksum")
 # Entries of summary.json that are a single value, and so a column of their own. A new one is listed here.
 FIGURES = (
     "F_n_first_peak F_n_max F_t_max F_t_min F_t_reverses batch configuration_error contact_duration "
