@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 PRESSED = 2.0  # times the depth of a contact's springs, up to which skins cross by the contact's own doing
 MEANT = 1.25  # times the overlap at the start, up to which it is meant
-FEWEST = 16  # looks in an impact phase at least
+FEWEST = 6  # looks in an impact phase at least
 CLOSEST = 4  # steps between two looks at least: in so few nothing passes two cells below half of the wave speed
 FASTER = 1.5  # times the greatest speed so far that nodes may reach until the next look
 

@@ -116,7 +116,7 @@ class Skin:
     @property
     def box(self) -> Array:
         """Least and greatest coordinates [m], shape (2, 3), float64."""
-        columns = self.x.T  # numpy's extremes along the longer axis take many times as long
+        columns = self.x.T  # as in `near`
         return np.array([[f(column) for column in columns] for f in (np.min, np.max)])
 
     def bent(self) -> float:
@@ -162,8 +162,13 @@ class Skin:
 
     def near(self, box: Array) -> Index:
         """Edges that may reach into a box, int32."""
-        near = ((self.x > box[0] - self.longest) & (self.x < box[1] + self.longest)).all(axis=1)
-        return np.flatnonzero(near[self.edge].any(axis=1)).astype(np.int32)
+        lower, upper = box[0] - self.longest, box[1] + self.longest
+        near = np.ones(len(self.x), dtype=bool)
+        for axis, column in enumerate(self.x.T):  # numpy takes many times as long along the other axis
+            near &= (column > lower[axis]) & (column < upper[axis])
+        if not near.any():
+            return np.zeros(0, dtype=np.int32)
+        return np.flatnonzero(near[self.edge[:, 0]] | near[self.edge[:, 1]]).astype(np.int32)
 
     def samples(self, chosen: Index) -> Array:
         """Ends and middles of chosen edges, moved into the body [m], shape (sample_count, 3), float64."""
