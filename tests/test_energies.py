@@ -91,4 +91,4 @@ def test_rounding_of_bodies_that_turn_on_joints_is_no_exchange(omega: float, joi
     )
     result = mca.run(scene)
     assert result.summary["energy_error_exchanged"] > 0.5 and result.summary["energy_error"] < 1e-5
-    assert result.warnings == ()
+    assert not any("exchanged" in warning for warning in result.warnings)

@@ -99,7 +99,9 @@ def test_a_cube_that_gains_energy_at_its_flat_end_runs_on_and_says_so():
 def test_a_strict_tolerance_or_a_given_penalty_has_no_allowance(tolerance: float, penalty: float | None):
     """Springs of a penalty that was asked for can be made softer."""
     scene = cube(tolerance=tolerance, penalty=penalty)
-    with pytest.raises(mca.GuardError, match=f"exceeds energy_tolerance = {tolerance}, of which contact springs made"):
+    with pytest.raises(
+        mca.GuardError, match=f"exceeds energy_tolerance = {tolerance} of .*, of which contact springs made"
+    ):
         mca.run(scene)
 
 

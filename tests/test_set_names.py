@@ -23,7 +23,10 @@ WELD = {"name": "W", "body": "a", "other": "b"}
     ("change", "said"),
     [
         ({"fixed": (mca.Fixed(body="b", nodes="tip"),)}, "Fixed.nodes of body b, node set = 'tip': the mesh has edge,"),
-        ({"fixed": (mca.Fixed(body="b", nodes="none"),)}, "Fixed.nodes of body b, node set = 'none': it is empty"),
+        (
+            {"fixed": (mca.Fixed(body="b", nodes="none"),)},
+            "Fixed.nodes of body b, node set = 'none': no cell has a node of it",
+        ),
         (
             {"prescribed": (mca.Prescribed(body="b", nodes="tip", axis="x", times=(0.0,), velocities=(0.0,)),)},
             "Prescribed.nodes of body b, node set = 'tip'",

@@ -87,7 +87,8 @@ def test_a_round_bush_turns_with_the_ring_around_it(fine: int, coarse: int, gap:
     assert 0.5 * rise < result.summary["ties"][0]["gap"] <= rise * (1.0 + 1e-9)
     whirling = SOFT.rho * (300.0 * 0.02) ** 2 / SOFT.E  # strain, at most
     assert result.summary["energy"]["elastic"] < whirling * result.summary["energy"]["initial"]
-    assert result.summary["energy_error"] < 1e-6 and result.warnings == ()
+    assert result.summary["energy_error"] < 1e-6
+    assert all("moment of inertia" in warning for warning in result.warnings)
 
 
 @pytest.mark.parametrize("gap", [1e-7, -2e-5])

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ def main() -> None:
     from benchmarks.stability.table import AXES, merged, tasks
 
     setattr(wp.config, "quiet", True)  # noqa: B010
+    logging.getLogger("warp_mca").setLevel(logging.ERROR)  # warnings are in the result as well
     parser = argparse.ArgumentParser(prog="python -m benchmarks.stability", description=DESCRIPTION)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--level", default="full", choices=("quick", "full", "long"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -19,7 +18,6 @@ Cell = dict[str, Any]
 
 def cell(name: str, value: Value, element: str, precision: str, device: str) -> Cell:
     """Run one cell, as it is stored."""
-    logging.getLogger("warp_mca").setLevel(logging.ERROR)  # warnings are in the result as well
     found: Cell = {"axis": name, "value": value, "element": element, "precision": precision, "device": device}
     begun = time.perf_counter()
     try:

@@ -49,9 +49,7 @@ Array = NDArray[np.float64]
 # below the usual one, or a penalty that the scene gives and can lower, they have no such allowance.
 MOST_MADE, USUAL = 10.0, 0.01
 MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not counted
-# The same where no contact closed. What turns on joints in `mixed` gains 5e-6 of its energy by rounding in 6 ms, which
-# looks like an exchange of as much with an imbalance of 100 %.
-MIN_FREE_EXCHANGE = 1e-4
+MIN_FREE_EXCHANGE = 1e-4  # the same without contact: what turns on joints in `mixed` gains 5e-6 by rounding in 6 ms
 SLIDING = 0.1  # share of the external work that friction takes, from which on a stop says that nodes slide
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 

@@ -122,9 +122,6 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
         return _source(_imported(Path(name)), Path(name).stem, builtin=False)
     names = scene_names()
     if name not in names:
-        if isinstance(name, str) and (Path(name).suffix or os.path.exists(name)):  # noqa: PTH110, a name may be too long
-            remedy = "give a Python file (.py), a model file (.mca) or a name that warp-mca scenes lists"
-            raise bad_value("scene", name, f"{remedy}; a part needs the suffix of its format, as .step or .inp")
         known = _known(name, names, "none")
         if isinstance(name, str) and Path(name).suffix and (Path(name).exists() or "did you mean" not in known):
             others = "model files (.mca), parts (.step, .iges, .brep, .stl) and meshes (.msh, .inp, .k, .vtu, …)"

@@ -149,17 +149,7 @@ class ContactStage:
         count, found = int(self.springs[-1]), spring.Spring()
         for name in ("tangential", "force", "impulse"):
             setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
-        for name in (
-            "energy",
-            "friction",
-            "drive",
-            "normal_impulse",
-            "stick_impulse",
-            "depth",
-            "lost",
-            "made",
-            "stiffness",
-        ):
+        for name in "energy friction drive normal_impulse stick_impulse depth lost made stiffness".split():
             setattr(found, name, wp.zeros(count, dtype=wp.float64))
         found.normal_energy = wp.zeros(0 if self.law == LINEAR else count, dtype=wp.float64)
         found.parameters = self.parameters

@@ -106,9 +106,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "one_density": Mutation(
         "every part of a body takes the density of its first material",
-        "warp_mca/model/assembly.py",
-        "rho = np.array([m.rho for m in self.materials])[self.material]",
-        "rho = np.array([self.materials[0].rho for m in self.materials])[self.material]",
+        "warp_mca/model/cells.py",
+        "rho[cells] = material.rho",
+        "rho[cells] = body_materials(body, mesh)[0][0].rho",
     ),
     "back_stress_high": Mutation(
         "the back stress is 0.68 (1 - beta) H eps_p in place of two thirds of (1 - beta) H eps_p",
