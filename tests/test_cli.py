@@ -84,7 +84,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 2) -> 
     [
         (["two_lnk"], ["'two_lnk'", "two_link"]),
         (["nowhere.py"], ["'nowhere.py'", "no such file"]),
-        (["notes.txt"], ["'notes.txt'", "give a Python file (.py)", "the suffix of its format"]),
+        (["notes.txt"], ["'notes.txt'", "a Python file (.py)", "parts (.step,"]),
         (["."], ["'.'", "give a Python file (.py)"]),
         ([300 * "a"], ["the scenes are"]),
         (["nowhere.mca"], ["'nowhere.mca'", "no such file"]),
