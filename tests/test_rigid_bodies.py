@@ -161,7 +161,7 @@ def test_a_weld_of_a_rigid_and_an_elastic_body_is_one_body():
 
 
 def ball(rigid: str, **contact: object) -> mca.Scene:
-    """A ball strikes a free plate aslant."""
+    """A ball of few cells, with their mass, strikes a free plate aslant."""
     sphere = mca.Sphere(radius=0.02, section=2, ring=1, pole_size=2e-3, pole_layers=2)
     plate = mca.Box(size=(0.03, 0.01, 0.03), divisions=(8, 3, 8), origin=(-0.015, -0.01, -0.015))
     half_turn = (0.0, 0.0, -0.5 * np.pi)
@@ -169,7 +169,7 @@ def ball(rigid: str, **contact: object) -> mca.Scene:
         mca.Body(name="ball", geometry=sphere, material=SOFT, position=(0.0, 0.02, 0.0), rotation=half_turn),
         mca.Body(name="plate", geometry=plate, material=SOFT),
     )
-    bodies = (replace(bodies[0], velocity=(3.0, -10.0, 1.0)), bodies[1])
+    bodies = (replace(bodies[0], velocity=(3.0, -10.0, 1.0), exact_mass=False), bodies[1])
     bodies = tuple(replace(body, rigid=body.name in rigid) for body in bodies)
     surfaces = {"slave": mca.Surface(body="ball", nodes="pole"), "master": mca.Surface(body="plate", nodes="ymax")}
     return mca.Scene(
@@ -188,7 +188,7 @@ OTHER_WAY = {"slave": mca.Surface(body="plate", nodes="ymax"), "master": mca.Sur
 def test_contact_of_rigid_bodies_keeps_momentum_and_energy(rigid: str, contact: dict[str, object]):
     impact = keeps_momentum(ball(rigid, **contact), axes=range(3))
     summary = result_of(impact).summary
-    assert summary["F_n_max"] > 1e3 and summary["energy_error"] < 3e-3
+    assert summary["F_n_max"] > 1e3 and summary["energy_error"] < 2e-3
     assert not summary["contact_open_at_end"] or summary["contacts"]
 
 
