@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 import warp as wp
 
-from warp_mca.kernels.contact import contact, sides
+from warp_mca.kernels.contact import contact, edge_shares, sides
 from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import absorbing, constraint, floating, node, rated_node
@@ -29,6 +29,7 @@ VARIANTS = {
     "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
     "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
+    "carry": [edge_shares.carry_kernel(3)],
     "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
     "tet4_dilatation": [tet4.dilatation_kernel(p, m) for p, m in TWO],
     "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],

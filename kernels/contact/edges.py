@@ -15,6 +15,7 @@ class SlaveFaces:
         face: nodes, shape (face_count, 4), int32; a triangle has its last node twice.
         offset: first entry of each slave node in face_of_slave, shape (slave_count + 1,), int32.
         face_of_slave: faces around the slave nodes, one after the other, int32.
+        number: of each node of the model among the slave nodes, shape (node_count,), int32.
     """
 
     node: wp.array(dtype=wp.int32)
@@ -22,6 +23,7 @@ class SlaveFaces:
     face: wp.array2d(dtype=wp.int32)
     offset: wp.array(dtype=wp.int32)
     face_of_slave: wp.array(dtype=wp.int32)
+    number: wp.array(dtype=wp.int32)
 
 
 @wp.func

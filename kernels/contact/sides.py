@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.contact import BLOCK_DIM
+from warp_mca.kernels.contact.edge_rest import release_function
 from warp_mca.kernels.contact.edges import SlaveFaces
 from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.nearest import Master, nearest_face
@@ -39,10 +40,11 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
     it may be as deep as in the side that released it, for it may have slid over an edge. Where several sides have
     candidates, step 0 chooses among them; step 1 presses the node.
     """
-    settle, let_go = settle_functions(friction, True, law)
+    settle, _ = settle_functions(friction, True, law)
     choose, confirm = choice_functions(sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)
+    release = release_function(friction, sides, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
@@ -68,14 +70,12 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
         wait_for_previous()
         let_next_begin()
         s = first + wp.tid()
-        i = slaves.node[s]
-        k = of(scene, s)
+        i, k = slaves.node[s], of(scene, s)
         x = X[i] + u[i]
         node = springs_of_node(s, master.count, spring)
         along = wp.vec3f(node.pressed)
         fronts, front_face, front = front_faces(X, u, master, node, x, along)
-        choice = first_choice(node)
-        total, scale = wp.vec3d(), of(per_newton, k)
+        choice, total, scale = first_choice(node), wp.vec3d(), of(per_newton, k)
         for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
             for e in range(node.begin, node.begin + wp.static(sides)):
                 near = nearest_face(X, u, master, e, x, along)
@@ -99,8 +99,10 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
                         total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
                         note_way(e, touch.touches, ends, spring)
                 elif step == 1:
-                    let_go(e, i, v, master.face, dt, front, held, spring)
-                    note_way(e, bool(False), ends, spring)
+                    total += release(
+                        X, u, v, master, slaves, s, e, k, near, node, choice.newcomer, ends, fronts, front_face, along,
+                        of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
+                    )  # fmt: skip
         if node.active:
             contact_force_out[i] = contact_force_out[i] + total
             recent_out[i] = recent(recent_out[i], total)

@@ -48,7 +48,9 @@ class Spring:
     laws that are not linear. parameters: of the contact law [SI units], shape (spring_count, parameter_count). made:
     energy that it made so far as it closed or opened within a step, see `switch` [J]. left: compression with which the
     side pressed the node last, until it is in front of that side, below it without being pressed, or pressed by another
-    [m]; only of masters with several sides.
+    [m]. support, share: the slave's edge that the spring presses in place of its node, or -1, and the node's share of
+    the force [-]; see `edge_rest`. bears: 1 where the side was the last to press the node itself, else 0 [-]. These
+    four are only of masters with several sides.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -70,6 +72,9 @@ class Spring:
     parameters: wp.array2d(dtype=wp.float64)
     made: wp.array(dtype=wp.float64)
     left: wp.array(dtype=wp.float64)
+    support: wp.array(dtype=wp.int32)
+    share: wp.array(dtype=wp.float64)
+    bears: wp.array(dtype=wp.int32)
 
 
 @wp.func

@@ -86,7 +86,8 @@ def way_ends(near: Nearest, elsewhere: bool) -> bool:
 
 @wp.func
 def note_way(e: int, presses: bool, ends: bool, spring: Spring):
-    """Keep how deep a side pressed the node last, until its way over the edge ends."""
+    """Keep how deep a side pressed the node last, until its way over the edge ends; no slave edge rests there."""
+    spring.support[e] = -1
     if presses:
         spring.left[e] = spring.held[e] - spring.rest[e]
     elif ends:

@@ -11,11 +11,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels.contact import contact, edges, nearest, search, sides, spring
-from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.kernels.contact import contact, nearest, search, sides
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.model.layout import offsets
 from warp_mca.model.surfaces import LIST_LENGTH, ContactPass
+from warp_mca.solve.slave_edges import SlaveEdges, new_springs
 from warp_mca.solve.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:
@@ -136,29 +136,13 @@ class ContactStage:
         lists, faces = (int(self.springs[-1]), len(self.face)) if surface else (0, 0)
         room = max(item.room for item in self.items)
         return ContactState(
-            spring=self._new_springs(),
+            spring=new_springs(self),
             count=wp.zeros(lists, dtype=wp.int32),
             candidate=wp.zeros((lists, LIST_LENGTH), dtype=wp.int32),
             face_count=wp.zeros(faces, dtype=wp.int32),
             face_slave=wp.zeros((faces, room), dtype=wp.int32),
             u_search=wp.zeros(self.node_count if surface else 0, dtype=wp.vec3d),
         )
-
-    def _new_springs(self) -> Any:
-        """Where some springs begin free of stress, their resting depth is 0."""
-        count, found = int(self.springs[-1]), spring.Spring()
-        for name in ("tangential", "force", "impulse"):
-            setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
-        for name in "energy friction drive normal_impulse stick_impulse depth lost made stiffness".split():
-            setattr(found, name, wp.zeros(count, dtype=wp.float64))
-        found.normal_energy = wp.zeros(0 if self.law == LINEAR else count, dtype=wp.float64)
-        found.parameters = self.parameters
-        found.rest = wp.zeros(count if self.stress_free or self.sides > 1 else 0, dtype=wp.float64)
-        found.left = wp.zeros(count if self.sides > 1 else 0, dtype=wp.float64)
-        found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
-        found.face = wp.full(count, -1, dtype=wp.int32)
-        found.weight = wp.zeros(count, dtype=wp.vec4d)
-        return found
 
     def _make_planes(self) -> None:
         planes = [item.plane for item in self.items if item.plane is not None]
@@ -179,12 +163,10 @@ class ContactStage:
         self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
+        self.edges = None
         if self.sides > 1:
-            self.slave_faces = edges.SlaveFaces()
-            self.slave_faces.node, self.slave_faces.stiffness = self.slave, self.stiffness
-            self.slave_faces.face = wp.array(self._join("slave_face"), dtype=wp.int32)
             rows = self._rows("slave_face", "slave_offset", "face_of_slave")
-            self.slave_faces.offset, self.slave_faces.face_of_slave = rows
+            self.edges = SlaveEdges(self, self._join("slave_face"), rows)
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.bvh: Any = None
@@ -206,11 +188,15 @@ class ContactStage:
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [self.kernel] if self.on_plane else [self.kernel, self.react]
+        if self.on_plane:
+            return [self.kernel]
+        return [self.kernel, self.react, *([self.edges.carry] if self.edges else [])]
 
     def search_kernels(self) -> list[Any]:
         """Those of a search."""
-        return [] if self.on_plane else [self.bounds, self.find, self.clear]
+        if self.on_plane:
+            return []
+        return [self.bounds, self.find, self.clear, *([self.edges.find] if self.edges else [])]
 
     def begin(self, work: Workspace, state: State) -> None:
         """Note which slaves are clear of the master before the first step, after the first search."""
@@ -247,6 +233,8 @@ class ContactStage:
             inputs=[self.bvh.id, *slaves, self.side, self.slave_scene, self.origin],
             outputs=[own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag],
         )
+        if self.edges:
+            self.edges.list_faces(self, work, state, u)
         wp.launch(search.sort_lists, len(self.face), inputs=[own.face_count], outputs=[own.face_slave])
         wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[own.u_search])
 
@@ -269,14 +257,16 @@ class ContactStage:
             inputs += [self.per_newton, dt, own.spring]
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
-        if self.sides > 1:
-            slaves = [self.slave_faces]
+        if self.edges:
+            slaves = [self.edges.faces]
         inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [own.face_count, own.face_slave, self.master_scene, self.margin, own.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
+        if self.edges:
+            self.edges.launch(work, own, split)
 
     def faces_of(self, own: ContactState) -> Any:
         """The master's faces with what the latest search listed."""

@@ -1,0 +1,242 @@
+"""Owns the edges of a slave's faces that rest on the edge of a master, where their outer node slid off a side.
+
+Between two rows of slave nodes, nothing else bears the slave there, and it would tip as its outer row slides off. The
+spring of the outer node then presses the point where the slave's edge crosses that of the master; both its nodes take
+their share, which are their shape functions at that point.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.edge_shares import slid_off
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, middle, neighbour
+from warp_mca.kernels.contact.nearest import ABOVE, Master, Nearest, nearest_face, reachable
+from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
+from warp_mca.kernels.contact.side_choice import NodeSprings, pressure_function
+from warp_mca.kernels.contact.spring import FAR, Spring
+from warp_mca.kernels.contact.way_back import note_way, slides_at, usual_depth
+
+wp.set_module_options({"enable_backward": False})
+
+
+_FLAT = 0.9  # least cosine between the reversed normal of a face that rests and that of the side
+_SLOW = 5e-5  # of an edge, by which a crossing that begins to rest moves into the side in a step at most
+_SLIDES = 0.01  # of an edge, by which it moves in all
+
+
+@wp.struct
+class Support:
+    """Where an edge of a slave's face rests on a master.
+
+    Attributes:
+        edge: 2 f for the edge from a node to the next one of face f of the slave, 2 f + 1 to the one before; or -1.
+        inner: the node at its other end, which still lies above the side.
+        share: shape function of the outer node at the crossing.
+        near: the face of the master that the crossing has penetrated; its normal is across both edges.
+    """
+
+    edge: wp.int32
+    inner: wp.int32
+    share: wp.float64
+    near: Nearest
+
+
+@wp.func
+def no_support() -> Support:
+    """No edge rests."""
+    support = Support()
+    support.edge = -1
+    support.share = wp.float64(1.0)
+    return support
+
+
+@wp.func
+def lies_on(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    master: Master,
+    e: int,
+    x: wp.vec3d,
+    own: wp.vec3d,
+    along: wp.vec3f,
+) -> bool:
+    """Whether the node of spring e, at x, lies on a face of its side, or just in front of one, that `own` opposes."""
+    near = nearest_face(X, u, master, e, x, along)
+    f = wp.max(near.face, near.front_face)
+    found = bool(False)
+    if f >= 0:
+        across = area_vector(X, u, master.face, f)
+        edge = wp.sqrt(wp.float64(0.5) * wp.length(across))
+        found = wp.where(near.face >= 0, wp.abs(near.gap), near.front) < wp.float64(ABOVE) * edge
+        found = found and -wp.dot(wp.normalize(own), wp.normalize(across)) > wp.float64(_FLAT)
+    return found
+
+
+@wp.func
+def meet_edge(
+    v: wp.array(dtype=wp.vec3d),
+    master: Master,
+    slaves: SlaveFaces,
+    s: int,
+    e: int,
+    support: Support,
+    dt: wp.float64,
+    along: wp.vec3f,
+    spring: Spring,
+    recent_force: wp.array(dtype=wp.vec3d),
+) -> Touch:
+    """How the crossing meets the side of spring e.
+
+    It is not caught in an impact, but begins to rest where it has come into the side slowly, by no more than nodes that
+    slide there; it is free of force then, and is pressed as the slave tips.
+    """
+    i = slaves.node[s]
+    near = support.near
+    touch = meet(v, master.face, i, near, dt, spring.held[e], along)
+    touch.du += dt * (wp.float64(1.0) - support.share) * (v[support.inner] - v[i])
+    touch.own = slaves.stiffness[s]
+    touch.limit = master.stiffness[near.face]
+    touch.begins = wp.float64(0.0)
+    edge = wp.float64(2.0) * wp.sqrt(near.area)
+    approach = wp.dot(touch.du, near.normal)
+    if spring.support[e] >= 0:
+        touch.touches = reachable(-near.gap, touch.held, wp.float64(FAR), approach, edge)
+    elif touch.held == wp.float64(0.0):
+        usual = usual_depth(master, slaves, s, near.face, near.normal, recent_force)
+        slow = wp.abs(approach) <= wp.float64(_SLOW) * edge and wp.length(touch.du) < wp.float64(_SLIDES) * edge
+        touch.touches = slow and slides_at(near.gap, usual, edge)
+    return touch
+
+
+@cache
+def support_function(sides: int) -> Any:
+    """The function that finds the edge of the slave which rests on the side of spring e."""
+    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
+
+    @wp.func
+    def face_across(e: int, begin: int, front_gap: Gaps, front_face: Faces, spring: Spring) -> int:
+        """The nearest face of another side that has the node in front of it, or -1; no other side presses the node."""
+        found = int(-1)
+        least = wp.float64(FAR)
+        for p in range(wp.static(sides)):
+            if begin + p != e:
+                if front_gap[p] < least:
+                    least = front_gap[p]
+                    found = front_face[p]
+        for p in range(wp.static(sides)):
+            if begin + p != e and spring.face[begin + p] >= 0:
+                found = int(-1)
+        return found
+
+    @wp.func
+    def find_support(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slaves: SlaveFaces,
+        s: int,
+        e: int,
+        node: NodeSprings,
+        front_gap: Gaps,
+        front_face: Faces,
+        along: wp.vec3f,
+        spring: Spring,
+    ) -> Support:
+        """An edge from the node to a neighbour that the side presses crosses the plane of the face across the edge.
+
+        The normal is across both edges, so that the crossing may move along them without work.
+        """
+        support = no_support()
+        f = int(-1)
+        if slid_off(e, spring):
+            f = face_across(e, node.begin, front_gap, front_face, spring)
+        if f >= 0:
+            i = slaves.node[s]
+            x = X[i] + u[i]
+            across = wp.normalize(area_vector(X, u, master.face, f))
+            at_edge = middle(X, u, master.face, f)
+            outside = wp.max(wp.dot(x - at_edge, across), wp.float64(0.0))
+            most = wp.float64(0.0)
+            for j in range(slaves.offset[s], slaves.offset[s + 1]):
+                g = slaves.face_of_slave[j]
+                own = area_vector(X, u, slaves.face, g)
+                for back in range(2):
+                    other = neighbour(slaves.face, g, i, 1 + 2 * back)
+                    inside = wp.dot(at_edge - X[other] - u[other], across)
+                    e_other = wp.static(sides) * slaves.number[other] + e - node.begin
+                    if inside > wp.float64(0.0) and spring.bears[e_other] == 1:
+                        share = inside / (inside + outside)
+                        if share > most and lies_on(X, u, master, e_other, X[other] + u[other], own, along):
+                            most = share
+                            support.edge = 2 * g + back
+                            support.inner = other
+            if support.edge >= 0:
+                start = X[support.inner] + u[support.inner]
+                support.share = most
+                support.near = nearest_face(X, u, master, e, start + most * (x - start), along)
+                own = area_vector(X, u, slaves.face, support.edge // 2)
+                if support.near.face < 0 or wp.dot(own, support.near.normal) >= wp.float64(0.0):
+                    support.edge = -1
+                else:
+                    normal = wp.normalize(wp.cross(x - start, wp.cross(support.near.normal, across)))
+                    cosine = wp.dot(normal, support.near.normal)
+                    support.near.normal = wp.sign(cosine) * normal
+                    support.near.gap = wp.abs(cosine) * support.near.gap
+        return support
+
+    return find_support
+
+
+@cache
+def release_function(friction: bool, sides: int, law: str) -> Any:
+    """The function that releases a node from a side that has no face below it, unless an edge of the slave rests there.
+
+    It gives the force on the node [N]. `newcomer` is the spring that begins to press the node in this step, or -1.
+    """
+    settle, let_go = settle_functions(friction, True, law)
+    pressure, find_support = pressure_function(friction), support_function(sides)
+    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
+
+    @wp.func
+    def release(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        master: Master,
+        slaves: SlaveFaces,
+        s: int,
+        e: int,
+        scene: int,
+        near: Nearest,
+        node: NodeSprings,
+        newcomer: int,
+        ends: bool,
+        front_gap: Gaps,
+        front_face: Faces,
+        along: wp.vec3f,
+        mu: wp.float64,
+        per_newton: wp.float64,
+        dt: wp.float64,
+        spring: Spring,
+        normal_force_out: wp.array(dtype=wp.int64),
+        recent_force: wp.array(dtype=wp.vec3d),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ) -> wp.vec3d:
+        support = no_support()
+        if node.listed > 1 and (newcomer < 0 or newcomer == e):
+            support = find_support(X, u, master, slaves, s, e, node, front_gap, front_face, along, spring)
+        if support.edge < 0:
+            let_go(e, slaves.node[s], v, master.face, dt, near.front, spring.held[e], spring)
+            note_way(e, bool(False), ends, spring)
+            return wp.vec3d()
+        touch = meet_edge(v, master, slaves, s, e, support, dt, wp.vec3f(pressure(e, spring)), spring, recent_force)
+        force = settle(e, scene, support.near, touch, mu, per_newton, spring, normal_force_out, flag_out)
+        note_way(e, touch.touches, ends, spring)
+        if touch.touches:
+            spring.support[e] = support.edge
+        spring.share[e] = support.share
+        return support.share * force
+
+    return release

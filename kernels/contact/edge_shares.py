@@ -1,0 +1,111 @@
+"""Owns what the inner nodes of resting edges take, and the search for faces that such edges rest on."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.contact.edges import SlaveFaces, neighbour
+from warp_mca.kernels.contact.search import OVERFLOW
+from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
+from warp_mca.kernels.hardware.per_scene import kind, value_function
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def slid_off(e: int, spring: Spring) -> bool:
+    """Whether the node of spring e slid off its side, and has not come back."""
+    return spring.bears[e] == 1 and (spring.face[e] < 0 or spring.support[e] >= 0)
+
+
+@cache
+def carry_kernel(sides: int) -> Any:
+    """Kernel: each slave node takes its share of what presses the edges to nodes that slid off, in a fixed order."""
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def carry(
+        first: int,
+        slaves: SlaveFaces,
+        spring: Spring,
+        contact_force_out: wp.array(dtype=wp.vec3d),
+    ):
+        wait_for_previous()
+        let_next_begin()
+        s = first + wp.tid()
+        i = slaves.node[s]
+        total = wp.vec3d()
+        pressed = bool(False)
+        for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
+            pressed = pressed or (spring.face[e] >= 0 and spring.support[e] < 0)
+        if pressed:
+            for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
+                spring.bears[e] = wp.where(spring.face[e] >= 0 and spring.support[e] < 0, 1, 0)
+        for j in range(slaves.offset[s], slaves.offset[s + 1]):
+            g = slaves.face_of_slave[j]
+            for back in range(2):
+                outer = slaves.number[neighbour(slaves.face, g, i, 3 - 2 * back)]
+                for e in range(wp.static(sides) * outer, wp.static(sides) * (outer + 1)):
+                    if spring.support[e] == 2 * g + back:
+                        total += (wp.float64(1.0) - spring.share[e]) * spring.force[e]
+        if wp.length_sq(total) > wp.float64(0.0):
+            contact_force_out[i] = contact_force_out[i] + total
+
+    return begins_early(carry)
+
+
+@cache
+def along_edges_kernel(each: bool, sides: int) -> Any:
+    """Kernel: add to the lists of nodes that slid off a side the faces along the slave's edges from there."""
+    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def list_along_edges(
+        bvh: wp.uint64,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        slaves: SlaveFaces,
+        side: wp.array(dtype=wp.int32),
+        scene: Index,
+        scene_origin: Vector,
+        spring: Spring,
+        count_out: wp.array(dtype=wp.int32),
+        candidate_out: wp.array2d(dtype=wp.int32),
+        face_count_out: wp.array(dtype=wp.int32),
+        face_slave_out: wp.array2d(dtype=wp.int32),
+        flag_out: wp.array2d(dtype=wp.int32),
+    ):
+        s = wp.tid()
+        i = slaves.node[s]
+        k = of(scene, s)
+        root = int(-1)  # of all faces
+        if wp.static(each):
+            root = wp.bvh_get_group_root(bvh, k)
+        slid = bool(False)
+        for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
+            slid = slid or slid_off(e, spring)
+        if slid:
+            x = wp.vec3f(X[i] + u[i] - of(scene_origin, k))
+            for j in range(slaves.offset[s], slaves.offset[s + 1]):
+                for step in range(1, 4, 2):
+                    other = neighbour(slaves.face, slaves.face_of_slave[j], i, step)
+                    end = wp.vec3f(X[other] + u[other] - of(scene_origin, k))
+                    f = int(0)
+                    query = wp.bvh_query_aabb(bvh, wp.min(x, end), wp.max(x, end), root)
+                    while wp.bvh_query_next(query, f):
+                        row = wp.static(sides) * s + side[f]
+                        found = count_out[row]
+                        known = found >= candidate_out.shape[1]  # then it rests on none beyond
+                        for c in range(found):
+                            known = known or candidate_out[row, c] == f
+                        if not known:
+                            candidate_out[row, found] = f
+                            count_out[row] = found + 1
+                            place = wp.atomic_add(face_count_out, f, 1)
+                            if place < face_slave_out.shape[1]:
+                                face_slave_out[f, place] = row
+                            else:
+                                flag_out[k, OVERFLOW] = 1
+
+    return list_along_edges
