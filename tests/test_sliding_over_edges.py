@@ -152,3 +152,37 @@ def test_a_block_that_strikes_a_side_just_below_its_edge_is_thrown_back(below: f
     )
     _, w = velocity(scene)
     assert w[0] < 0.2 * speed
+
+
+@pytest.mark.parametrize(
+    ("gap", "n", "x", "z", "along", "contact"),
+    [
+        (1e-6, 2, 0.006, 0.0, (0.0, 0.0, 4.0), {"two_way": True}),
+        (1e-5, 2, 0.006, 0.0, (0.0, 0.0, 0.4), {"two_way": True}),
+        (1e-6, 3, 0.005, 1e-3, (4.0, 0.0, 0.0), {"two_way": True}),
+        (1e-4, 1, 0.005, -0.005, (0.0, 0.0, 4.0), {"slave": mca.Surface(body="plate", nodes="boundary")}),
+    ],
+    ids=str,
+)
+def test_nodes_in_the_plane_of_a_side_but_beyond_its_edge_are_not_in_contact(
+    gap: float, n: int, x: float, z: float, along: tuple, contact: dict
+):
+    """Faces of the block stand over rows of nodes of the plate, which the sides of the block caught."""
+    R = np.eye(3)
+    block = box("block", (W, W, W), (n, n, n), (x, W + gap, z), R, velocity=along)
+    plate = box("plate", (0.03, W, 0.02), (6, 2, 4) if n > 1 else (3, 1, 2), (0.0, 0.0, 0.0), R)
+    surfaces = {
+        "slave": mca.Surface(body="block", nodes="boundary"),
+        "master": mca.Surface(body="plate", nodes="boundary"),
+    }
+    if "slave" in contact:
+        surfaces["master"] = surfaces["slave"]
+    scene = mca.Scene(
+        name="graze",
+        bodies=(block, plate),
+        contacts=(mca.Contact(**{**surfaces, **contact}),),
+        fixed=(mca.Fixed(body="plate", nodes="ymin"),),
+        impact=mca.ImpactPhase(duration=5e-5, output_interval=1e-6),
+    )
+    result, w = velocity(scene)
+    assert w == pytest.approx(along, abs=1e-9) and result.F_n.max() == 0.0

@@ -55,9 +55,21 @@ def carry_kernel(sides: int) -> Any:
     return begins_early(carry)
 
 
+@wp.func
+def sort_row(row: int, count: wp.array(dtype=wp.int32), candidate_out: wp.array2d(dtype=wp.int32)):
+    """Sort a list of faces: crossings lie on seams of faces, where the first of equally near ones is taken."""
+    for a in range(1, count[row]):
+        value = candidate_out[row, a]
+        b = a - 1
+        while b >= 0 and candidate_out[row, wp.max(b, 0)] > value:
+            candidate_out[row, b + 1] = candidate_out[row, b]
+            b = b - 1
+        candidate_out[row, b + 1] = value
+
+
 @cache
 def along_edges_kernel(each: bool, sides: int) -> Any:
-    """Kernel: add to the lists of nodes that slid off a side the faces along the slave's edges from there."""
+    """Kernel: add to the lists of nodes that slid off a side the faces along the slave's edges, and sort all lists."""
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -107,5 +119,7 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
                                 face_slave_out[f, place] = row
                             else:
                                 flag_out[k, OVERFLOW] = 1
+        for p in range(wp.static(sides)):
+            sort_row(wp.static(sides) * s + p, count_out, candidate_out)
 
     return list_along_edges

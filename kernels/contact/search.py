@@ -5,13 +5,15 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.projection import project_on_face
+from warp_mca.kernels.contact.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 wp.set_module_options({"enable_backward": False})
 
 # Entries of the flag array that the host reads with every batch of records.
 FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
+
+_EQUAL = 1e-6  # relative difference of distances up to which faces share the nearest point
 
 
 @cache
@@ -120,6 +122,32 @@ def candidates_kernel(each: bool, sides: int) -> Any:
     return find_candidates
 
 
+@wp.func
+def distance_to_face(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    x: wp.vec3d,
+    at: wp.vec2d,
+    triangle: bool,
+) -> wp.float64:
+    """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
+    one = wp.float64(1.0)
+    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
+    if triangle:
+        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
+        on = on / wp.max(on[0] + on[1], one)
+    foot = interpolate(
+        weights_at(on, triangle),
+        X[face[f, 0]] + u[face[f, 0]] - x,
+        X[face[f, 1]] + u[face[f, 1]] - x,
+        X[face[f, 2]] + u[face[f, 2]] - x,
+        X[face[f, 3]] + u[face[f, 3]] - x,
+    )
+    return wp.length(foot)
+
+
 @cache
 def clear_kernel(each: bool, sides: int) -> Any:
     """Kernel: set the depth at the start to 0 for slave nodes in front of their nearest face.
@@ -127,6 +155,9 @@ def clear_kernel(each: bool, sides: int) -> Any:
     Where a master has several sides, a node behind its nearest face keeps a depth in the side of that face alone. The
     candidate lists cannot be used: in a body thinner than its faces are long they may hold only the far side. So this
     looks for faces as far away as the boxes of faces are deep.
+
+    Of faces that share the nearest point, an edge, the one counts whose plane is farthest: a node in the plane of a
+    face, but beyond its edge, is on the side of the edge that the other face tells.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
     of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
@@ -158,13 +189,23 @@ def clear_kernel(each: bool, sides: int) -> Any:
         query = wp.bvh_query_aabb(bvh, lower, upper, root)
         f = int(0)
         nearest = wp.float64(wp.inf)
+        plane = wp.float64(-1.0)  # distance to the plane of the nearest face
         clear = bool(False)
         behind = int(0)  # side of the nearest face
         while wp.bvh_query_next(query, f):
-            inside, _at, away, area_normal, _triangle = project_on_face(X, u, face, f, x)
+            inside, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
             gap = wp.dot(away, wp.normalize(area_normal))
-            if inside and (wp.abs(gap) < nearest or (wp.abs(gap) == nearest and gap >= wp.float64(0.0))):
-                nearest = wp.abs(gap)
+            depth = wp.abs(gap)
+            distance = depth
+            closer = depth < nearest or (depth == nearest and gap >= wp.float64(0.0))
+            if wp.static(sides > 1):
+                distance = distance_to_face(X, u, face, f, x, at, triangle)
+                closer = distance < nearest
+                if wp.abs(distance - nearest) <= wp.float64(_EQUAL) * nearest:
+                    closer = depth > plane or (depth == plane and gap >= wp.float64(0.0))
+            if inside and closer:
+                nearest = distance
+                plane = depth
                 clear = gap >= wp.float64(0.0)
                 behind = of_face(side, f)
         for p in range(wp.static(sides)):
