@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from impacts import begun
+from sharp_edges import in_frame
 
 import warp_mca as mca
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
@@ -326,3 +327,13 @@ def test_force_leaves_no_files_of_an_earlier_batch(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"0", "10", "2024", "notes"}
     assert [path.name for path in (tmp_path / "notes").iterdir()] == ["summary.json"]
     assert [path.name for path in (tmp_path / "2024").iterdir()] == ["forces.png"]
+
+
+def test_scenes_whose_masters_have_several_sides_give_the_bits_that_they_give_alone():
+    """Faces of the second scene's slave were looked for among the nodes of the first."""
+    scenes = [in_frame("L", ("every",), velocity) for velocity in ((-2.0, -3.0, 0.5), (-3.0, -2.5, 0.0))]
+    scenes = [replace(scene, impact=replace(scene.impact, duration=1e-4)) for scene in scenes]
+    for scene, together in zip(scenes, mca.run_batch(scenes), strict=True):
+        alone = mca.run(scene)
+        assert all(np.array_equal(together[name], alone[name], equal_nan=True) for name in alone.history)
+        assert alone.F_n.max() > 0.0

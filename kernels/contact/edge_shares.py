@@ -69,7 +69,7 @@ def sort_row(row: int, count: wp.array(dtype=wp.int32), candidate_out: wp.array2
 
 @cache
 def along_edges_kernel(each: bool, sides: int) -> Any:
-    """Kernel: add to the lists of nodes that slid off a side the faces along the slave's edges, and sort all lists."""
+    """Kernel: add the faces along the slave's edges to the lists of nodes that slid off, or may; sort all lists."""
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -95,9 +95,11 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
         if wp.static(each):
             root = wp.bvh_get_group_root(bvh, k)
         slid = bool(False)
+        listed = int(0)
         for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
             slid = slid or slid_off(e, spring)
-        if slid:
+            listed += wp.where(count_out[e] > 0, 1, 0)
+        if slid or listed > 1:  # near an edge, over which it may slide before the next search
             x = wp.vec3f(X[i] + u[i] - of(scene_origin, k))
             for j in range(slaves.offset[s], slaves.offset[s + 1]):
                 for step in range(1, 4, 2):

@@ -58,7 +58,7 @@ def join_models(models: Sequence[Model]) -> Model:
         ),
         ties=join_ties([model.ties.moved(int(start)) for model, start in zip(models, nodes, strict=False)]),
         passes=tuple(
-            replace(item, slave=item.slave + start, face=item.face + start, master=item.master + start)
+            replace(item, **{name: getattr(item, name) + start for name in ("slave", "slave_face", "face", "master")})
             for model, start in zip(models, nodes, strict=False)
             for item in model.passes
         ),
