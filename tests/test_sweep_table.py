@@ -12,6 +12,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.runs.sweep_job import figures
 from warp_mca.runs.sweep_lines import read_lines
+from warp_mca.runs.sweep_plan import Plan, RunOptions
 from warp_mca.runs.sweep_table import SweepTable, check_identity, remove_sweep, write_identity
 
 
@@ -183,3 +184,17 @@ def test_a_table_of_an_unknown_sweep_is_refused(tmp_path: Path):
 def test_figures_are_all_single_values_of_a_summary():
     summary = {"n": 3, "energy": {"kinetic": 1.5, "parts": {"a": None}}, "peaks": [1.0], "device": "cpu\n(x)"}
     assert dict(figures(summary)) == {"n": 3, "energy.kinetic": 1.5, "energy.parts.a": None, "device": "cpu (x)"}
+
+
+@pytest.mark.parametrize("recipe", [mca.MeshFile, lambda path: mca.Cad(path, size=1e-3)], ids=["mesh", "cad"])
+def test_a_file_that_was_changed_is_another_sweep(tmp_path: Path, recipe):
+    """Rows of two meshes stood in one table."""
+    file, metal = tmp_path / "part.stl", mca.Elastic(E=1e9, nu=0.3, rho=1e3)
+    file = file.with_suffix(".msh") if recipe is mca.MeshFile else file
+    file.write_text("one")
+    body = mca.Body(name="b", geometry=recipe(str(file)), material=metal)
+    plan = Plan([mca.Scene(name="s", bodies=(body,), impact=mca.ImpactPhase(duration=1e-6))], [{}], RunOptions())
+    first = plan.identity()
+    assert plan.identity() == first
+    file.write_text("two")
+    assert plan.identity()["scenes"] != first["scenes"]

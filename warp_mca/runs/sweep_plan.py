@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry import Cad, MeshFile
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.scene.materials import Elastic
 
@@ -208,8 +209,22 @@ def _distinct(values: Iterable[object]) -> list[object]:
     return list({(type(value), value): value for value in map(plain, values)}.values())
 
 
+def _content(path: Path) -> bytes:
+    """Digest of a file; empty where there is none, of which a run tells."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").digest()
+    except OSError:
+        return b""
+
+
 def _feed(digest: hashlib._Hash, value: object) -> None:
-    """Add a value to a digest: dataclasses by their fields, arrays by their bytes, others by their attributes."""
+    """Add a value to a digest: dataclasses by their fields, arrays by their bytes, others by their attributes.
+
+    A mesh or CAD file counts by what it holds, too.
+    """
+    if isinstance(value, Cad | MeshFile):
+        digest.update(_content(Path(value.path)))
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         parts: Iterable[object] = (part for f in dataclasses.fields(value) for part in (f.name, getattr(value, f.name)))
     elif isinstance(value, np.ndarray):
