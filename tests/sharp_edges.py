@@ -58,6 +58,14 @@ def in_frame(kind: str, masters: tuple[str, ...], velocity: tuple, **contact) ->
     return mca.Scene(name="frame", bodies=bodies, contacts=contacts, fixed=(held,), impact=impact)
 
 
+def uneven(scene: mca.Scene) -> mca.Scene:
+    """The scene with each node of its first body moved by about 1 nm, so that none lies in the plane of a face."""
+    body, *others = scene.bodies
+    mesh = body.geometry if isinstance(body.geometry, mca.Mesh) else body.geometry.build()
+    moved = mesh.points + 1e-9 * np.random.default_rng(0).standard_normal(mesh.points.shape)
+    return replace(scene, bodies=(replace(body, geometry=replace(mesh, points=moved)), *others))
+
+
 def bars(
     closed: bool, *, cells: int = 4, aside: float = 0.0, along: float = 0.0, width: float = 0.01, **contact
 ) -> mca.Scene:

@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, middle, neighbour
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, lies_below, middle, neighbour
 from warp_mca.kernels.contact.nearest import ABOVE, Master, Nearest, nearest_face, reachable
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
 from warp_mca.kernels.contact.side_choice import NodeSprings, pressure_function
@@ -177,7 +177,10 @@ def support_function(sides: int) -> Any:
                 support.share = most
                 support.near = nearest_face(X, u, master, e, start + most * (x - start), along)
                 own = area_vector(X, u, slaves.face, support.edge // 2)
-                if support.near.face < 0 or wp.dot(own, support.near.normal) >= wp.float64(0.0):
+                rests = support.near.face >= 0 and wp.dot(own, support.near.normal) < wp.float64(0.0)
+                if rests:  # Warp evaluates both sides of `and`
+                    rests = lies_below(X, u, master.face, f, support.near.face, support.near.normal)
+                if not rests:  # a face across a fold stands above the side
                     support.edge = -1
                 else:
                     normal = wp.normalize(wp.cross(x - start, wp.cross(support.near.normal, across)))
