@@ -25,7 +25,7 @@ from benchmarks.rates import measure_host, measure_rates, measure_savings
 from benchmarks.startup import startup
 from benchmarks.timing import QUICK, Care
 from warp_mca import __version__
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 
 PARTS = ("ceilings", "flops", "rates", "savings", "host", "startup")
 KEY = ("element", "size", "precision", "case")

@@ -45,7 +45,7 @@ from benchmarks.accuracy_measure import (
 )
 from warp_mca.accuracy.prediction import processes_of
 from warp_mca.accuracy.store import OWN, family_from
-from warp_mca.runs.sweep_job import check_device_after
+from warp_mca.studies.sweep_job import check_device_after
 
 ROOT = Path(__file__).resolve().parents[1]
 JSON = ROOT / "docs" / "accuracy.json"

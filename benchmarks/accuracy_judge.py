@@ -13,7 +13,7 @@ from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import BOUND, bound_errors
 from warp_mca.accuracy.prediction import HIGH, LOW, SMALL
 from warp_mca.accuracy.store import Size, families
-from warp_mca.runs.rate_groups import COSTS, StepCost
+from warp_mca.phases.rate_groups import COSTS, StepCost
 
 START, END = "<!-- accuracy: measured -->", "<!-- accuracy: end -->"  # around what is rendered
 # Counts of `accuracy_left_out`, each with what it is out of.

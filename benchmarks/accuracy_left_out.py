@@ -14,7 +14,7 @@ from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.prediction import SMALL
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.store import Family, Measured, family_from
-from warp_mca.runs.rate_groups import COSTS
+from warp_mca.phases.rate_groups import COSTS
 
 COARSE, FINE = 0.05, 0.02  # shares that are asked for
 DEVICES = ("H100", "cpu")  # whose costs choices are made by

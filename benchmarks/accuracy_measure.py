@@ -21,8 +21,8 @@ from warp_mca.accuracy.figures import BOUND, figures_of
 from warp_mca.accuracy.plan import lighter
 from warp_mca.accuracy.prediction import INTERVAL
 from warp_mca.accuracy.variant import Variant
-from warp_mca.runs.sweep_job import check_device_after
-from warp_mca.runs.sweep_workers import WorkerDied, Workers
+from warp_mca.studies.sweep_job import check_device_after
+from warp_mca.studies.sweep_workers import WorkerDied, Workers
 
 BATCH = 8  # scenes side by side at most
 WORK = {"hex8r": 0.65}  # processor time of an element over that of hex8 with plasticity (docs/performance.md) [-]

@@ -14,7 +14,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 INSTRUCTION = re.compile(r"^\s*(?:@\S+\s+)?([a-z]+)(?:\.(?!f32|f64)\w+)*\.(f32|f64)\b", re.MULTILINE)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 import warp_mca as mca
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.prepare import Clock, prepare
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Clock, prepare
 
 RADIUS, LENGTH = 0.013, 0.21
 METAL = mca.Elastic(E=70e9, nu=0.27, rho=2700.0)

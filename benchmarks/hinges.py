@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.prepare import Clock, prepare
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Clock, prepare
 from warp_mca.scene import model_file
 from warp_mca.scene.catalogue import parse_overrides
-from warp_mca.solve.solver import Solver
-from warp_mca.solve.state import State
+from warp_mca.step.solver import Solver
+from warp_mca.step.state import State
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from benchmarks.blocks import Held
-from warp_mca.elements.patch_stage import PatchStage
+from warp_mca.physics.elements.patch_stage import PatchStage
 
 
 def size(array: wp.array) -> int:

@@ -54,7 +54,7 @@ def check_origin(folder: Path) -> None:
         RuntimeError: it does not.
     """
     text = (
-        "import warp_mca.kernels.materials.j2 as a, warp_mca.elements as b, warp_mca.scenes as c; "
+        "import warp_mca.kernels.materials.j2 as a, warp_mca.physics.elements as b, warp_mca.scenes as c; "
         "print(*map(origin, (a, b, c)))"
     )
     command = [sys.executable, "-c", f"origin = lambda module: module.__file__; {text}"]

@@ -14,7 +14,7 @@ import warp as wp
 from benchmarks.blocks import RATES, SIZES, Held, assemble
 from benchmarks.rates import step_seconds
 from benchmarks.timing import Care
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 
 AMOUNTS = (0.0, 0.3, 0.7, 1.1, 1.9, 2.6, 3.3, 5.1, 7.7, 11.3)  # allocated before [MB]
 

@@ -13,7 +13,7 @@ from benchmarks.memory import memory
 from benchmarks.stages import shares
 from benchmarks.timing import Care, clock, ratio, seconds_per_call, steps_per_graph
 from warp_mca.model.model import Model
-from warp_mca.solve.stage import Step
+from warp_mca.step.stage import Step
 
 
 def steps_of(held: Held, care: Care) -> int:

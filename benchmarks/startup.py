@@ -17,7 +17,7 @@ import warp as wp
 wp.config.quiet = True
 import warp_mca as mca
 from warp_mca.model.build import build_model
-from warp_mca.solve.solver import Solver
+from warp_mca.step.solver import Solver
 imported = time.perf_counter()
 scene = mca.make_scene("rod_on_wall")
 meshes = mca.mesh(scene)

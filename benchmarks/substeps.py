@@ -15,14 +15,14 @@ import warp as wp
 
 import warp_mca as mca
 from benchmarks.timing import QUICK, seconds_per_call
-from warp_mca.elements.patch_stage import PatchStage
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.prepare import Clock, prepare
-from warp_mca.runs.rate_groups import grouping
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Clock, prepare
+from warp_mca.phases.rate_groups import grouping
+from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.options import with_options
-from warp_mca.solve.rate_chains import Chains, Task
-from warp_mca.solve.stage import Stage, Step
+from warp_mca.step.rate_chains import Chains, Task
+from warp_mca.step.stage import Stage, Step
 
 TURNS = 10  # launches of a part in one graph
 SPAN = 5e-3  # of the impact phase, which sets its steps [s]

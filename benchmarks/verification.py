@@ -43,7 +43,7 @@ def measure(task: Task) -> dict[str, Any] | None:
 
 def tasks(names: Iterable[str], device: str, level: str) -> list[Task]:
     """Every case with each element and precision that it takes, in the order of the page."""
-    from warp_mca.elements import ELEMENTS
+    from warp_mca.physics.elements import ELEMENTS
     from warp_mca.verify import cases
 
     return [

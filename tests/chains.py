@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.model.build import Grouping, build_model
-from warp_mca.model.cells import nodal_masses
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Prepared
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.results.paths import locate
 from warp_mca.rigid.handback import HandBack, carriage_motion, hand_back
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.rigid.scene_chain import pins
 from warp_mca.rigid.swing import Swing, swing_until
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.prepare import Prepared
 
 START, SPAN = 0.02, 1e-3  # of the impact phase, from the release [s]
 LENGTH = 0.2

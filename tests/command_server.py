@@ -22,8 +22,8 @@ IMPORTED = """
     gmsh h5py matplotlib.backends.backend_agg matplotlib.figure PIL.Image pxr.UsdGeom pxr.UsdLux pxr.UsdShade
     scipy.integrate scipy.signal scipy.sparse.csgraph warp warp_mca.accuracy.tradeoff warp_mca.cli.main
     warp_mca.paper.report warp_mca.recorders warp_mca.recorders.rerun_blueprint warp_mca.report.energies
-    warp_mca.report.forces warp_mca.report.paths warp_mca.runs.impact warp_mca.runs.simulate warp_mca.runs.simulation
-    warp_mca.verify.runner
+    warp_mca.report.forces warp_mca.report.paths warp_mca.phases.impact warp_mca.phases.simulate
+    warp_mca.phases.simulation warp_mca.verify.runner
 """.split()
 STAND_IN = """\
 #!{python} -IS

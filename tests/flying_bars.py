@@ -8,7 +8,7 @@ import numpy as np
 
 import warp_mca as mca
 from warp_mca.model.build import build_model
-from warp_mca.model.cells import nodal_masses
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.recorders.frames import skins
 from warp_mca.recorders.recorder import Frame, RunInfo, Volume
 from warp_mca.rigid.handoff import hand_off

@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.prepare import Clock, Prepared, prepare
-from warp_mca.runs.rate_groups import grouping
-from warp_mca.solve.solver import Solver
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Clock, Prepared, prepare
+from warp_mca.phases.rate_groups import grouping
+from warp_mca.step.solver import Solver
 
 # least lengths of ranges that threads take, so short that small models are cut
 SHORT_RANGES = {
-    "warp_mca.solve.node_stage.NODES": RANGE_MULTIPLE,
-    "warp_mca.solve.solver.RANGE": RANGE_MULTIPLE,
-    "warp_mca.elements.stage.ELEMENTS": RANGE_MULTIPLE,
-    "warp_mca.elements.tet4_stage.ELEMENTS": RANGE_MULTIPLE,
-    "warp_mca.elements.tet4_stage.NODES": RANGE_MULTIPLE,
-    "warp_mca.solve.contact_stage.CONTACT": RANGE_MULTIPLE // 2,
+    "warp_mca.step.node_stage.NODES": RANGE_MULTIPLE,
+    "warp_mca.step.solver.RANGE": RANGE_MULTIPLE,
+    "warp_mca.physics.elements.stage.ELEMENTS": RANGE_MULTIPLE,
+    "warp_mca.physics.elements.tet4_stage.ELEMENTS": RANGE_MULTIPLE,
+    "warp_mca.physics.elements.tet4_stage.NODES": RANGE_MULTIPLE,
+    "warp_mca.physics.contact.stage.CONTACT": RANGE_MULTIPLE // 2,
 }
 
 

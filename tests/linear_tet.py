@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.elements.element import Array
 from warp_mca.geometry.tetrahedron import gradients, volumes
+from warp_mca.physics.elements.element import Array
 
 if TYPE_CHECKING:
-    from warp_mca.elements.stage import ElementStage
     from warp_mca.model.model import Block
+    from warp_mca.physics.elements.stage import ElementStage
 
 
 class LinearTet:
@@ -45,6 +45,6 @@ class LinearTet:
         """Its arrays and kernels on the current device."""
         import linear_tet_kernels
 
-        from warp_mca.elements.stage import ElementStage
+        from warp_mca.physics.elements.stage import ElementStage
 
         return ElementStage(block, precision, linear_tet_kernels, points=1)

@@ -12,7 +12,7 @@ from impacts import begun, figures, finished, prepared, result_of
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.model.absorbing import NORMAL, TANGENTIAL
+from warp_mca.physics.absorbing.nodes import NORMAL, TANGENTIAL
 from warp_mca.scene import model_file
 from warp_mca.scenes import two_link
 from warp_mca.verify.absorbing import reflected_share

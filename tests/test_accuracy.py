@@ -24,7 +24,7 @@ from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.cli.main import main
-from warp_mca.runs.rate_groups import COSTS
+from warp_mca.phases.rate_groups import COSTS
 from warp_mca.scene.options import with_options
 
 BOUND = ("F_n_first_peak", "impulse", "contact_duration")

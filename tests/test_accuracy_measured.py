@@ -32,7 +32,7 @@ from warp_mca.accuracy.choice import cost_of
 from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.store import families
 from warp_mca.geometry.refinement import refined
-from warp_mca.runs.rate_groups import COSTS
+from warp_mca.phases.rate_groups import COSTS
 
 ROD = FAMILY["rod_on_wall"]  # its first peak has no limit
 HOW = ROD.limits

@@ -15,17 +15,17 @@ from test_structure import imported, modules, tree_of
 from test_style import entries
 
 import warp_mca as mca
-from warp_mca.elements.state import ElementState
-from warp_mca.model.floating import with_floating_frames
-from warp_mca.solve.absorbing_stage import AbsorbingState
-from warp_mca.solve.constraint_stage import ConstraintState
-from warp_mca.solve.contact_stage import ContactState
-from warp_mca.solve.coupling_stage import CouplingState
-from warp_mca.solve.floating_stage import FloatingState
-from warp_mca.solve.load_stage import LoadState
-from warp_mca.solve.rigid_stage import RigidState
-from warp_mca.solve.solver import Solver
-from warp_mca.solve.state import State
+from warp_mca.physics.absorbing.stage import AbsorbingState
+from warp_mca.physics.contact.stage import ContactState
+from warp_mca.physics.elements.state import ElementState
+from warp_mca.physics.floating.frames import with_floating_frames
+from warp_mca.physics.floating.stage import FloatingState
+from warp_mca.physics.joints.constraint_stage import ConstraintState
+from warp_mca.physics.joints.coupling_stage import CouplingState
+from warp_mca.physics.loads.stage import LoadState
+from warp_mca.physics.rigid.stage import RigidState
+from warp_mca.step.solver import Solver
+from warp_mca.step.state import State
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")

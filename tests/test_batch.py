@@ -9,9 +9,9 @@ from sharp_edges import in_frame
 
 import warp_mca as mca
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
-from warp_mca.model.patches import PATCH, make_patches
+from warp_mca.physics.elements.patches import PATCH, make_patches
 from warp_mca.results.storage import ALL_FILES, PROBE_FILES
-from warp_mca.runs.batch import check_alike
+from warp_mca.studies.batch import check_alike
 
 
 def hinged(

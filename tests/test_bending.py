@@ -16,9 +16,9 @@ from warp_mca.geometry.degenerate import stored, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
 from warp_mca.model.model import Model
-from warp_mca.runs.bending import samples_of, seen
-from warp_mca.runs.bent_cells import FLOW, FLOWING, RIGHT, SPENT
-from warp_mca.solve.solver import Solver
+from warp_mca.step.solver import Solver
+from warp_mca.watch.bending import samples_of, seen
+from warp_mca.watch.bent_cells import FLOW, FLOWING, RIGHT, SPENT
 
 CUTS = {  # of a hexahedron into two wedges, whose axes go along its edges
     "along": ((0, 3, 7, 1, 2, 6), (0, 7, 4, 1, 6, 5)),

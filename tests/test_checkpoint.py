@@ -15,9 +15,9 @@ from test_full_disk import files_up_to
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.runs.checkpoint import FILE, Checkpoint, Every
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.pure_setup import Place
+from warp_mca.phases.checkpoint import FILE, Checkpoint, Every
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.pure_setup import Place
 
 BLOCK = mca.Body(
     name="block",

@@ -12,7 +12,7 @@ import warp_mca as mca
 from warp_mca.kernels.contact import contact, search
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.projection import bilinear, closest_point, interpolate, shape
-from warp_mca.model.surfaces import contact_passes, make_faces
+from warp_mca.physics.contact.surfaces import contact_passes, make_faces
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)
 
@@ -323,13 +323,13 @@ def test_lists_of_slaves_are_sorted():
 
 
 def test_full_candidate_list_stops_the_run(monkeypatch):
-    monkeypatch.setattr("warp_mca.solve.contact_stage.LIST_LENGTH", 1)
+    monkeypatch.setattr("warp_mca.physics.contact.stage.LIST_LENGTH", 1)
     with pytest.raises(mca.GuardError, match="contact lists overflowed"):
         mca.run(two_boxes())
 
 
 def test_node_that_outruns_the_search_stops_the_run(monkeypatch):
-    monkeypatch.setattr("warp_mca.runs.division.SPEED_RESERVE", 1e-9)
+    monkeypatch.setattr("warp_mca.phases.division.SPEED_RESERVE", 1e-9)
     scene = two_boxes()
     slow = mca.Scene(**{**vars(scene), "impact": mca.ImpactPhase(duration=4e-3, output_interval=4e-3)})
     with pytest.raises(mca.GuardError, match="outran the contact search"):
@@ -343,7 +343,7 @@ def test_deep_penetration_stops_the_run():
 
 def test_coarse_output_searches_often_enough(monkeypatch):
     """With a short look ahead, output every 50 us needs several searches; the forces are those of fine output."""
-    monkeypatch.setattr("warp_mca.model.surfaces.SEARCH_MARGIN", 0.008)
+    monkeypatch.setattr("warp_mca.physics.contact.surfaces.SEARCH_MARGIN", 0.008)
     fine = mca.run(two_boxes(mu=0.4), duration=1e-4)
     scene = two_boxes(mu=0.4)
     coarse = mca.run(mca.Scene(**{**vars(scene), "impact": mca.ImpactPhase(duration=1e-4, output_interval=5e-5)}))

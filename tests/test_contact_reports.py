@@ -15,7 +15,7 @@ from warp_mca.accuracy.figures import why_unsure
 from warp_mca.model.build import build_model
 from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
 from warp_mca.results.force_history import faint_share, grazing_share
-from warp_mca.runs.contact_warnings import symmetry_of
+from warp_mca.watch.contact_warnings import symmetry_of
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 SOFT = mca.Elastic(E=1e7, nu=0.3, rho=1000.0)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.phases.cycle import begin_cycle, run_cycle
+from warp_mca.phases.cycle_result import cycle_result
+from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.impact_driver import bending_period
+from warp_mca.phases.parts import ImpactPart, Part, SwingPart
+from warp_mca.phases.settings import Settings
 from warp_mca.rigid.handback import HandBack
-from warp_mca.runs.cycle import begin_cycle, run_cycle
-from warp_mca.runs.cycle_result import cycle_result
-from warp_mca.runs.cycle_setup import Setup
-from warp_mca.runs.impact_driver import bending_period
-from warp_mca.runs.parts import ImpactPart, Part, SwingPart
-from warp_mca.runs.settings import Settings
-from warp_mca.solve.state_figures import max_plastic_strain
+from warp_mca.step.state_figures import max_plastic_strain
 
 COARSE = {
     "section": 2,

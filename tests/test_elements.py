@@ -12,15 +12,15 @@ from impacts import Displaced
 from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
-from warp_mca.elements import ELEMENTS
-from warp_mca.elements.stage import gather_lists
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import cell_names, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
 from warp_mca.kernels.nodes.node import gather_function
 from warp_mca.model.build import build_model
-from warp_mca.solve.solver import Solver
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.stage import gather_lists
+from warp_mca.step.solver import Solver
 from warp_mca.verify.small_meshes import mixed_cube
 
 gather = gather_function("float64")

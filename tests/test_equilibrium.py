@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 import warp_mca as mca
 from warp_mca.base.errors import GuardError
 from warp_mca.model.build import build_model
-from warp_mca.model.cells import nodal_masses
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.equilibrium import equilibrium
-from warp_mca.solve.solver import Solver
+from warp_mca.step.solver import Solver
 
 E, SIGMA_Y, E_T = 70e9, 110e6, 27e9
 

@@ -20,9 +20,9 @@ from warp_mca.geometry.lug import lug, lug_volume
 from warp_mca.geometry.quality import volumes
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.build import build_model
-from warp_mca.runs.mass_report import body_report, mass_warnings
 from warp_mca.scene.catalogue import make_scene, scene_names
 from warp_mca.scene.model_file import load, save
+from warp_mca.watch.mass_report import body_report, mass_warnings
 
 RHO = 2700.0
 METAL = mca.Elastic(E=70e9, nu=0.3, rho=RHO)

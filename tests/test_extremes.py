@@ -12,7 +12,7 @@ from test_elements import KINDS, STEEL, held_of
 from test_run import bar
 
 import warp_mca as mca
-from warp_mca.solve.steps import CHECK_STEPS, CHECK_TIME, Steps
+from warp_mca.step.steps import CHECK_STEPS, CHECK_TIME, Steps
 
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=400e6, E_t=2e9)
 DT = 2.5e-8  # of most runs here: rows differ, steps do not
@@ -24,7 +24,7 @@ def run(
     """A run of so many rows of as many steps each."""
     division = Steps(dt=dt, per_search=steps, searches=1, intervals=rows)
     with monkeypatch.context() as patch:
-        patch.setattr("warp_mca.runs.impact.divide_alike", lambda *_: division)
+        patch.setattr("warp_mca.phases.impact.divide_alike", lambda *_: division)
         return mca.run(scene, **more)
 
 
@@ -130,7 +130,7 @@ def test_an_imbalance_between_two_rows_stops_the_run(monkeypatch):
 def test_rows_hold_their_whole_interval_whatever_checks_lie_in_it(count, monkeypatch):
     """More checks in a row than the device keeps records; stress along paths is that of the rows."""
     scene = mca.make_scene("single_rod", axial=40, mu=0.0)
-    monkeypatch.setattr("warp_mca.solve.solver.RANGE", 64)
+    monkeypatch.setattr("warp_mca.step.solver.RANGE", 64)
     fine, coarse = (run(scene, monkeypatch, *division, threads=count) for division in ((140, 10), (2, 700)))
     assert coarse.summary["n_steps"] == fine.summary["n_steps"] == 1400
     for name in ("time_s", "tip_vx", "E_kinetic", "E_internal", "E_contact"):

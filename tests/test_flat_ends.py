@@ -11,7 +11,7 @@ from impacts import finished, result_of
 
 import warp_mca as mca
 from warp_mca.kernels.records.columns import MADE
-from warp_mca.runs import ledger
+from warp_mca.watch import ledger
 
 E, RHO, SIDE = 70e9, 2700.0, 0.01
 C = math.sqrt(E / RHO)

@@ -10,9 +10,9 @@ from test_architecture import everything
 from test_multi_rate import graded
 
 import warp_mca as mca
-from warp_mca.model.floating import with_floating_frames
-from warp_mca.runs.impact import Impact
-from warp_mca.solve.solver import Solver
+from warp_mca.phases.impact import Impact
+from warp_mca.physics.floating.frames import with_floating_frames
+from warp_mca.step.solver import Solver
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 FLOWING = mca.J2Bilinear(E=STEEL.E, nu=0.3, rho=STEEL.rho, sigma_y=400e6, E_t=2e9)

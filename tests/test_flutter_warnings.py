@@ -10,8 +10,8 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.model.model import Model
-from warp_mca.runs.flutter_warnings import MEAN, SPAN, flutter_warnings, vibration
 from warp_mca.scenes import two_link
+from warp_mca.watch.flutter_warnings import MEAN, SPAN, flutter_warnings, vibration
 
 ROWS = 400
 

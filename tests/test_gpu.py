@@ -258,7 +258,7 @@ def test_scenes_of_a_batch_give_the_bits_that_they_give_alone():
     ids=["bars", "two walls", "three walls", "roof"],
 )
 def test_sides_of_a_master_press_as_on_the_cpu_and_repeat_bit_for_bit(scene):
-    """Rounding decides which face presses a node in the plane of two: on both devices alike only where none lies there."""
+    """Rounding decides which face presses a node in the plane of two; devices agree where none lies there."""
     short = replace(scene, impact=replace(scene.impact, duration=min(scene.impact.duration, 1e-4)))
     one, two = (mca.run(short, device="cuda:0", precision="float64") for _ in range(2))
     assert one.F_n.max() > 100.0
@@ -314,9 +314,9 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
     """Against the same graphs whose kernels begin when the one before them has ended."""
     from benchmarks.blocks import FULL, Case, Held, assemble
     from warp_mca.kernels.nodes import node
-    from warp_mca.solve import replay
+    from warp_mca.step import replay
 
-    monkeypatch.setattr("warp_mca.solve.node_stage.EARLY_ROUNDS", 0)
+    monkeypatch.setattr("warp_mca.step.node_stage.EARLY_ROUNDS", 0)
     model, case = assemble(element, 90_000), {"elastic": Case(), "flows": Case(0.3), "everything": FULL}[name]
     own, changed, states = replay.launch_early, [], []
     for change in (lambda graph: changed.append(own(graph)), lambda graph: None):

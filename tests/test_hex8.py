@@ -7,14 +7,14 @@ import pytest
 import warp as wp
 from scipy.spatial.transform import Rotation
 
-from warp_mca.elements import ELEMENTS
-from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.geometry.hexahedron import gradients
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements import hex8
 from warp_mca.kernels.elements.rotation import nearest_rotation
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.model.stable_step import stable_step
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.scene.materials import Elastic, J2Bilinear
 
 K, G = 50.7e9, 27.6e9

@@ -6,7 +6,7 @@ from impacts import finished, momentum, result_of
 
 import warp_mca as mca
 from warp_mca.model.build import build_model
-from warp_mca.model.cells import nodal_masses
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.handoff import hand_off
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)

@@ -9,7 +9,7 @@ from test_joint import BAR, SIZE, SOFT
 
 import warp_mca as mca
 from warp_mca.base.rotation import rotation_matrix
-from warp_mca.model.cells import nodal_masses
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.scene import model_file
 
 HALF = mca.Box(size=(0.05, 0.02, 0.02), divisions=(5, 2, 2), origin=(0.0, -0.01, -0.01))

@@ -16,10 +16,10 @@ import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.batch_model import join_models
-from warp_mca.model.joint_loads import hinge_loads
+from warp_mca.phases.impact import Impact
+from warp_mca.physics.loads.joint_loads import hinge_loads
 from warp_mca.rigid.loads import Table
 from warp_mca.rigid.swing import swing_until
-from warp_mca.runs.impact import Impact
 from warp_mca.scenes import single_link
 
 SLIDE = mca.Slide(direction=(0.8, 0.6, 0.0), carriage_mass=0.3, velocity=0.5)

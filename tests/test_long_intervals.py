@@ -8,7 +8,7 @@ from test_recording import Memory, bar
 
 import warp_mca as mca
 from warp_mca.recorders.recorder import SURFACE
-from warp_mca.solve.replay import Replay
+from warp_mca.step.replay import Replay
 
 
 @pytest.mark.parametrize("recorded", [False, True])

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.elements.patch_stage import PatchStage
 from warp_mca.kernels.elements import hex8, hex8_patch
 from warp_mca.model.rates import Rates
-from warp_mca.runs.division import divide
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.rate_groups import COSTS, StepCost, grouping
+from warp_mca.phases.division import divide
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.rate_groups import COSTS, StepCost, grouping
+from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.scene.catalogue import load_source
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)

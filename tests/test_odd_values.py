@@ -201,7 +201,7 @@ def fields() -> list[Any]:
 @pytest.mark.filterwarnings("error")
 def test_odd_values_are_refused_in_a_sentence_or_run(kind: type, name: str, monkeypatch: pytest.MonkeyPatch):
     """No traceback and no warning of NumPy, until a few steps are done."""
-    monkeypatch.setattr("warp_mca.runs.division.MAX_STEPS", 1000)
+    monkeypatch.setattr("warp_mca.phases.division.MAX_STEPS", 1000)
     sound, tried = SOUND[kind], []
     for value in ODD:
         try:

@@ -13,8 +13,8 @@ from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import absorbing, constraint, floating, node, rated_node
 from warp_mca.scene.materials import Elastic, J2Bilinear
-from warp_mca.solve import early_launch as module
-from warp_mca.solve.early_launch import launch_early
+from warp_mca.step import early_launch as module
+from warp_mca.step.early_launch import launch_early
 
 KERNELS = Path(node.__file__).parents[1]
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...

@@ -15,7 +15,7 @@ from test_contact_stiffness import PLATE, block_on_plate
 import warp_mca as mca
 from warp_mca.kernels.contact import penalty
 from warp_mca.model.build import build_model
-from warp_mca.model.cells import nodal_masses
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import model_file
 from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw

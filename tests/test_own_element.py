@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 from test_elements import STEEL, energy, held_of
 
 import warp_mca as mca
-from warp_mca.elements import ELEMENTS
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.geometry.degenerate import tetrahedral
-from warp_mca.model.cells import body_cells
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.cells import body_cells
 from warp_mca.recorders import UsdFile, VtkHdfFile
-from warp_mca.solve.output import NodalStress
+from warp_mca.step.output import NodalStress
 from warp_mca.verify.runner import verify
 from warp_mca.verify.small_meshes import mixed_cube
 

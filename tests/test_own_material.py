@@ -20,8 +20,8 @@ from warp_mca.kernels.hardware.early_launch import MIN_ARCH
 from warp_mca.recorders.colours import ColourScale
 from warp_mca.scene import model_file as scene_file
 from warp_mca.scene.materials import MATERIALS
-from warp_mca.solve.output import NodalStress
-from warp_mca.solve.state_figures import max_plastic_strain
+from warp_mca.step.output import NodalStress
+from warp_mca.step.state_figures import max_plastic_strain
 
 
 @dataclass(frozen=True, kw_only=True)

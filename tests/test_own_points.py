@@ -13,10 +13,10 @@ from impacts import begun, finished, result_of
 from linear_tet import LinearTet
 
 import warp_mca as mca
-from warp_mca.elements import ELEMENTS
-from warp_mca.elements.stage import ElementStage
 from warp_mca.kernels.elements import hourglass
 from warp_mca.kernels.materials.laws import HISTORY_SIZE
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.stage import ElementStage
 
 METAL = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=50e6, E_t=1e9)
 LAST = 8  # point that flows

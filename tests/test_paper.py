@@ -36,7 +36,7 @@ from warp_mca.paper.studies import (
 from warp_mca.paper.word_checks import chosen
 from warp_mca.results.result import Result
 from warp_mca.results.storage import load
-from warp_mca.runs.sweep import LATE
+from warp_mca.studies.sweep import LATE
 
 DOCS = Path(__file__).parent.parent / "docs"
 COARSE = MeshChoice("quick", refine=0.5)

@@ -11,7 +11,7 @@ import pytest
 from impacts import begun
 
 import warp_mca as mca
-from warp_mca.runs.passing import DEPTH
+from warp_mca.watch.passing import DEPTH
 
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
 FLOOR = mca.RigidPlane()

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.model.patches import NOWHERE, PATCH, SLOTS, SORT_CHUNK, Patches, compact_order, grid_points, make_patches
+from warp_mca.physics.elements.patches import (
+    NOWHERE,
+    PATCH,
+    SLOTS,
+    SORT_CHUNK,
+    Patches,
+    compact_order,
+    grid_points,
+    make_patches,
+)
 
 
 def patch_of_elements(patches: Patches) -> np.ndarray:
@@ -168,7 +177,7 @@ def test_sums_over_the_corners_of_an_element_fit_32_bits(edge: float):
 
 
 def test_elements_leave_room_for_contact():
-    from warp_mca.elements.patch_stage import PatchStage
+    from warp_mca.physics.elements.patch_stage import PatchStage
 
     for patches, blocks in itertools.product((1, 40, 528, 1229, 7814), (1, 19, 64, 5000)):
         stage = object.__new__(PatchStage)
@@ -180,7 +189,7 @@ def test_elements_leave_room_for_contact():
 
 def test_small_models_have_smaller_patches():
     """6,144 hexahedra on 132 multiprocessors: 96 patches of 64; a few more elements would leave no room for others."""
-    from warp_mca.elements.patch_stage import patch_size
+    from warp_mca.physics.elements.patch_stage import patch_size
 
     assert [patch_size(n, 132) for n in (1, 6144, 6336, 6337, 158080)] == [64, 64, 64, PATCH, PATCH]
     conn = meshes()["box"]

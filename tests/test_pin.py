@@ -15,9 +15,9 @@ from test_joint_loads import ALL, SLIDE
 
 import warp_mca as mca
 from warp_mca.base.rotation import mean_pose
-from warp_mca.runs.cycle import begin_cycle, run_cycle
-from warp_mca.runs.parts import ImpactPart
-from warp_mca.runs.settings import Settings
+from warp_mca.phases.cycle import begin_cycle, run_cycle
+from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.settings import Settings
 
 SIZE = (0.1, 0.02, 0.02)
 ORIGIN = (0.0, -0.01, -0.01)

@@ -16,7 +16,7 @@ from test_multi_rate import free_bar, hinged
 from test_run import bar
 
 import warp_mca as mca
-from warp_mca.runs.impact import Impact
+from warp_mca.phases.impact import Impact
 from warp_mca.scene import model_file
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
@@ -168,7 +168,7 @@ def test_elements_in_floating_frames_give_the_forces_of_the_world(monkeypatch):
     )
     framed = begun(scene)
     with monkeypatch.context() as patch:
-        patch.setattr("warp_mca.runs.impact.with_floating_frames", lambda model, *_: model)
+        patch.setattr("warp_mca.phases.impact.with_floating_frames", lambda model, *_: model)
         plain = begun(scene, precision="float64")
     assert framed.solver.floating.count == 1 and plain.solver.floating.count == 0
     for impact in (framed, plain):

@@ -17,9 +17,9 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.cli.main import main
+from warp_mca.phases import pure_fem
+from warp_mca.phases.checkpoint import FILE, Checkpoint, Every
 from warp_mca.recorders import SnapshotFile
-from warp_mca.runs import pure_fem
-from warp_mca.runs.checkpoint import FILE, Checkpoint, Every
 
 SCENE = '''"""A short, coarse rod that turns fast strikes a plate 1.1 ms after its release."""
 from dataclasses import replace
@@ -42,8 +42,8 @@ BLOCK, INTERVAL, COMMAND = 2, 2e-6, ["run", "scene.py", "--method", "pure-fem", 
 KILLED = """
 import os, signal, sys
 from warp_mca.cli.main import main
-from warp_mca.runs import pure_fem
-from warp_mca.runs.checkpoint import Checkpoint
+from warp_mca.phases import pure_fem
+from warp_mca.phases.checkpoint import Checkpoint
 
 pure_fem.BLOCK, store, count = 2, Checkpoint.store, []
 

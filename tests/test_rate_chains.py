@@ -15,14 +15,14 @@ from test_multi_rate import METAL, STEEL, graded, hinged
 from test_overlap import Driver
 
 import warp_mca as mca
-from warp_mca.elements.patch_stage import PatchStage
 from warp_mca.kernels.elements import hex8, hex8_patch
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import rated_node
-from warp_mca.solve import early_launch
-from warp_mca.solve.rate_chains import Chains, Task, tasks
-from warp_mca.solve.stage import Step
-from warp_mca.solve.threads import flushing
+from warp_mca.physics.elements.patch_stage import PatchStage
+from warp_mca.step import early_launch
+from warp_mca.step.rate_chains import Chains, Task, tasks
+from warp_mca.step.stage import Step
+from warp_mca.step.threads import flushing
 
 
 def in_some_order(found: list[Task], top: int, seed: int) -> list[Task]:

@@ -19,8 +19,8 @@ from warp_mca.recorders.checks import check_files
 from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
 from warp_mca.results.paths import locate
-from warp_mca.solve.output import Output
-from warp_mca.solve.solver import Solver
+from warp_mca.step.output import Output
+from warp_mca.step.solver import Solver
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 
@@ -453,7 +453,7 @@ def test_plastic_strain_at_nodes():
 def test_a_scene_without_paths_pays_nothing_for_them(monkeypatch: pytest.MonkeyPatch):
     import dataclasses
 
-    from warp_mca.solve import output
+    from warp_mca.step import output
 
     monkeypatch.setattr(output.Output, "__init__", None)
     mca.run(dataclasses.replace(bar(), paths=()), duration=2e-6)

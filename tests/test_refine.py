@@ -12,7 +12,7 @@ import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.geometry.quality import edge_lengths, scaled_jacobian
 from warp_mca.geometry.refinement import refined_count
-from warp_mca.runs.meshing import mesh
+from warp_mca.phases.meshing import mesh
 from warp_mca.scene import catalogue, model_file
 
 FACTORS = (0.5, 0.7, 1.3, 2.0)

@@ -15,7 +15,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.runs.checkpoint import FILE, HEADER, Checkpoint
+from warp_mca.phases.checkpoint import FILE, HEADER, Checkpoint
 
 SCENE = '''"""A block lands."""
 import warp_mca as mca

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from test_cycle import COARSE
 
 import warp_mca as mca
-from warp_mca.model.rigid_rows import independent
-from warp_mca.runs.cycle import begin_cycle, run_cycle
-from warp_mca.runs.cycle_result import cycle_result
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.parts import ImpactPart
-from warp_mca.runs.settings import Settings
+from warp_mca.phases.cycle import begin_cycle, run_cycle
+from warp_mca.phases.cycle_result import cycle_result
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.settings import Settings
+from warp_mca.physics.rigid.rows import independent
 
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=2700.0)
 ROUND_OFF = 1e-12

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.model.cells import nodal_masses
+from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.handback import hand_back
 from warp_mca.rigid.handoff import hand_off

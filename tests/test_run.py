@@ -14,7 +14,7 @@ from impacts import begun, finished, prepared, result_of
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.runs.division import divide
+from warp_mca.phases.division import divide
 
 ALUMINIUM = {"E": 70e9, "nu": 0.0, "rho": 2700.0}
 C = np.sqrt(70e9 / 2700.0)

@@ -8,8 +8,8 @@ from impacts import begun, finished, momentum, result_of
 from sharp_edges import HARD, SOFT, STEEL, H, bars, frame, in_frame, roof
 
 import warp_mca as mca
-from warp_mca.model.sides import MAX_SIDES, find_sides, stiffest_fold
-from warp_mca.model.surfaces import face_geometry
+from warp_mca.physics.contact.sides import MAX_SIDES, find_sides, stiffest_fold
+from warp_mca.physics.contact.surfaces import face_geometry
 
 
 def sides(mesh: mca.Mesh, nodes: str = "boundary") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -206,7 +206,7 @@ def test_searching_more_often_does_not_change_a_bit(scene, monkeypatch):
     """Which faces are listed beyond those that touch depends on when was searched, which differs between devices."""
     histories = []
     for apart in (1, 3, 4):
-        monkeypatch.setattr("warp_mca.runs.division.MOST_INTERVALS", apart)
+        monkeypatch.setattr("warp_mca.phases.division.MOST_INTERVALS", apart)
         impact = replace(scene.impact, duration=min(scene.impact.duration, 1e-4))
         histories.append(mca.run(replace(scene, impact=impact)).history)
     assert all(np.array_equal(h[name], histories[0][name], equal_nan=True) for h in histories for name in h)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.runs.skins import Skin, SkinPair
+from warp_mca.watch.skins import Skin, SkinPair
 
 NO_TURN = (0.0, 0.0, 0.0)
 

@@ -25,15 +25,15 @@ from test_style import entries
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.elements.state import ElementState
 from warp_mca.kernels.contact.spring import Spring
-from warp_mca.runs.impact import Impact
-from warp_mca.solve.constraint_stage import ConstraintState
-from warp_mca.solve.contact_stage import ContactState
-from warp_mca.solve.load_stage import LoadState
-from warp_mca.solve.records import SceneRecords
-from warp_mca.solve.state import State
-from warp_mca.solve.state_figures import max_speed
+from warp_mca.phases.impact import Impact
+from warp_mca.physics.contact.stage import ContactState
+from warp_mca.physics.elements.state import ElementState
+from warp_mca.physics.joints.constraint_stage import ConstraintState
+from warp_mca.physics.loads.stage import LoadState
+from warp_mca.step.records import SceneRecords
+from warp_mca.step.state import State
+from warp_mca.step.state_figures import max_speed
 
 PRECISIONS = ["mixed", "float64"]
 

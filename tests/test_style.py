@@ -216,7 +216,7 @@ def patched(tree: ast.AST) -> Iterator[str]:
     "source",
     [
         "monkeypatch.setattr(solver.Solver, 'start', None)",
-        "patch.setattr('warp_mca.solve.solver.Solver.start', None)",
+        "patch.setattr('warp_mca.step.solver.Solver.start', None)",
         "with patch.object(Solver, 'start'): pass",
         "Solver.start = None",
     ],

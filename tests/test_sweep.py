@@ -10,7 +10,7 @@ from sweeping import SCENE
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.runs.sweep_plan import parse_grid
+from warp_mca.studies.sweep_plan import parse_grid
 
 
 @pytest.fixture(autouse=True)

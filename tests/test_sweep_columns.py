@@ -10,9 +10,9 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.runs.sweep_columns import FIGURES, OTHERS, RESERVED, parameter_column
-from warp_mca.runs.sweep_lines import read_lines
-from warp_mca.runs.sweep_table import CSV, SweepTable
+from warp_mca.studies.sweep_columns import FIGURES, OTHERS, RESERVED, parameter_column
+from warp_mca.studies.sweep_lines import read_lines
+from warp_mca.studies.sweep_table import CSV, SweepTable
 
 OUTPUTS = Path(__file__).parents[1] / "docs" / "outputs.md"
 

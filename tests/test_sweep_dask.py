@@ -9,7 +9,7 @@ import pytest
 from sweeping import SCENE, figures
 
 from warp_mca.cli.main import main
-from warp_mca.runs.sweep_lines import read_lines
+from warp_mca.studies.sweep_lines import read_lines
 
 distributed = pytest.importorskip("distributed", reason="the extra cluster is not installed")
 COMMAND = ["sweep", "block.py", "--grid", "v=1,2,3", "--grid", "kills=nothing,worker", "--set", "duration=2e-6"]
@@ -44,7 +44,7 @@ def test_a_killed_worker_of_a_cluster_loses_no_run(here: Path, address: str):
 def test_a_scheduler_that_does_not_answer_is_named(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    monkeypatch.setattr("warp_mca.runs.sweep_workers.CONNECTING", "0.5s")
+    monkeypatch.setattr("warp_mca.studies.sweep_workers.CONNECTING", "0.5s")
     assert main([*COMMAND, "--executor", "dask://127.0.0.1:9", "--out", "all"]) == 2
     assert "executor = 'dask://127.0.0.1:9': no Dask scheduler answers there" in capsys.readouterr().err
     assert not (here / "all").exists()

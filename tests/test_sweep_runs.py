@@ -19,12 +19,12 @@ from sweeping import SCENE, Losing, figures, lose_device
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.runs.sweep import TRIES
-from warp_mca.runs.sweep_job import DeviceLost, Job, check_device_after
-from warp_mca.runs.sweep_job import figures as summary_figures
-from warp_mca.runs.sweep_lines import read_lines
-from warp_mca.runs.sweep_plan import FULL, Plan, RunOptions, batches, differing
-from warp_mca.runs.sweep_workers import WorkerDied, Workers
+from warp_mca.studies.sweep import TRIES
+from warp_mca.studies.sweep_job import DeviceLost, Job, check_device_after
+from warp_mca.studies.sweep_job import figures as summary_figures
+from warp_mca.studies.sweep_lines import read_lines
+from warp_mca.studies.sweep_plan import FULL, Plan, RunOptions, batches, differing
+from warp_mca.studies.sweep_workers import WorkerDied, Workers
 
 SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
 

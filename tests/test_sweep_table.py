@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import warp_mca as mca
-from warp_mca.runs.sweep_job import figures
-from warp_mca.runs.sweep_lines import read_lines
-from warp_mca.runs.sweep_plan import Plan, RunOptions
-from warp_mca.runs.sweep_table import SweepTable, check_identity, remove_sweep, write_identity
+from warp_mca.studies.sweep_job import figures
+from warp_mca.studies.sweep_lines import read_lines
+from warp_mca.studies.sweep_plan import Plan, RunOptions
+from warp_mca.studies.sweep_table import SweepTable, check_identity, remove_sweep, write_identity
 
 
 def row(index: int, **values: object) -> dict[str, object]:

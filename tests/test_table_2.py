@@ -21,7 +21,7 @@ from warp_mca.paper.page import Page, as_html, as_markdown
 from warp_mca.paper.pure_claims import PURE
 from warp_mca.paper.studies import LEVELS, MAIN, MESH, pure_case
 from warp_mca.paper.table_2 import HEAD, compare, enough, event_end, stored, table_rows
-from warp_mca.runs import pure_fem
+from warp_mca.phases import pure_fem
 
 COARSE = {
     "section": 2,

@@ -11,7 +11,7 @@ from impacts import SHORT_RANGES
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.solve import solver, threads
+from warp_mca.step import solver, threads
 
 
 @pytest.fixture(autouse=True)

@@ -12,8 +12,8 @@ from impacts import SHORT_RANGES, Displaced, begun, figures, finished, momentum,
 
 import warp_mca as mca
 from warp_mca.geometry.face_projection import project, shape
-from warp_mca.model.cells import nodal_masses
-from warp_mca.solve.solver import Solver
+from warp_mca.physics.elements.cells import nodal_masses
+from warp_mca.step.solver import Solver
 
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
 SIDE = 0.01
@@ -174,7 +174,7 @@ def test_a_tied_run_repeats_bit_for_bit_alone_in_a_batch_and_on_threads(monkeypa
 
 
 def test_parts_of_one_body_are_tied_and_a_model_file_keeps_them(tmp_path: Path):
-    from warp_mca.runs.simulation import mesh
+    from warp_mca.phases.simulation import mesh
     from warp_mca.scene.model_file import load, save
 
     scene = bar()
@@ -293,8 +293,8 @@ def test_bad_plates_and_parts_are_refused():
 
 
 def test_tied_bodies_relax_together():
-    from warp_mca.runs.residual import Relaxation
-    from warp_mca.runs.settings import Settings
+    from warp_mca.phases.residual import Relaxation
+    from warp_mca.phases.settings import Settings
 
     held = tuple(mca.Fixed(body=body, nodes="ymin", axes="xyz") for body in ("fine", "coarse"))
     model = prepared(bar(fixed=held)).model

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.elements import ELEMENTS
-from warp_mca.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.model import stable_step as timestep
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.build import build_model
-from warp_mca.model.cells import nodal_masses
 from warp_mca.model.model import Model
 from warp_mca.model.stable_step import stable_step
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.cells import nodal_masses
+from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.rigid.handoff import hand_off
-from warp_mca.solve.solver import Solver
-from warp_mca.solve.steps import Steps
+from warp_mca.step.solver import Solver
+from warp_mca.step.steps import Steps
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01
@@ -240,7 +240,7 @@ def test_run_blows_up_just_beyond_the_assembled_limit(share: float, stable: bool
     dt = share * 2.0 / np.sqrt(frequencies(model, free).max())
     assert model.stable.dt < dt
     steps = Steps(dt=dt, per_search=10, searches=1, intervals=60)
-    monkeypatch.setattr("warp_mca.runs.impact.divide_alike", lambda *_: steps)
+    monkeypatch.setattr("warp_mca.phases.impact.divide_alike", lambda *_: steps)
     if stable:
         assert mca.run(made, precision="float64").summary["energy_error"] < 1e-3
     else:

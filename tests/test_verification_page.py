@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.verification import key, measure, tasks, write_page
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.verify import cases
 from warp_mca.verify.mutations import MUTATIONS
 

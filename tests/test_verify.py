@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from warp_mca.base.errors import GuardError
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.verify import Setup, bending, cases
 from warp_mca.verify.case import Row
 from warp_mca.verify.mutations import MUTATIONS

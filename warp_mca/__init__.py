@@ -42,15 +42,15 @@ if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
     from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
+    from warp_mca.phases.simulation import mesh, run
     from warp_mca.report.quality import quality_table
     from warp_mca.results.cfc import cfc_filter
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
-    from warp_mca.runs.batch import run_batch
-    from warp_mca.runs.simulation import mesh, run
-    from warp_mca.runs.sweep import sweep
     from warp_mca.scene.catalogue import make_scene
     from warp_mca.scene.parameters import Param
+    from warp_mca.studies.batch import run_batch
+    from warp_mca.studies.sweep import sweep
 
 __version__ = "0.1.0"
 
@@ -75,10 +75,10 @@ _LAZY = {
     "load": "warp_mca.results.storage",
     "tradeoff": "warp_mca.accuracy.tradeoff",
     "quality_table": "warp_mca.report.quality",
-    "mesh": "warp_mca.runs.simulation",
-    "run": "warp_mca.runs.simulation",
-    "run_batch": "warp_mca.runs.batch",
-    "sweep": "warp_mca.runs.sweep",
+    "mesh": "warp_mca.phases.simulation",
+    "run": "warp_mca.phases.simulation",
+    "run_batch": "warp_mca.studies.batch",
+    "sweep": "warp_mca.studies.sweep",
 }
 
 __all__ = [

@@ -10,7 +10,7 @@ from typing import Any
 import warp_mca as mca
 from benchmarks.stability.axis import AXES, Direct, Figure, Trial, Value, with_element
 from warp_mca.model.model import Model
-from warp_mca.runs import division
+from warp_mca.phases import division
 
 PRECISIONS = ("mixed", "float64")
 Cell = dict[str, Any]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.stability.axis import Axis, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, wrong
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 
 TEMPLATE = Path(__file__).parent.parent.parent / "docs" / "stability.template.md"
 

@@ -18,7 +18,7 @@ from benchmarks.stability import (  # noqa: F401  (they register axes)
 )
 from benchmarks.stability.axis import AXES, Level, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, cell
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 
 __all__ = ["AXES", "keys", "merged", "tasks"]
 

@@ -17,7 +17,7 @@ from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import keep_functions
-from warp_mca.model.patches import PATCH
+from warp_mca.physics.elements.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 

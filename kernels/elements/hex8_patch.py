@@ -37,7 +37,7 @@ from warp_mca.kernels.hardware.shared_memory import (
     wait_for_copies,
 )
 from warp_mca.kernels.records.extremes import keep_functions
-from warp_mca.model.patches import PATCH, SLOTS
+from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 

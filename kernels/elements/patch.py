@@ -22,7 +22,7 @@ from warp_mca.kernels.hardware.shared_memory import (
     copy_words,
     wait_for_copies,
 )
-from warp_mca.model.patches import PATCH, SLOTS
+from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
 RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need
@@ -42,7 +42,7 @@ class Patches:
     """Patches of a block of elements.
 
     A head of a patch is its first element, its first slot, (slots << 16) + (exponent << 8) + elements, and its number;
-    see `warp_mca.model.patches`.
+    see `warp_mca.physics.elements.patches`.
 
     Attributes:
         head: of each patch, shape (patch_count,), vec4i.

@@ -3,7 +3,7 @@
 CUDA C++ Programming Guide, "Programmatic Dependent Launch and Synchronization". The kernel starts when every block of
 the one before it has called `let_next_begin` or has ended. Before `wait_for_previous` it may read only what no such
 kernel writes; after that call all writes of the kernel before it are visible. Both functions do nothing on a CPU, and
-in graphs whose edges were not changed (`warp_mca.solve.early_launch`).
+in graphs whose edges were not changed (`warp_mca.step.early_launch`).
 """
 
 from typing import Any

@@ -13,7 +13,7 @@ from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.nodes.node import TOUCHABLE, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
-from warp_mca.model.patches import PATCH
+from warp_mca.physics.elements.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 

@@ -37,7 +37,7 @@ from warp_mca.kernels.nodes.floating import seen
 from warp_mca.kernels.records.extremes import keep_functions
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes
-from warp_mca.model.patches import PATCH, SLOTS
+from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 

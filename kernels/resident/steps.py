@@ -2,7 +2,7 @@
 
 Blocks of threads keep their roles from step to step: patches of elements and slave nodes of a contact give forces;
 master, bound and free nodes move. Those that move nodes wait for all forces of a step, and those that give forces for
-all nodes. All blocks must be on the device together (`warp_mca.solve.resident`).
+all nodes. All blocks must be on the device together (`warp_mca.step.resident`).
 """
 
 from functools import cache

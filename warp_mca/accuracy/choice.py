@@ -11,7 +11,7 @@ from warp_mca.accuracy.prediction import Expected, expected_errors, is_close
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
-from warp_mca.runs.rate_groups import StepCost
+from warp_mca.phases.rate_groups import StepCost
 
 # Probabilities, weighed by scenes of the store that are left out in turn (docs/accuracy.md):
 LEAST = 0.84  # that all errors are within what was asked; a variant below it is not chosen [-]

@@ -9,7 +9,7 @@ from typing import Any
 
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Scene
 from warp_mca.scene.catalogue import load_source, scene_names
 

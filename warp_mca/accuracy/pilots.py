@@ -22,8 +22,8 @@ from warp_mca.accuracy.levels import ANOTHER, Levels
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import GuardError, bad_value
-from warp_mca.runs.spring_share import PEAK_LOSS
 from warp_mca.scene import Scene
+from warp_mca.watch.spring_share import PEAK_LOSS
 
 if TYPE_CHECKING:
     from warp_mca.results.result import Result

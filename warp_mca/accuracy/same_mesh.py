@@ -11,7 +11,7 @@ import numpy as np
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import McaError
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.runs.meshing import mesh
+from warp_mca.phases.meshing import mesh
 from warp_mca.scene import Scene
 
 

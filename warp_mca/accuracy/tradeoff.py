@@ -18,8 +18,8 @@ from warp_mca.accuracy.variant import Variant
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.base.progress import duration_words
-from warp_mca.runs.arguments import check_scene, span_of
-from warp_mca.runs.settings import settings_of
+from warp_mca.phases.arguments import check_scene, span_of
+from warp_mca.phases.settings import settings_of
 from warp_mca.scene import Scene
 
 REFERENCE_SHARE = 0.45  # of the budget left after the first runs

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.elements import ELEMENTS
-from warp_mca.runs.rate_groups import check_multi_rate
+from warp_mca.phases.rate_groups import check_multi_rate
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Scene
 from warp_mca.scene.phases import is_mass_scaling
 

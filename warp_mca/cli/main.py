@@ -22,7 +22,7 @@ from warp_mca.base.garbage import few_collections
 from warp_mca.base.stdio import drop_output, open_streams, what_failed
 from warp_mca.cli import completion
 from warp_mca.cli.parser import make_parser
-from warp_mca.runs.advice import LOGGER
+from warp_mca.watch.advice import LOGGER
 
 
 class _Warnings(logging.Handler):

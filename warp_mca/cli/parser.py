@@ -12,8 +12,8 @@ import warp_mca as mca
 from warp_mca.cli import commands, paper, resume, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.cli.folder import folder
-from warp_mca.elements import ELEMENTS
-from warp_mca.runs.checkpoint import METHODS
+from warp_mca.phases.checkpoint import METHODS
+from warp_mca.physics.elements import ELEMENTS
 
 WELCOME = """\
 warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit

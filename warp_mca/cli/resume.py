@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_mca.base.errors import bad_value
-from warp_mca.runs.checkpoint import FILE, stored_command
+from warp_mca.phases.checkpoint import FILE, stored_command
 from warp_mca.scene.catalogue import SUFFIX as PYTHON
 from warp_mca.scene.catalogue import scene_names
 from warp_mca.scene.model_file import SUFFIX as MODEL

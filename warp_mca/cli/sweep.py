@@ -12,8 +12,8 @@ from warp_mca.cli.request import parameters_given, read_requests
 from warp_mca.cli.warp_start import start_warp
 
 if TYPE_CHECKING:
-    from warp_mca.runs.sweep_job import Row
-    from warp_mca.runs.sweep_plan import Plan
+    from warp_mca.studies.sweep_job import Row
+    from warp_mca.studies.sweep_plan import Plan
 
 SHOWN, WARNINGS = 40, 10  # rows and warnings that the terminal shows at most; the table has all
 
@@ -82,9 +82,9 @@ def sweep(
         GuardError: not all runs are done; the table has them all.
     """
     from warp_mca.base.progress import progress_bar
-    from warp_mca.runs.rate_groups import check_multi_rate
-    from warp_mca.runs.sweep import carry_out
-    from warp_mca.runs.sweep_plan import Plan, RunOptions, parse_grid, plain
+    from warp_mca.phases.rate_groups import check_multi_rate
+    from warp_mca.studies.sweep import carry_out
+    from warp_mca.studies.sweep_plan import Plan, RunOptions, parse_grid, plain
 
     settings = parse_grid(option, grids, parameters_given(args))
     requests = read_requests(args, settings)
@@ -124,8 +124,8 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
     from rich.table import Table
 
     from warp_mca.report.console import console
-    from warp_mca.runs.sweep_job import BETWEEN, DONE
-    from warp_mca.runs.sweep_table import CSV, PARQUET
+    from warp_mca.studies.sweep_job import BETWEEN, DONE
+    from warp_mca.studies.sweep_table import CSV, PARQUET
 
     out = console()
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))

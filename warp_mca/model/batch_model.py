@@ -13,7 +13,7 @@ from warp_mca.model.assembly import GROUND, Block
 from warp_mca.model.layout import Layout, complete, offsets
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
-from warp_mca.model.tied_nodes import join_ties
+from warp_mca.physics.ties.nodes import join_ties
 
 Index = NDArray[np.int32]
 

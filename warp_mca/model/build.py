@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.absorbing import absorbing_nodes
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.auto_penalty import ChosenPenalty, settled
-from warp_mca.model.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
-from warp_mca.model.contact_axes import contact_axes
-from warp_mca.model.contact_checks import check_spacing
-from warp_mca.model.joint_loads import hinge_loads, movable_bases
 from warp_mca.model.mass_scaling import check_masses, scale_masses
 from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
-from warp_mca.model.rigid_bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
-from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
-from warp_mca.model.surfaces import ContactPass, contact_eigenvalues, contact_passes
-from warp_mca.model.tied_nodes import check_ties, on_faces, tied_nodes, velocities
+from warp_mca.physics.absorbing.nodes import absorbing_nodes
+from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
+from warp_mca.physics.contact.axes import contact_axes
+from warp_mca.physics.contact.checks import check_spacing
+from warp_mca.physics.contact.surfaces import ContactPass, contact_eigenvalues, contact_passes
+from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
+from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
+from warp_mca.physics.rigid.bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
+from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
+from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import RigidPlane, Scene
 
 if TYPE_CHECKING:

@@ -8,21 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.model.absorbing import AbsorbingNodes
 from warp_mca.model.assembly import Block
-from warp_mca.model.auto_penalty import ChosenPenalty
-from warp_mca.model.constraints import JointPairs
-from warp_mca.model.couplings import Coupling
-from warp_mca.model.floating import FloatingFrames
-from warp_mca.model.joint_loads import HingeLoad, MovableBase
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.rates import Rates
-from warp_mca.model.rigid_bodies import RigidBody
-from warp_mca.model.rigid_rows import RigidPin, RigidRow
 from warp_mca.model.stable_step import StableStep
-from warp_mca.model.surfaces import ContactPass
-from warp_mca.model.tied_nodes import TiedNodes
+from warp_mca.physics.absorbing.nodes import AbsorbingNodes
+from warp_mca.physics.contact.auto_penalty import ChosenPenalty
+from warp_mca.physics.contact.surfaces import ContactPass
+from warp_mca.physics.floating.frames import FloatingFrames
+from warp_mca.physics.joints.constraints import JointPairs
+from warp_mca.physics.joints.couplings import Coupling
+from warp_mca.physics.loads.joint_loads import HingeLoad, MovableBase
+from warp_mca.physics.rigid.bodies import RigidBody
+from warp_mca.physics.rigid.rows import RigidPin, RigidRow
+from warp_mca.physics.ties.nodes import TiedNodes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

@@ -12,8 +12,8 @@ from warp_mca.base.chunks import chunks
 from warp_mca.model.stable_step import BATCH, KEY, at_elements, step_of
 
 if TYPE_CHECKING:
-    from warp_mca.elements import Element
     from warp_mca.model.assembly import Assembly
+    from warp_mca.physics.elements import Element
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

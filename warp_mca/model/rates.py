@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.elements import ELEMENTS
-from warp_mca.model.patches import PATCH, compact_order
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.patches import PATCH, compact_order
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Block

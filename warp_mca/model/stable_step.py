@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.elements import Element
+from warp_mca.physics.elements import Element
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

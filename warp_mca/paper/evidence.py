@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from warp_mca.paper.studies import MAIN, STUDIES, Case, Key, Level, cases, in_order
+from warp_mca.phases.arguments import Progress
 from warp_mca.results.result import Result
 from warp_mca.results.storage import load
-from warp_mca.runs.arguments import Progress
-from warp_mca.runs.sweep import carry_out, stored_rows
-from warp_mca.runs.sweep_job import DONE, Row
-from warp_mca.runs.sweep_plan import Plan, RunOptions, differing, run_name
-from warp_mca.runs.sweep_workers import Prepare, devices_named
+from warp_mca.studies.sweep import carry_out, stored_rows
+from warp_mca.studies.sweep_job import DONE, Row
+from warp_mca.studies.sweep_plan import Plan, RunOptions, differing, run_name
+from warp_mca.studies.sweep_workers import Prepare, devices_named
 
 RUNS = "runs"  # folder of the sweep
 SHARE = 3  # runs that share a GPU: most of a run's time goes to meshes, assembly, figures and files, on the host

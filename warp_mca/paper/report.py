@@ -20,11 +20,11 @@ from warp_mca.paper.page import IMAGES, Page, as_html, as_markdown
 from warp_mca.paper.pictures import PICTURES, drawn
 from warp_mca.paper.studies import LEVELS, Level, pure_case
 from warp_mca.paper.table_2 import compare, stored
+from warp_mca.phases.arguments import Progress
+from warp_mca.phases.checkpoint import METHOD
 from warp_mca.results.storage import folder_path, load
-from warp_mca.runs.arguments import Progress
-from warp_mca.runs.checkpoint import METHOD
-from warp_mca.runs.sweep_job import DONE, Row
-from warp_mca.runs.sweep_workers import Prepare, devices_named
+from warp_mca.studies.sweep_job import DONE, Row
+from warp_mca.studies.sweep_workers import Prepare, devices_named
 
 HTML, JSON, MARKDOWN = "paper.html", "paper.json", "paper.md"
 PURE = "pure"  # folder of the comparison with finite elements alone

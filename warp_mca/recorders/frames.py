@@ -27,12 +27,12 @@ from warp_mca.recorders.recorder import (
     SurfaceMesh,
     Volume,
 )
-from warp_mca.solve.transfer import SLOTS, Transfer
+from warp_mca.step.transfer import SLOTS, Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model.model import Model
-    from warp_mca.solve.output import Output
+    from warp_mca.step.output import Output
 
 
 # Frames on their way from a GPU, which goes on meanwhile: while recorders start, or save their files.

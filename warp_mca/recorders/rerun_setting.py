@@ -14,7 +14,7 @@ from warp_mca.report.setting import plane_meshes, up_of
 if TYPE_CHECKING:
     import rerun as rr
 
-    from warp_mca.model.surfaces import ContactPass
+    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.recorders.recorder import RunInfo
 
 PLANES = "/world/planes"

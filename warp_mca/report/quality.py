@@ -61,10 +61,10 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     """
     from warp_mca.geometry.quality import edge_lengths, scaled_jacobian
     from warp_mca.model.build import build_model
-    from warp_mca.model.cells import nodal_masses
+    from warp_mca.phases.meshing import mesh
+    from warp_mca.physics.elements.cells import nodal_masses
     from warp_mca.rigid.handoff import hand_off
-    from warp_mca.runs.advice import mesh_warnings
-    from warp_mca.runs.meshing import mesh
+    from warp_mca.watch.advice import mesh_warnings
 
     meshes = mesh(scene, given=meshes)
     bodies = tuple(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene.drops import fall_velocity, resting_place
 from warp_mca.scene.materials import MATERIALS, Material
 

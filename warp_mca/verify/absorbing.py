@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.runs.impact import Impact
-from warp_mca.runs.prepare import Clock, prepare
-from warp_mca.solve.solver import Solver
-from warp_mca.solve.state import State
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Clock, prepare
+from warp_mca.step.solver import Solver
+from warp_mca.step.state import State
 from warp_mca.verify.case import Row, Setup, case
 
 Array = NDArray[np.float64]

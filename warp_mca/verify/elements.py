@@ -28,10 +28,10 @@ class Imposed:
 
     def __init__(self, setup: Setup, geometry: Mesh, kinematics: Kinematics = "corotational"):
         from warp_mca.model.build import build_model
-        from warp_mca.model.cells import nodal_masses
+        from warp_mca.physics.elements.cells import nodal_masses
         from warp_mca.rigid.handoff import hand_off
-        from warp_mca.solve.output import NodalStress
-        from warp_mca.solve.solver import Solver
+        from warp_mca.step.output import NodalStress
+        from warp_mca.step.solver import Solver
 
         body = mca.Body(name="block", geometry=geometry, material=MATERIAL, kinematics=kinematics)
         scene = mca.Scene(name="imposed", bodies=(body,), impact=mca.ImpactPhase(duration=1.0))

@@ -23,7 +23,7 @@ def impulse(result: mca.Result) -> NDArray[np.float64]:
 def springs(setup: Setup, scene: mca.Scene) -> float:
     """Stiffness of all springs of the scene's contact together [N/m]: it depends on the faces of the element."""
     from warp_mca.model.build import build_model
-    from warp_mca.model.cells import nodal_masses
+    from warp_mca.physics.elements.cells import nodal_masses
     from warp_mca.rigid.handoff import hand_off
 
     scene = setup.with_element(scene)

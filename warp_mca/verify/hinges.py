@@ -202,8 +202,8 @@ def pinned_double_pendulum(setup: Setup) -> list[Row]:
 
 def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
     """Tip, hinge A and kinetic energy at the end of a swing, for links of rising stiffness."""
-    from warp_mca.model.cells import nodal_masses
-    from warp_mca.runs.simulation import mesh
+    from warp_mca.phases.simulation import mesh
+    from warp_mca.physics.elements.cells import nodal_masses
 
     moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))
     start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}

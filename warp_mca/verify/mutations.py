@@ -106,7 +106,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "one_density": Mutation(
         "every part of a body takes the density of its first material",
-        "warp_mca/model/cells.py",
+        "warp_mca/physics/elements/cells.py",
         "rho[cells] = material.rho",
         "rho[cells] = body_materials(body, mesh)[0][0].rho",
     ),
@@ -273,7 +273,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "dashpots_stiff_in_shear": Mutation(
         "dashpots of absorbing boundaries resist shear with rho c_p in place of rho c_s",
-        "warp_mca/model/absorbing.py",
+        "warp_mca/physics/absorbing/nodes.py",
         "(rho * c_p, rho * c_s)",
         "(rho * c_p, rho * c_p)",
     ),

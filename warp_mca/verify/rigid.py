@@ -174,10 +174,10 @@ def chain_energy(setup: Setup) -> list[Row]:
 )
 def handoff_conservation(setup: Setup) -> list[Row]:
     """The two-link manipulator at contact with inertia="mesh"; then back, with and without a vibration on top."""
-    from warp_mca.model.cells import nodal_masses
+    from warp_mca.phases.simulation import mesh
+    from warp_mca.physics.elements.cells import nodal_masses
     from warp_mca.rigid.handback import hand_back
     from warp_mca.rigid.handoff import hand_off
-    from warp_mca.runs.simulation import mesh
 
     scene = setup.with_element(setup.scene("two_link", rigid_inertia="mesh", duration=1e-6))
     meshes = mesh(scene)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.files import check_folder
-from warp_mca.elements import ELEMENTS
-from warp_mca.solve.device import check_device
+from warp_mca.physics.elements import ELEMENTS
+from warp_mca.step.device import check_device
 from warp_mca.verify import cases
 from warp_mca.verify.case import Case, Level, Setup
 from warp_mca.verify.report import Outcome, lines, write

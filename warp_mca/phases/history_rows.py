@@ -1,0 +1,113 @@
+"""Owns the columns of the history of a run, and the history of each contact, from the rows that a ledger keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.kernels.records.columns import (
+    IMPULSE,
+    NORMAL_ENERGY,
+    NORMAL_FORCE,
+    NORMAL_IMPULSE,
+    PRESSURE,
+    STICK_IMPULSE,
+)
+from warp_mca.results.contact_history import ContactHistory
+
+if TYPE_CHECKING:
+    from warp_mca.watch.ledger import Ledger
+
+Array = NDArray[np.float64]
+
+
+def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
+    """The columns of history.csv from row `first` on, each shape (row_count,), float64.
+
+    Forces are means over the interval before.
+    """
+    model, steps, kept = ledger.model, ledger.steps, ledger.kept
+    table, energy = ledger.table(first), ledger.energies(first)
+    F_n, F_t, stick = _forces(ledger, ledger.springs(table))
+    velocity = np.array(kept.velocities[first:]).reshape(-1, len(model.points), 3)
+    velocity[:, model.points < 0] = np.nan
+    if model.points[1] < 0 and model.passes and model.passes[0].plane is not None:
+        velocity[:, 1] = model.passes[0].plane.velocity
+    stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
+    balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
+    absorbed = {"E_absorbed": energy["absorbed"]} if ledger.absorbs else {}
+    return {
+        "time_s": steps.interval * np.arange(first, kept.count, dtype=np.float64),
+        "F_n_N": F_n,
+        "F_t_N": F_t,
+        "stick_fraction": stick,
+        "tip_vx": velocity[:, 0, 0],
+        "tip_vy": velocity[:, 0, 1],
+        "plate_vx": velocity[:, 1, 0],
+        "E_kinetic": energy["kinetic"],
+        "E_internal": stored,
+        "E_plastic": energy["plastic"],
+        "E_contact": energy["contact"],
+        "E_friction": energy["friction"],
+        "E_total_error": balance - ledger.initial_energy,
+        "tip_vz": velocity[:, 0, 2],
+        "plate_vy": velocity[:, 1, 1],
+        "plate_vz": velocity[:, 1, 2],
+        "closing_speed": _closing_speed(ledger, first),
+        **absorbed,
+    }
+
+
+def _forces(ledger: Ledger, springs: Array) -> tuple[Array, Array, Array]:
+    """Normal and tangential force [N] and the share of the normal force that sticks [-], each shape (row_count,).
+
+    `springs` are the columns of each row and contact pass, shape (row_count, pass_count, PASS_COLUMNS).
+    """
+    model, share = ledger.model, ledger.contact_dt / ledger.steps.interval
+    F_n, F_t, stick = np.zeros(len(springs)), np.zeros(len(springs)), np.zeros(len(springs))
+    for k, item in enumerate(model.passes):
+        force = share * item.sign * springs[:, k, IMPULSE]
+        normal, tangent = model.contact_axes[item.contact]
+        F_n += force @ normal if normal.any() else share * springs[:, k, NORMAL_IMPULSE]  # see `Model.contact_axes`
+        F_t += force @ tangent
+    pressed, stuck = springs[:, :, NORMAL_IMPULSE].sum(axis=1), springs[:, :, STICK_IMPULSE].sum(axis=1)
+    np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
+    return F_n, F_t, stick
+
+
+def contact_histories(ledger: Ledger, names: Sequence[str]) -> tuple[ContactHistory, ...]:
+    """Each contact by itself, with these `names`."""
+    passes, springs = ledger.model.passes, ledger.springs(ledger.table())
+    share = ledger.contact_dt / ledger.steps.interval
+    found: list[ContactHistory] = []
+    for index, name in enumerate(names):
+        own = [k for k, item in enumerate(passes) if item.contact == index]
+        sign = np.array([passes[k].sign for k in own])
+        found.append(
+            ContactHistory(
+                name=name,
+                force=share * np.einsum("p,rpc->rc", sign, springs[:, own, IMPULSE]),
+                pressure=share * springs[:, own, NORMAL_IMPULSE].sum(axis=1),
+                normal_force=np.einsum("p,rpc->rc", sign, springs[:, own, NORMAL_FORCE]),
+                closing_speed=_closing_speed(ledger, 0, own),
+            )
+        )
+    return tuple(found)
+
+
+def _closing_speed(ledger: Ledger, first: int, passes: Sequence[int] | slice = slice(None)) -> Array:
+    """As in `ContactHistory`, of some passes, from row `first` on.
+
+    Normal forces do the work dE = sum(F_n v dt) on their springs. So the gain of these in an interval, over the normal
+    impulse by the trapezoidal rule, is the mean of v over nodes and time that is weighted with F_n.
+    """
+    rows = ledger.table(max(first - 1, 0))
+    springs = ledger.springs(rows)[:, passes].sum(axis=1)
+    gain, rise = np.diff(springs[:, NORMAL_ENERGY]), np.diff(springs[:, PRESSURE])
+    impulse = ledger.contact_dt * (springs[1:, NORMAL_IMPULSE] - 0.5 * rise)
+    speed: Array = np.full(len(rows), np.nan)
+    np.divide(gain, impulse, out=speed[1:], where=impulse > 0.0)
+    return speed[min(first, 1) :]

@@ -1,0 +1,291 @@
+"""Owns the impact phase: a solver, the state that it advances, and the only loop over its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import GuardError
+from warp_mca.base.garbage import few_collections
+from warp_mca.model.batch_model import join_models
+from warp_mca.model.layout import offsets
+from warp_mca.phases.division import divide_alike
+from warp_mca.phases.initial_overlap import settle_initial_overlap
+from warp_mca.phases.scene_run import SceneRun
+from warp_mca.physics.floating.frames import with_floating_frames
+from warp_mca.results.paths import join_probes
+from warp_mca.results.sensors import join_sensors
+from warp_mca.step.output import Output
+from warp_mca.step.records import SceneRecords
+from warp_mca.step.sensor_stage import SensorStage
+from warp_mca.step.solver import Solver
+from warp_mca.step.stage import Search
+from warp_mca.step.state import State
+from warp_mca.step.steps import Part, Steps
+from warp_mca.step.transfer import Transfer
+from warp_mca.step.workspace import ROWS
+from warp_mca.watch.looks import Looks
+from warp_mca.watch.passing import Watch
+
+if TYPE_CHECKING:
+    import os
+
+    from warp_mca.phases.prepare import Prepared
+    from warp_mca.recorders.frames import Recording
+    from warp_mca.recorders.recorder import SurfaceMesh
+
+
+Array = NDArray[np.float64]
+
+
+class Impact:
+    """The impact phase of one scene, or of those of a batch side by side.
+
+    Attributes:
+        ready: the scenes at its start.
+        steps: how it is divided.
+        solver: that advances it.
+        state: all that changes.
+        scene_runs: records and result of each scene.
+        stopped: which guard stopped each scene, in one sentence, or None.
+        recording: recorders of a lone scene, or None.
+    """
+
+    def __init__(
+        self,
+        ready: Sequence[Prepared],
+        span: float,
+        *,
+        device: str,
+        precision: str,
+        threads: int,
+        skins: Mapping[str, SurfaceMesh] | None = None,
+        needs: frozenset[str] = frozenset(),
+        shape: Callable[[Solver, State], None] | None = None,
+    ) -> None:
+        """Allocate, compile and settle what overlaps.
+
+        Args:
+            ready: scenes with the same output interval and contacts of the same kinds.
+            span: simulated time [s].
+            device, precision, threads: as in `warp_mca.run`; threads are not None.
+            skins: surfaces of bodies that recorders show, by body.
+            needs: of recorders.
+            shape: gives the new state what earlier impacts left, and springs that press what then overlaps; None for
+                bodies without displacement or stress.
+
+        Raises:
+            RequestError: steps cannot be chosen, or bodies overlap that must not.
+        """
+        self.ready = tuple(ready)
+        self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
+        model = join_models([item.model for item in ready])
+        model = with_floating_frames(model, [item.scene for item in ready], span, precision)
+        self.solver = Solver(model, device=device, precision=precision, dt=self.steps.dt, threads=threads)
+        probes = join_probes([(item.probes, item.model.node_count) for item in ready])
+        if skins or len(probes.corner):
+            self.solver.output = Output(self.solver, skins or {}, probes, needs)
+        if any(item.sensors.channels for item in ready):
+            sensors = join_sensors([(item.sensors, item.model) for item in ready])
+            self.solver.sensors = SensorStage(self.solver, sensors)
+        self.solver.compile()
+        self.state = self.solver.new_state()
+        if shape:
+            shape(self.solver, self.state)
+        self.solver.begin(self.state)
+        if not shape:
+            settle_initial_overlap(self.ready, self.solver, self.state)
+        self.solver.start(self.state)
+        self.stopped: list[str | None] = [None] * len(self.ready)
+        self.recording: Recording | None = None
+        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span) for item in ready]
+        self._begin_scenes()
+
+    def _begin_scenes(self) -> None:
+        first = offsets([len(item.probes.corner) for item in self.ready])
+        channel = offsets([item.sensors.channels for item in self.ready])
+        self.scene_runs = [
+            SceneRun(item, self.steps, self.solver, self.state, self._watches[k], k, int(first[k]), int(channel[k]))
+            for k, item in enumerate(self.ready)
+        ]
+
+    def load(self, path: str | os.PathLike[str]) -> None:
+        """Go on from a state that `save` stored.
+
+        Raises:
+            RequestError: as in `State.load`.
+        """
+        self.state.load(path, self.solver.model, self.solver.dt)
+        self.stopped = [None] * len(self.ready)
+        self._begin_scenes()
+
+    def save(self, path: str | os.PathLike[str], more: Mapping[str, NDArray] | None = None) -> None:
+        """Store the state, and `more` arrays with it, between two calls of `advance`.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        self.state.save(path, self.solver.model, self.solver.dt, more)
+
+    def divide_anew(self, steps: Steps) -> list[SceneRecords]:
+        """Go on with other intervals of the same time step: rows begin anew, energies and extremes go on.
+
+        Returns:
+            What each scene has recorded so far.
+        """
+        earlier = self.state.scenes
+        self.state.scenes = [records.without_rows(self.state.steps * self.solver.dt) for records in earlier]
+        self.state.steps = 0
+        self.take(steps)
+        return earlier
+
+    def take(self, steps: Steps) -> None:
+        """Divide the phase, what is done of it included, by intervals of the same time step."""
+        self.steps = steps
+        self._begin_scenes()
+
+    @property
+    def rows(self) -> int:
+        """Rows of the history so far, the most of any scene."""
+        return max(item.ledger.kept.count for item in self.scene_runs)
+
+    def advance(
+        self, until: int | None = None, told: Callable[[], None] = lambda: None, ended: Callable[[], bool] | None = None
+    ) -> None:
+        """Search for contact, record and step, until so many steps are done, or all.
+
+        Args:
+            until: number of steps since the start of the phase at which to pause; all if None.
+            told: called when records have been read.
+            ended: asked at each row of the history whether the phase ends there; records are then read as they come.
+        """
+        if None not in self.stopped or self.state.steps > self.steps.count:
+            return  # with the last record of all
+        with suppress(GuardError), few_collections():  # the error is that of the last scene
+            _Loop(self, told, ended).run(until)
+
+    def at_last_record(self) -> tuple[Array, Array]:
+        """Displacements [m] and velocities [m/s] of the nodes at the last record, each shape (node_count, 3), float64.
+
+        A record is followed by a step, which is taken back.
+        """
+        u, after, dt = self.solver.nodes.at_record(self.state)
+        v = after.numpy()
+        return u.numpy() - dt * v, 0.5 * (self.solver.work.v_before.numpy() + v)
+
+    def read(self, written: int, records: Mapping[str, NDArray]) -> None:
+        """Hand records to each scene that no guard has stopped.
+
+        Raises:
+            GuardError: a guard stops the last one.
+        """
+        for k, scene_run in enumerate(self.scene_runs):
+            if self.stopped[k] is None:
+                try:
+                    scene_run.read(written, records)
+                except GuardError as error:
+                    self.stopped[k] = str(error)
+                    if None not in self.stopped:
+                        raise
+
+
+class _Loop:
+    """One call of `Impact.advance`: launches, and records on their way to the host."""
+
+    def __init__(self, impact: Impact, told: Callable[[], None], ended: Callable[[], bool] | None) -> None:
+        self.impact, self.told, self.ended = impact, told, ended
+        self.solver, self.state, self.steps = impact.solver, impact.state, impact.steps
+        with wp.ScopedDevice(self.solver.device):
+            self.solver.work.row.fill_(ROWS - 1)
+        self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
+        self.looks = Looks(self.solver, self.state, impact.scene_runs)
+        self.written = 0
+        if ended:  # each part of the ring is waited for
+            self.solver.replay.note_ahead(self.state)
+
+    def run(self, until: int | None) -> None:
+        """As `Impact.advance`."""
+        last = self.steps.count if until is None else min(until, self.steps.count)
+        interval = self.state.steps // self.steps.per_interval
+        while self.state.steps < last and not self._ends(interval):
+            self._interval(interval, last)
+            interval += 1
+        if until is None or self.state.steps >= self.steps.count:
+            if self.written == ROWS:
+                self._send()
+            self.looks.watch(last=True)
+            self._record(1, self.state.steps // self.steps.per_interval, True)
+        self.looks.finish()
+        if self.written:
+            self._send()
+        if self.impact.recording:
+            self.impact.recording.catch_up(self._receive_arrived)
+        while self.transfer.pending:
+            self._receive()
+
+    def _ends(self, interval: int) -> bool:
+        """Whether the phase ends with this row, by what the rows before it say."""
+        if self.ended is None or self.state.steps != interval * self.steps.per_interval:
+            return False
+        return self.ended()
+
+    def _interval(self, interval: int, last: int) -> None:
+        """The steps of an output interval that are not done yet, up to step `last`."""
+        first = interval * self.steps.per_interval
+        if self.state.steps == first:
+            self.looks.row(interval, self.steps.intervals)
+        for number, part in enumerate(self.steps.parts(interval)):
+            end = first + part.count
+            if self.state.steps < min(end, last):
+                self._part(part, first, min(end, last), interval if number == 0 else None)
+            first = end
+
+    def _part(self, part: Part, first: int, end: int, row: int | None) -> None:
+        """Steps that follow each other without a look from outside, from the present one to `end`."""
+        if self.state.steps == first:  # not interrupted in between
+            self.looks.watch()
+            if part.begins_check and self.written == ROWS:
+                self._send()
+            count = self.looks.until(end - first, part.count)
+            if part.begins_check:
+                self._record(count, row, part.begins_search)
+            elif part.begins_search:
+                self.solver.search(self.state)
+        while self.state.steps < end:
+            if self.state.steps > first:
+                self.looks.watch(part.count)
+            self.solver.step(self.state, self.looks.until(end - self.state.steps, part.count))
+
+    def _record(self, count: int, row: int | None, searches: bool = False) -> None:
+        """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
+        recording = self.impact.recording
+        needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
+        search: Search = ("after" if self.steps.spare else "before") if searches else ""
+        self.solver.record_and_step(self.state, count, needs, row is not None, search)
+        self.written += 1
+        if recording and row is not None:
+            recording.take(row, needs)
+
+    def _send(self) -> None:
+        if self.transfer.full:
+            if self.impact.recording:
+                self.impact.recording.work(lambda: self.transfer.arrived)
+            if not self.transfer.arrived:  # the device has two parts more to compute
+                self.solver.replay.note_ahead(self.state)
+            self._receive()
+        self.transfer.send(self.written)
+        self.written = 0
+        self._receive_arrived()
+
+    def _receive_arrived(self) -> None:
+        while self.transfer.arrived or (self.ended and self.transfer.pending):
+            self._receive()
+
+    def _receive(self) -> None:
+        self.impact.read(*self.transfer.receive())
+        self.told()

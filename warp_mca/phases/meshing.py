@@ -1,0 +1,152 @@
+"""Owns the meshes of a scene's bodies: each recipe meshed once, checked, cut where a formulation asks for it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from warp_mca.base import validate
+from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry.cell_types import CELL_TYPES
+from warp_mca.geometry.degenerate import cut_to
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.refinement import refined
+from warp_mca.geometry.shape_volume import built
+from warp_mca.phases.arguments import check_scene
+from warp_mca.physics.elements import ELEMENTS, default_element
+from warp_mca.scene import Body, Scene
+
+
+def mesh(
+    scene: Scene, made: dict[object, Mesh] | None = None, given: Mapping[str, Mesh] | None = None
+) -> dict[str, Mesh]:
+    """The mesh of every body, checked.
+
+    Args:
+        scene: whose bodies to mesh.
+        made: meshes by recipe, for scenes that share some; those made here are added.
+        given: finished meshes by body, in place of the bodies' own geometry.
+
+    Raises:
+        RequestError: an element is inverted, a mesh is not whole or not given, a recipe or file cannot be turned into a
+            mesh, or an element was chosen that no body can take.
+    """
+    from warp_mca.geometry.quality import check
+
+    check_scene("scene", scene)
+    if given is not None:
+        validate.kind_of("meshes", given, Mapping, "give a Mesh for each body by its name, as mca.mesh makes them")
+    meshes = {}
+    made = {} if made is None else made
+    for body in scene.bodies:
+        if given is not None and body.name not in given:
+            raise bad_value("meshes", list(given), f"give a mesh of body {body.name} too")
+        geometry = _geometry(scene, body) if given is None else given[body.name]
+        if given is not None:
+            validate.kind_of(f"meshes[{body.name!r}]", geometry, Mesh, "give a finished Mesh, as mca.mesh makes it")
+        key = _key(geometry)
+        if key not in made:
+            made[key] = geometry if isinstance(geometry, Mesh) else _build(scene, body, geometry)
+            check(made[key], body.name)
+        meshes[body.name] = made[key]
+    cut = _cut(scene, meshes)
+    _check_elements(scene, cut)
+    for name, item in cut.items():
+        if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
+            check(item, name)
+    for field, body, name, covers in scene.named_sets():
+        _check_set(field, body, name, cut[body], covers)
+    return cut
+
+
+def _check_set(field: str, body: str, name: str, mesh: Mesh, covers: bool) -> None:
+    """Refuse a node set that the mesh of a body does not have, or that does not cover faces where it must.
+
+    Raises:
+        RequestError: so it is.
+    """
+    try:
+        mesh.surface(name) if covers else mesh.nodes(name)
+    except RequestError as error:
+        raise RequestError(f"{field} of body {body}, {error}") from error
+
+
+def _geometry(scene: Scene, body: Body) -> object:
+    """The mesh or recipe of a body, finer or coarser where the scene asks for it.
+
+    Raises:
+        RequestError: it cannot be made so.
+    """
+    if scene.refine == 1.0:
+        return body.geometry
+    try:
+        return refined(f"body {body.name}", body.geometry, scene.refine)
+    except RequestError as error:
+        raise _of_refine(scene, body, error) from error
+
+
+def _build(scene: Scene, body: Body, geometry: object) -> Mesh:
+    """The mesh of a recipe, which may be the user's own.
+
+    Raises:
+        RequestError: its `build` failed or returned something else than a mesh.
+    """
+    field, recipe = f"Body {body.name}.geometry", type(geometry).__name__
+    try:
+        made = validate.call(field, recipe, "build()", lambda: built(field, geometry))  # type: ignore[arg-type]
+    except RequestError as error:
+        raise (error if geometry == body.geometry else _of_refine(scene, body, error)) from error
+    validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
+    return made
+
+
+def _of_refine(scene: Scene, body: Body, error: RequestError) -> RequestError:
+    """The error, which names `refine` where it is of a value that the recipe has from this."""
+    field = re.match(r"(\w+)\.(\w+) = ", str(error))
+    if field is None or field[2] == "path":
+        return error
+    own = type(body.geometry).__name__ == field[1] and getattr(body.geometry, field[2], None)
+    return error if str(error).startswith(f"{field[0]}{own!r}:") else bad_value("refine", scene.refine, str(error))
+
+
+def _key(geometry: object) -> object:
+    """What equal recipes share; a mesh, and a recipe that cannot be hashed, is like itself alone."""
+    try:
+        hash(geometry)
+    except TypeError:
+        return _Itself(geometry)
+    return geometry
+
+
+class _Itself:
+    """Equal for one object alone, which it keeps: the id of one that is gone may be that of the next."""
+
+    def __init__(self, item: object) -> None:
+        self.item = item
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and other.item is self.item
+
+    def __hash__(self) -> int:
+        return id(self.item)
+
+
+def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
+    """The meshes, cut to the cell type of each body's element where that is possible."""
+    return {body.name: cut_to(meshes[body.name], ELEMENTS[body.element].cell) for body in scene.bodies}
+
+
+def _check_elements(scene: Scene, meshes: Mapping[str, Mesh]) -> None:
+    """Refuses elements that were chosen, as other than the first of their cell type, and compute no cell.
+
+    Raises:
+        RequestError: there is one.
+    """
+    for element in ELEMENTS.values():
+        asked = [body for body in scene.bodies if body.element == element.name]
+        taken = any(len(meshes[body.name].cells[element.cell]) for body in asked if not body.rigid)
+        if asked and not taken and element is not default_element(element.cell):
+            names = ", ".join(body.name for body in asked)
+            cell = CELL_TYPES[element.cell].field
+            remedy = f"it computes {cell}, of which {names} {'has' if len(asked) == 1 else 'have'} none that deform"
+            raise bad_value("element", element.name, f"{remedy}; leave it out")

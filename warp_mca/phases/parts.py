@@ -1,0 +1,69 @@
+"""Owns what each phase of a cycle adds to a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.phases.impact import Impact
+from warp_mca.phases.motion import Motion
+from warp_mca.rigid.handback import HandBack
+from warp_mca.rigid.swing import Swing
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwingPart:
+    """What a rigid phase adds to a run.
+
+    Attributes:
+        motion: at its beginning.
+        swing: how the chain moved.
+        kinetic: of the other bodies, which move on as they are [J].
+        stopped: why the run ends here, in one sentence, or None.
+    """
+
+    motion: Motion
+    swing: Swing
+    kinetic: float
+    stopped: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactPart:
+    """What an impact phase adds to a run.
+
+    Attributes:
+        start, end: time from the release [s].
+        ended_by: "separation", "duration" or "t_end".
+        impact: as it ended.
+        theta: angles of the links at the start [rad], shape (link_count,), float64.
+        jump: kinetic energy of the nodes at the start less that of the rigid bodies [J].
+        settled: strain energy that the shape lost when it settled at the start [J].
+        back: the way back to rigid bodies; None where the run ends with the impact.
+        lost: energy of vibration that the way back leaves out [J].
+        jump_back: kinetic energy of the chain that swings on, less that of its nodes' rigid motion [J].
+        hinge_impulse: that the inbound hinge of each link, by its body, gave when the motion became rigid [N s], shape
+            (2,), float64.
+        stopped: why the run ends here, in one sentence, or None.
+    """
+
+    start: float
+    end: float
+    ended_by: str
+    impact: Impact
+    theta: Array
+    jump: float
+    settled: float
+    back: HandBack | None = None
+    lost: float = 0.0
+    jump_back: float = 0.0
+    hinge_impulse: Mapping[str, Array] = field(default_factory=dict)
+    stopped: str | None = None
+
+
+Part = SwingPart | ImpactPart

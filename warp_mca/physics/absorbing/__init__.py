@@ -1,0 +1,1 @@
+"""Absorbing boundaries."""

@@ -1,0 +1,129 @@
+"""Owns the stage of absorbing boundaries: their nodes move against dashpots, and what these take up is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
+from warp_mca.kernels.nodes.node import LEVEL_BIT
+from warp_mca.kernels.records.absorbing import sum_absorbed
+from warp_mca.kernels.records.columns import absorbing_column
+from warp_mca.model.layout import Layout
+from warp_mca.physics.elements.stage import BLOCK_DIM
+from warp_mca.step.stage import Stage, Step
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.step.node_stage import NodeStage
+    from warp_mca.step.record_stage import RecordStage
+    from warp_mca.step.state import State
+
+
+@dataclass(eq=False)
+class AbsorbingState:
+    """What absorbing boundaries have taken up; empty where a scene has none.
+
+    Attributes:
+        impulse: given by each of their nodes to what lies beyond up to t(n) [N s], shape (count,), vec3d.
+        impulse_after: the same half a step later [N s], shape (count,), vec3d.
+        absorbed: energy that each node gave away, in the frame of its body, up to t(n) [J], shape (count,), float64.
+        absorbed_after: the same half a step later [J], shape (count,), float64.
+        stretch: displacement of each node less the way of its body [m], shape (count,), vec3d; empty without springs.
+    """
+
+    impulse: wp.array
+    impulse_after: wp.array
+    absorbed: wp.array
+    absorbed_after: wp.array
+    stretch: wp.array
+
+
+class AbsorbingStage:
+    """What `kernels.nodes.absorbing` reads and writes.
+
+    Attributes:
+        count: nodes of absorbing boundaries.
+        items, chains: of the kernel: those up to each level, and those of each.
+    """
+
+    def __init__(self, model: Model, layout: Layout, nodes: NodeStage, precision: str) -> None:
+        """Allocate on the current device."""
+        own, self.nodes, self.layout = model.absorbing, nodes, layout
+        self.count, self.model = len(own.node), model
+        if not self.count:
+            return
+        level = model.rates.node_level[own.node].astype(np.int32) if model.rates else np.zeros(self.count, np.int32)
+        step = (nodes.base * 2.0**level)[:, None, None]
+        decay = 0.5 * step * own.damping / model.mass[own.node, None, None]
+        item = np.arange(self.count, dtype=np.int32) + (level << LEVEL_BIT)
+        levels = range(model.rates.top + 1 if model.rates else 1)
+        self.items = [wp.array(item[level <= k], dtype=wp.int32) for k in levels]
+        self.chains = [wp.array(item[level == k], dtype=wp.int32) for k in levels]
+        self.dashpots = Dashpots()
+        self.dashpots.node = wp.array(own.node, dtype=wp.int32)
+        self.dashpots.damping = wp.array(own.damping, dtype=wp.mat33d)
+        stiffness = own.stiffness if own.sprung else own.stiffness[:0]
+        self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
+        self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
+        self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
+        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each, nodes.rated, nodes.turned)
+        first = np.searchsorted(own.node, layout.nodes)
+        self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
+        self.column = absorbing_column(len(model.passes) // layout.count)
+
+    def new_state(self) -> AbsorbingState:
+        """State before the first step, on the current device."""
+        return AbsorbingState(
+            impulse=wp.zeros(self.count, dtype=wp.vec3d),
+            impulse_after=wp.zeros(self.count, dtype=wp.vec3d),
+            absorbed=wp.zeros(self.count, dtype=wp.float64),
+            absorbed_after=wp.zeros(self.count, dtype=wp.float64),
+            stretch=wp.zeros(self.count if self.model.absorbing.sprung else 0, dtype=wp.vec3d),
+        )
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [self.kernel] if self.count else []
+
+    def record_kernels(self) -> list[Any]:
+        """Those of a record."""
+        return [sum_absorbed] if self.count else []
+
+    def record_stages(self, records: RecordStage) -> list[Stage]:
+        """Those of a record, after all nodes have moved."""
+        return [Stage("absorbed energy", lambda s: self._sum(s, records), only_records=True)] if self.count else []
+
+    def active(self, level: int | None, chain: int | None) -> wp.array:
+        """Its nodes up to a level, or all; of one level where a chain is given. As the kernel takes them."""
+        if not self.count:
+            return wp.zeros(0, dtype=wp.int32)
+        return self.chains[chain] if chain is not None else self.items[-1 if level is None else level]
+
+    def advance(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
+        """The nodes that are `active`, with forces of elements up to a level, or of all."""
+        work, state, own, item = self.nodes.work, step.state, step.state.absorbing, self.active(level, chain)
+        inputs = [item, self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
+        inputs += [work.force, work.frames(state), self.nodes.scene, self.nodes.gravity, self.nodes.base]
+        outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
+        outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
+        wp.launch(self.kernel, len(item), inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+    def _sum(self, step: Step, records: RecordStage) -> None:
+        """Energy absorbed and work of what lies beyond, in the record."""
+        own = step.state.absorbing
+        inputs = [self.column, self.first, self.dashpots.velocity, own.impulse, own.absorbed]
+        records.sum_runs(sum_absorbed, self.most, inputs)
+
+    def impulses(self, state: State, scene: int = 0) -> dict[str, list[float]]:
+        """Impulse that each body of a scene gave to what lies beyond its absorbing boundaries [N s], by name."""
+        names = [name for name in self.model.node_start if self.layout.count == 1 or name.startswith(f"{scene}/")]
+        starts = [self.model.node_start[name] for name in names]
+        bounds = np.searchsorted(self.model.absorbing.node, [*starts, self.layout.nodes[scene + 1]])
+        impulse = state.absorbing.impulse.numpy()
+        spans = zip(names, bounds[:-1], bounds[1:], strict=True)
+        own = {name: impulse[first:end].sum(axis=0).tolist() for name, first, end in spans if end > first}
+        return own if self.layout.count == 1 else {name.split("/", 1)[1]: value for name, value in own.items()}

@@ -1,0 +1,1 @@
+"""Contact: springs between slave nodes and the faces of masters."""

@@ -1,0 +1,50 @@
+"""Owns the greatest normal force of any step: sums of whole numbers, which do not depend on the order of nodes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import warp as wp
+
+from warp_mca.physics.contact.surfaces import ContactPass
+from warp_mca.step.threads import RANGES
+
+_BITS = 60  # of the whole numbers, below their sign, that springs as deep as their faces are long would fill
+_LARGEST = 1000  # exponent of a scale that a float64 holds, whatever the springs
+_LINE = 8  # numbers in a line of a CPU's cache: two threads that write to one wait for each other
+
+
+class NormalForce:
+    """How normal forces of all springs of a step are summed for each scene: `State.normal_force` holds the sums.
+
+    Attributes:
+        per_newton: what the sums count for a newton [1/N], a power of two; see `kernels.hardware.per_scene`.
+    """
+
+    def __init__(self, scenes: Sequence[Sequence[ContactPass]], threads: int) -> None:
+        """For the passes of each scene, none where no scene has contact, and for as many threads of a CPU."""
+        ranges = RANGES * threads if threads > 1 else 1
+        self._shape = (1 + ranges if scenes else 0, -(-len(scenes) // _LINE) * _LINE)
+        self._scales = [_scale(passes) for passes in scenes]
+        self.per_newton: Any = self._scales[0] if len(scenes) == 1 else wp.array(self._scales, dtype=wp.float64)
+
+    def new_state(self) -> wp.array:
+        """The greatest sum of any step, then a row of sums of the present step for each range of slaves.
+
+        Shape (1 + range_count, column_count), int64; a column for each scene, and some that stay 0.
+        """
+        return wp.zeros(self._shape, dtype=wp.int64)
+
+    def greatest(self, sums: wp.array, scene: int) -> float:
+        """Greatest normal force of a scene in any step [N]; 0 without contact."""
+        return float(sums.numpy()[0, scene]) / self._scales[scene] if self._scales else 0.0
+
+
+def _scale(passes: Sequence[ContactPass]) -> float:
+    """What sums count for a newton [1/N]: guards stop a run before forces come near the largest whole number."""
+    stiffness = [item.stiffening * item.sides * float(item.stiffness.sum()) for item in passes]
+    reach = [k * max(item.longest, item.deepest) for k, item in zip(stiffness, passes, strict=True)]
+    _, exponent = math.frexp(sum(reach))
+    return 2.0 ** min(max(_BITS - exponent, -_LARGEST), _LARGEST)

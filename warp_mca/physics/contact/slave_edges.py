@@ -1,0 +1,76 @@
+"""Owns the springs of slave nodes on the device, and the edges of slaves that rest on edges of a master."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.kernels.contact import contact, edge_shares, edges, spring
+from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.step.threads import CONTACT, Split
+
+if TYPE_CHECKING:
+    from warp_mca.physics.contact.stage import ContactStage, ContactState
+    from warp_mca.step.state import State
+    from warp_mca.step.workspace import Workspace
+
+
+def new_springs(stage: ContactStage) -> Any:
+    """Springs that no face presses. Where some begin free of stress, their resting depth is 0."""
+    count, found = int(stage.springs[-1]), spring.Spring()
+    sided = count if stage.sides > 1 else 0
+    numbers = "energy friction drive normal_impulse stick_impulse depth lost made stiffness"
+    for name in ("tangential", "force", "impulse"):
+        setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
+    for name in numbers.split():
+        setattr(found, name, wp.zeros(count, dtype=wp.float64))
+    found.normal_energy = wp.zeros(0 if stage.law == LINEAR else count, dtype=wp.float64)
+    found.parameters = stage.parameters
+    found.rest = wp.zeros(count if stage.stress_free else sided, dtype=wp.float64)
+    found.left = wp.zeros(sided, dtype=wp.float64)
+    found.share = wp.full(sided, 1.0, dtype=wp.float64)
+    found.support = wp.full(sided, -1, dtype=wp.int32)
+    found.bears = wp.zeros(sided, dtype=wp.int32)
+    found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
+    found.face = wp.full(count, -1, dtype=wp.int32)
+    found.weight = wp.zeros(count, dtype=wp.vec4d)
+    return found
+
+
+class SlaveEdges:
+    """Slave nodes with the faces around them, and the kernels that let edges of these faces rest on the master.
+
+    Attributes:
+        faces: `kernels.contact.edges.SlaveFaces`.
+        carry, find: kernels of a step and of a search; see `kernels.contact.edge_shares`.
+    """
+
+    def __init__(self, stage: ContactStage, face: NDArray[np.int32], rows: tuple[wp.array, wp.array]) -> None:
+        """`face`: of the slave, shape (face_count, 4); `rows`: those around each slave node, compressed."""
+        self.carry = edge_shares.carry_kernel(stage.sides)
+        self.find = edge_shares.along_edges_kernel(stage.each, stage.sides)
+        number = np.full(stage.node_count, -1, np.int32)
+        number[np.concatenate([item.slave for item in stage.items])] = np.arange(len(stage.slave))
+        self.faces = edges.SlaveFaces()
+        self.faces.node, self.faces.stiffness = stage.slave, stage.stiffness
+        self.faces.face, self.faces.number = (wp.array(values, dtype=wp.int32) for values in (face, number))
+        self.faces.offset, self.faces.face_of_slave = rows
+
+    def list_faces(self, stage: ContactStage, work: Workspace, state: State, u: wp.array) -> None:
+        """Add to the lists of a search the faces along edges from nodes that slid off a side."""
+        own = state.contacts[stage.index]
+        inputs = [stage.bvh.id, work.X, u, self.faces, stage.side, stage.slave_scene, stage.origin, own.spring]
+        lists = [own.count, own.candidate, own.face_count, own.face_slave]
+        wp.launch(self.find, len(stage.slave), inputs, [*lists, state.flag])
+
+    def launch(self, work: Workspace, own: ContactState, split: Split) -> None:
+        """Add their share of the force on each edge to the inner nodes."""
+
+        def launch(part: slice) -> None:
+            inputs = [part.start, self.faces, own.spring]
+            wp.launch(self.carry, part.stop - part.start, inputs, [work.contact_force], block_dim=contact.BLOCK_DIM)
+
+        split(len(self.faces.node), launch, CONTACT)

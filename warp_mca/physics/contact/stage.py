@@ -1,0 +1,285 @@
+"""Owns the device side of contact: one pass of the scene, or of each scene of a batch, in the same launches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.kernels.contact import contact, nearest, search, sides
+from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
+from warp_mca.model.layout import offsets
+from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
+from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
+from warp_mca.step.threads import CONTACT, Split, whole
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.physics.contact.extremes import NormalForce
+    from warp_mca.step.state import State
+    from warp_mca.step.workspace import Workspace
+
+
+def per_scene(first: NDArray[np.int32]) -> Any:
+    """Scene of each entry for kernels: 0 where there is one scene, else an array; see `kernels.hardware.per_scene`."""
+    if len(first) == 2:
+        return 0
+    return wp.array(np.repeat(np.arange(len(first) - 1), np.diff(first)), dtype=wp.int32)
+
+
+def _numbers(values: Sequence[float]) -> Any:
+    """A number of each scene, as kernels take it."""
+    return values[0] if len(values) == 1 else wp.array(list(values), dtype=wp.float64)
+
+
+def _vectors(values: Sequence[Any]) -> Any:
+    """A vector of each scene, as kernels take it."""
+    return wp.vec3d(*values[0]) if len(values) == 1 else wp.array(np.asarray(values), dtype=wp.vec3d)
+
+
+def has_sides(model: Model) -> bool:
+    """Whether a master of the model has several sides, which need the latest forces on nodes."""
+    return any(item.sides > 1 for item in model.passes)
+
+
+@dataclass(eq=False)
+class ContactState:
+    """State of a contact pass; lists are those of the latest search, and empty on a rigid plane.
+
+    Attributes:
+        spring: of each slave node and side, those of slave 0 first; `kernels.contact.spring.Spring` lists its arrays.
+        count: faces in the list of each slave and side [-], shape (spring_count,), int32.
+        candidate: these faces [-], shape (spring_count, LIST_LENGTH), int32.
+        face_count: slaves in the list of each master face [-], shape (face_count,), int32.
+        face_slave: these slaves, sorted [-], shape (face_count, room), int32.
+        u_search: displacement of slaves and masters at the search [m], shape (node_count,), vec3d.
+    """
+
+    spring: Any
+    count: wp.array
+    candidate: wp.array
+    face_count: wp.array
+    face_slave: wp.array
+    u_search: wp.array
+
+
+class ContactStage:
+    """Device side of one contact pass.
+
+    Attributes:
+        items: the pass of each scene; no slave meets the faces of another scene.
+        index: of the pass in a scene; its state is `State.contacts[index]`.
+        column: of its sums in a record.
+        sides: of the master, the most of any scene; each slave has a spring and a list of faces for each.
+        springs, first: first spring of each scene, and the number of all, shape (scene_count + 1,), int32, on the host
+            and on the device.
+    """
+
+    def __init__(self, items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> None:
+        """Allocate on the current device; `normal_force` says how normal forces are summed."""
+        self.items, self.index, self.column = items, index, PASS + PASS_COLUMNS * index
+        self.per_newton, self.node_count = normal_force.per_newton, model.node_count
+        self.each = len(items) > 1
+        self.sides = max(item.sides for item in items)
+        self.noted = has_sides(model)
+        slaves = offsets([len(item.slave) for item in items])
+        self.springs = self.sides * slaves
+        self.first = wp.array(self.springs, dtype=wp.int32)
+        self.slave_scene = per_scene(slaves)
+        self.slave = wp.array(self._join("slave"), dtype=wp.int32)
+        self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
+        self.mu = _numbers([item.mu for item in items])
+        self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
+        self.law = items[0].law
+        rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
+        self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
+        friction = any(item.mu > 0.0 for item in items)
+        if items[0].plane is not None:
+            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.law)
+            self._make_planes()
+            return
+        self.kernel = (
+            contact.surface_kernel(friction, self.each, self.stress_free, self.law, self.noted)
+            if self.sides == 1
+            else sides.sided_kernel(friction, self.each, self.sides, self.law)
+        )
+        self.lanes = contact.LANES if wp.get_device().is_cuda else 1
+        self.react, self.bounds = (
+            contact.react_kernel(self.each, self.lanes, self.noted),
+            search.bounds_kernel(self.each),
+        )
+        self.find = search.candidates_kernel(self.each, self.sides)
+        self.clear = search.clear_kernel(self.each, self.sides)
+        self._make_faces(model)
+
+    def _join(self, name: str) -> NDArray:
+        return np.concatenate([getattr(item, name) for item in self.items])
+
+    def _rows(self, face: str, offset: str, number: str) -> tuple[wp.array, wp.array]:
+        """Compressed rows of all scenes, which count faces and entries on."""
+        faces, entries = (offsets([len(getattr(item, name)) for item in self.items]) for name in (face, number))
+        rows = [getattr(item, offset)[:-1] + start for item, start in zip(self.items, entries, strict=False)]
+        numbers = [getattr(item, number) + start for item, start in zip(self.items, faces, strict=False)]
+        return (
+            wp.array(np.append(np.concatenate(rows), entries[-1]), dtype=wp.int32),
+            wp.array(np.concatenate(numbers), dtype=wp.int32),
+        )
+
+    def new_state(self) -> ContactState:
+        """Springs that no face presses, and empty lists, on the current device."""
+        surface = not self.on_plane
+        lists, faces = (int(self.springs[-1]), len(self.face)) if surface else (0, 0)
+        room = max(item.room for item in self.items)
+        return ContactState(
+            spring=new_springs(self),
+            count=wp.zeros(lists, dtype=wp.int32),
+            candidate=wp.zeros((lists, LIST_LENGTH), dtype=wp.int32),
+            face_count=wp.zeros(faces, dtype=wp.int32),
+            face_slave=wp.zeros((faces, room), dtype=wp.int32),
+            u_search=wp.zeros(self.node_count if surface else 0, dtype=wp.vec3d),
+        )
+
+    def _make_planes(self) -> None:
+        planes = [item.plane for item in self.items if item.plane is not None]
+        normals = [np.asarray(plane.normal, dtype=float) for plane in planes]
+        unit = [normal / np.linalg.norm(normal) for normal in normals]
+        self.planes = [_vectors([p.point for p in planes]), _vectors(unit), _vectors([p.velocity for p in planes])]
+        self.deepest = _numbers([item.deepest for item in self.items])
+
+    def _make_faces(self, model: Model) -> None:
+        faces = offsets([len(item.face) for item in self.items])
+        masters = offsets([len(item.master) for item in self.items])
+        self.margin = _numbers([item.margin for item in self.items])
+        self.longest = _numbers([item.longest for item in self.items])
+        self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
+        self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
+        self.face = wp.array(self._join("face"), dtype=wp.int32)
+        self.face_stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
+        self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
+        self.master = wp.array(self._join("master"), dtype=wp.int32)
+        self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
+        self.edges = None
+        if self.sides > 1:
+            rows = self._rows("slave_face", "slave_offset", "face_of_slave")
+            self.edges = SlaveEdges(self, self._join("slave_face"), rows)
+        self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
+        self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
+        self.bvh: Any = None
+
+    @property
+    def on_plane(self) -> bool:
+        """Whether the master is a rigid plane, in each scene."""
+        return self.items[0].plane is not None
+
+    @property
+    def is_replayable(self) -> bool:
+        """Whether a graph can hold the search: on a GPU, once a first search has built the tree of boxes."""
+        return not self.on_plane and self.bvh is not None and wp.get_device(self.slave.device).is_cuda
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of threads that look at the slaves."""
+        return -(-len(self.slave) // contact.BLOCK_DIM)
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        if self.on_plane:
+            return [self.kernel]
+        return [self.kernel, self.react, *([self.edges.carry] if self.edges else [])]
+
+    def search_kernels(self) -> list[Any]:
+        """Those of a search."""
+        if self.on_plane:
+            return []
+        return [self.bounds, self.find, self.clear, *([self.edges.find] if self.edges else [])]
+
+    def begin(self, work: Workspace, state: State) -> None:
+        """Note which slaves are clear of the master before the first step, after the first search."""
+        if not self.on_plane:
+            inputs = [self.bvh.id, work.X, state.u, self.slave, self.face, self.side, self.slave_scene, self.origin]
+            held = state.contacts[self.index].spring.held
+            wp.launch(self.clear, len(self.slave), inputs=[*inputs, self.longest], outputs=[held])
+
+    def search(self, work: Workspace, state: State) -> None:
+        """Broad phase: list what each slave may touch until the next search."""
+        self.find_boxes(work, state.u)
+        self.list_faces(work, state, state.u)
+
+    def find_boxes(self, work: Workspace, u: wp.array) -> None:
+        """First part of a search: boxes around the master's faces, and the tree of these."""
+        if self.on_plane:
+            return
+        inputs = [work.X, u, self.face, self.face_scene, self.origin, self.margin]
+        wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper])
+        if self.bvh is None:
+            self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
+        else:
+            self.bvh.refit()
+
+    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
+        """Second part of a search: the lists, which contact reads."""
+        if self.on_plane:
+            return
+        own, slaves = state.contacts[self.index], [work.X, u, self.slave]
+        own.face_count.zero_()
+        wp.launch(
+            self.find,
+            len(self.slave),
+            inputs=[self.bvh.id, *slaves, self.side, self.slave_scene, self.origin],
+            outputs=[own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag],
+        )
+        if self.edges:
+            self.edges.list_faces(self, work, state, u)
+        wp.launch(search.sort_lists, len(self.face), inputs=[own.face_count], outputs=[own.face_slave])
+        wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[own.u_search])
+
+    def launch(self, work: Workspace, state: State, dt: float, split: Split = whole) -> None:
+        """Contact forces of this pass, added to those on nodes; its normal forces, added to the sums of the step."""
+        own, first = state.contacts[self.index], iter(range(1, len(state.normal_force)))
+
+        def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
+            threads = lanes * (part.stop - part.start)
+            outputs: list[Any] = [work.contact_force, state.flag]
+            if not self.on_plane:
+                outputs.insert(1, state.recent_force)
+            if kernel is self.kernel:  # a row of sums for each range of slaves
+                outputs.insert(1, state.normal_force[next(first)])
+            wp.launch(kernel, threads, [part.start, *inputs], outputs, block_dim=contact.BLOCK_DIM)
+
+        nodes, slaves = [work.X, state.u, state.v], [self.slave, self.stiffness]
+        if self.on_plane:
+            inputs = [*nodes, *slaves, self.slave_scene, *self.planes, self.mu, self.deepest]
+            inputs += [self.per_newton, dt, own.spring]
+            split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
+            return
+        if self.edges:
+            slaves = [self.edges.faces]
+        inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
+        inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
+        split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
+        inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
+        inputs += [own.face_count, own.face_slave, self.master_scene, self.margin, own.spring]
+        split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
+        if self.edges:
+            self.edges.launch(work, own, split)
+
+    def faces_of(self, own: ContactState) -> Any:
+        """The master's faces with what the latest search listed."""
+        found = nearest.Master()
+        found.face, found.stiffness = self.face, self.face_stiffness
+        found.count, found.candidate = own.count, own.candidate
+        return found
+
+    def rest_at(self, state: State, depth: NDArray[np.float64]) -> None:
+        """Let springs be free of force at these depths [m], shape (spring_count,)."""
+        state.contacts[self.index].spring.rest.assign(depth)
+
+    def depths(self, state: State, scene: int) -> NDArray[np.float64]:
+        """Largest penetration so far of each spring of a scene [m], those of slave 0 first, shape (spring_count,)."""
+        depth = state.contacts[self.index].spring.depth.numpy()
+        return depth[self.springs[scene] : self.springs[scene + 1]]

@@ -1,0 +1,125 @@
+"""Owns what a body's mesh is made of: cells by formulation, the materials that fill them, and their lumped masses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.chunks import CHUNK, chunks
+from warp_mca.base.errors import bad_value
+from warp_mca.geometry.cell_types import CELL_TYPES
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.shape_volume import of_cells
+from warp_mca.physics.elements import ELEMENTS, Element, default_element
+from warp_mca.physics.ties.nodes import within_body
+from warp_mca.scene import Body, Scene
+from warp_mca.scene.materials import Material
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+
+def body_materials(body: Body, mesh: Mesh) -> list[tuple[Material, Index]]:
+    """Materials of a body with the cells that each fills; together they fill the body.
+
+    Raises:
+        RequestError: a named cell set is unknown, or cells are left without material or have two.
+    """
+    if isinstance(body.material, Material):
+        return [(body.material, np.arange(mesh.cell_count, dtype=np.int32))]
+    owner = np.full(mesh.cell_count, -1, dtype=np.int32)
+    listed = list(body.material.items())
+    for k, (name, _) in enumerate(listed):
+        if name == "*":
+            continue
+        if name not in mesh.cell_sets:
+            known = ", ".join(sorted(mesh.cell_sets)) or "none"
+            raise bad_value(f"Body {body.name}.material", name, f"the mesh's cell sets are {known}; or use '*'")
+        others = owner[mesh.cell_sets[name]]
+        if (others >= 0).any():
+            remedy = f"some of its cells are in {listed[others.max()][0]} too; give each cell one material"
+            raise bad_value(f"Body {body.name}.material", name, remedy)
+        owner[mesh.cell_sets[name]] = k
+    if "*" in body.material:
+        owner[owner < 0] = [name for name, _ in listed].index("*")
+    if (owner < 0).any():
+        raise bad_value(f"Body {body.name}.material", [n for n, _ in listed], "some cells have none; add a '*' entry")
+    return [(m, np.flatnonzero(owner == k).astype(np.int32)) for k, (_, m) in enumerate(listed)]
+
+
+def densities(body: Body, mesh: Mesh) -> Array:
+    """Density of each cell [kg/m^3], shape (cell_count,), float64: with `Body.exact_mass`, times the volume of the
+    shape over that of its cells."""
+    rho = np.empty(mesh.cell_count)
+    for material, cells in body_materials(body, mesh):
+        rho[cells] = material.rho
+    return rho * of_cells(mesh) if body.exact_mass else rho
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of one formulation and strain measure.
+
+    Attributes:
+        element: the formulation.
+        finite: whether strains may be large.
+        conn: nodes of each cell, shape (cell_count, corners), int32.
+        index: of each in the concatenated meshes, shape (cell_count,), int32.
+    """
+
+    element: Element
+    finite: bool
+    conn: Index
+    index: Index
+
+
+def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
+    """The cells of a body by formulation, in the mesh's own numbering.
+
+    Raises:
+        RequestError: the mesh holds cells that should have been cut to those of the body's element.
+    """
+    finite, own = body.kinematics == "finite", ELEMENTS[body.element]
+    found, first = [], 0
+    for name, conn in mesh.cells.items():
+        if len(conn):
+            if name in CELL_TYPES[own.cell].cut_from:
+                remedy = f"its mesh holds {CELL_TYPES[name].field}; pass meshes through warp_mca.mesh"
+                raise bad_value(f"Body {body.name}.element", body.element, remedy)
+            index = np.arange(first, first + len(conn), dtype=np.int32)
+            found.append(Cells(own if name == own.cell else default_element(name), finite, conn, index))
+            first += len(conn)
+    return found
+
+
+def element_masses(cells: Cells, points: Array, rho: Array) -> Array:
+    """Lumped masses of cells [kg], shape (cell_count, corners); `rho` [kg/m^3] is that of every element."""
+    mass = np.empty(cells.conn.shape)
+    for part in chunks(len(mass), CHUNK):
+        mass[part] = cells.element.lumped_masses(points[cells.conn[part]], rho[cells.index[part]])
+    return mass
+
+
+def sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
+    """Sum of what each element gives its corners, shape (node_count,), float64."""
+    return np.bincount(conn.ravel(), value.ravel(), minlength=node_count).astype(np.float64)
+
+
+def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
+    """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum.
+
+    Slaves of ties within a body have none: their masters carry it.
+    """
+    masses = {}
+    for body in scene.bodies:
+        mesh = meshes[body.name]
+        rho = densities(body, mesh)
+        points, ties = within_body(scene, meshes, body.name)
+        total = np.zeros(len(points))
+        for part in body_cells(body, mesh):
+            total += sum_to_nodes(part.conn, element_masses(part, points, rho), len(total))
+        masses[body.name] = ties.carried(total)
+    return masses

@@ -1,0 +1,239 @@
+"""Owns the device side of elements: the arrays and kernels of one block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import bad_value
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.simd import vectorised
+from warp_mca.kernels.materials.laws import HISTORY_SIZE
+from warp_mca.physics.elements.patches import PATCH
+from warp_mca.physics.elements.state import ElementState
+from warp_mca.step.threads import ELEMENTS, Split, whole
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Block
+    from warp_mca.step.state import State
+    from warp_mca.step.workspace import Workspace
+
+Index = NDArray[np.int32]
+
+BLOCK_DIM = PATCH  # threads of a block, for all kernels of elements
+
+
+def levels_of(ends: Sequence[int]) -> Index:
+    """Level of each of some entries, of which those of level k end at ends[k], int32."""
+    counts = np.diff(np.array([0, *ends], dtype=np.int64))
+    return np.repeat(np.arange(len(ends), dtype=np.int32), counts)
+
+
+class ElementStage:
+    """Device side of one block of elements.
+
+    Attributes:
+        block: the host side.
+        index: of the block in the model; its state is `State.elements[index]`.
+        conn, material: as in `Block`.
+        points: integration points that keep a plastic strain.
+        rows: of the history.
+        vectors: that follow the plastic strains in the history, and turn with the element.
+        slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
+        slot: where the block's slots start in the force array.
+        slot_level: level of `Model.rates` of each slot, shape (slot_count,), int32; empty with one rate.
+        rounds: patches that a block of threads computes in turn.
+    """
+
+    rounds = 0
+
+    def __init__(self, block: Block, precision: str, kernels: Any, points: int, rows: int | None = None) -> None:
+        """Allocate.
+
+        Args:
+            block: the elements.
+            precision: as in `warp_mca.run`.
+            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says in VECTORS how many
+                vectors follow the plastic strains in the history, if any do.
+            points: integration points that keep a plastic strain.
+            rows: of the history, where an element keeps more.
+
+        Raises:
+            RequestError: the history has fewer rows than the points and vectors need.
+        """
+        self.block, self.corners, self.index = block, block.conn.shape[0], 0
+        self.conn = wp.array(block.conn, dtype=wp.int32)
+        self.material = wp.array(block.material, dtype=wp.int32)
+        self.count = block.conn.shape[1]
+        self.slot_node: Index = block.conn.ravel()
+        self.slot_level: Index = np.tile(levels_of(block.level_ends), self.corners)
+        self.slot = 0
+        self.vectors: int = getattr(kernels, "VECTORS", 0)
+        needed = points * HISTORY_SIZE + 3 * self.vectors
+        self.points, self.rows = points, needed if rows is None else rows
+        if points < 0 or self.rows < needed:
+            remedy = f"give at least {needed}, for {points} points of {HISTORY_SIZE} and {self.vectors} vectors of 3"
+            raise bad_value(f"Rows of the history of element {block.element}", self.rows, remedy)
+        self.real = scalars(precision).real
+        kind = (precision, block.law, block.finite)
+        self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite)
+        self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
+        self.stress_kernel = vectorised(kernels.stress_kernel(*kind), large=block.finite)
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [self.force_kernel, self.energy_kernel]
+
+    def more(self, part: slice) -> list[Any]:
+        """What kernels of this formulation take beside what all take, of a range of elements."""
+        return []
+
+    def new_state(self) -> ElementState:
+        """State of elements that have never flowed, on the current device; an elastic block keeps no history."""
+        kept = self.count if self.block.plastic else 0
+        return ElementState(
+            yielded=wp.zeros(kept, dtype=wp.int32),
+            history=wp.zeros((self.rows, kept), dtype=self.real),
+            extreme=wp.zeros((2, self.count), dtype=self.real),
+        )
+
+    def rotated(self, history: NDArray, rotation: NDArray[np.float64]) -> NDArray:
+        """A history whose elements are turned, with their reference positions.
+
+        Args:
+            history: as in `ElementState`, shape (row_count, element_count).
+            rotation: of each element [-], shape (element_count, 3, 3), float64.
+        """
+        found = np.array(history, dtype=np.float64)
+        for first in range(0, self.points * HISTORY_SIZE, HISTORY_SIZE):
+            xx, yy, xy, yz, xz = found[first : first + 5]
+            strain = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, -xx - yy], axis=-1).reshape(-1, 3, 3)
+            turned = rotation @ strain @ rotation.transpose(0, 2, 1)
+            found[first : first + 5] = turned[:, [0, 1, 0, 1, 0], [0, 1, 1, 2, 2]].T
+        for first in range(self.points * HISTORY_SIZE, self.points * HISTORY_SIZE + 3 * self.vectors, 3):
+            found[first : first + 3] = np.einsum("eij,je->ie", rotation, found[first : first + 3])
+        return found.astype(history.dtype)
+
+    def _history(self, own: ElementState, part: slice) -> list[Any]:
+        """Yield flags and history of a range of elements."""
+        return [own.yielded[part], own.history[:, part]] if self.block.plastic else [own.yielded, own.history]
+
+    def make_room(self, blocks: int) -> None:
+        """Called where contact is computed beside the elements: leave room on the device for its blocks of threads."""
+
+    def schedule(self) -> None:
+        """Launched now and then, between steps: choose in which order the next ones compute elements."""
+
+    def active(self, level: int) -> int:
+        """Elements up to this level."""
+        return self.block.level_ends[level] if self.block.level_ends else self.count
+
+    def parts(self, level: int, chain: int | None = None) -> list[slice]:
+        """Elements up to a level, of one chain or all, see `Model.rates`."""
+        ends = (0, *self.block.part_ends)
+        levels = len(self.block.level_ends)
+        chains = range(levels) if chain is None else [chain]
+        k = [levels * own + c for own in range(level + 1) for c in chains]
+        return [slice(ends[i], ends[i + 1]) for i in k if ends[i] < ends[i + 1]]
+
+    def launch(
+        self,
+        work: Workspace,
+        state: State,
+        split: Split = whole,
+        level: int | None = None,
+        chain: int | None = None,
+    ) -> None:
+        """Forces of each element on its nodes [N], into the slots of this block; plastic flow.
+
+        Of elements up to a `level` of `Model.rates`, of all if None; of one `chain` or all.
+        """
+        own = state.elements[self.index]
+
+        def launch(part: slice) -> None:
+            inputs = [work.X, self.conn[:, part], self.material[part], work.law, work.displacements(state)]
+            inputs += [self.slot + part.start, self.count, *self.more(part)]
+            outputs = [*self._history(own, part), own.extreme[:, part], work.force]
+            wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+        if chain is None:
+            split(self.count if level is None else self.active(level), launch, ELEMENTS)
+            return
+        assert level is not None
+        for part in self.parts(level, chain):
+            launch(part)
+
+    def energies(self, work: Workspace, state: State, split: Split = whole, u: wp.array | None = None) -> None:
+        """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].
+
+        To be called after `launch` of the same step; u are the displacements of that [m], if not those of the state.
+        """
+        own = state.elements[self.index]
+        seen = work.displacements(state) if u is None or work.frame is not None else u
+
+        def launch(part: slice) -> None:
+            inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
+            inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.more(part)]
+            count = part.stop - part.start
+            wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
+
+        split(self.count, launch, ELEMENTS)
+
+    def stresses(
+        self, work: Workspace, state: State, u: wp.array, element: wp.array, first: int, stress: wp.array
+    ) -> None:
+        """Stress [Pa] and plastic strain [-] at the corners of some elements with displacements u, from `first` on."""
+        own = state.elements[self.index]
+        inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, u, element, first]
+        inputs += self.more(slice(0, self.count))
+        wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
+
+    def max_plastic_strain(self, state: State, part: slice) -> float:
+        """Greatest equivalent plastic strain of any point of a range of elements [-]."""
+        if not self.block.plastic or not self.points or part.start == part.stop:
+            return 0.0
+        history = state.elements[self.index].history
+        last = history[HISTORY_SIZE - 1 : self.points * HISTORY_SIZE : HISTORY_SIZE, part]
+        return float(last.numpy().max())
+
+
+def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index, Index]:
+    """Give each stage its slots; list the slots of the forces on each node, in rising order.
+
+    Returns:
+        (The first slot of each node, one beyond all of them where it has none, and its second, -1 where there is none,
+        -2 - row where it has more than two, shape (node_count, 2), int32; rows of three more slots, -1 where there are
+        fewer, and the number of the node's rows, shape (row_count, 4), int32.)
+    """
+    first = 0
+    for stage in stages:
+        stage.slot = first
+        first += len(stage.slot_node)
+    node = np.concatenate([np.zeros(0, np.int32), *(stage.slot_node for stage in stages)])
+    first_slots, more_slots = list_slots(np.arange(len(node), dtype=np.int32), node, node_count)
+    first_slots[first_slots[:, 0] < 0, 0] = first  # of nodes without elements: a slot without force
+    return first_slots, more_slots
+
+
+def list_slots(entry: Index, node: Index, node_count: int) -> tuple[Index, Index]:
+    """As `gather_lists`, of some slots: entries that stand for them, and the node of each; -1 where a node has none."""
+    slot, count = entry[np.argsort(node, kind="stable")], np.bincount(node, minlength=node_count)
+    begin = np.cumsum(count) - count
+    first_slots = np.full((node_count, 2), -1, dtype=np.int32)
+    first_slots[count > 0, 0] = slot[begin[count > 0]]
+    first_slots[count == 2, 1] = slot[begin[count == 2] + 1]
+    many = np.flatnonzero(count > 2)
+    others = count[many] - 1
+    rows = (others + 2) // 3
+    first_row = np.cumsum(rows) - rows
+    first_slots[many, 1] = -2 - first_row
+    more_slots = np.full((int(rows.sum()), 4), -1, dtype=np.int32)
+    more_slots[:, 3] = np.repeat(rows, rows)
+    k = np.arange(others.sum()) - np.repeat(np.cumsum(others) - others, others)
+    row, column = np.divmod(k, 3)
+    more_slots[np.repeat(first_row, others) + row, column] = slot[np.repeat(begin[many], others) + 1 + k]
+    return first_slots, more_slots

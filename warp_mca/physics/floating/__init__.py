@@ -1,0 +1,1 @@
+"""Floating frames, in which elements of bodies that turn compute."""

@@ -1,0 +1,67 @@
+"""Owns the stages of floating frames: they follow their bodies at records, and nodes are seen in them in every step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.kernels.nodes import floating
+from warp_mca.physics.elements.stage import BLOCK_DIM
+from warp_mca.step.threads import NODES
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.step.stage import Step
+    from warp_mca.step.workspace import Workspace
+
+
+@dataclass(eq=False)
+class FloatingState:
+    """State of floating frames; empty where elements compute in the world frame.
+
+    Attributes:
+        rotation: of each frame since the start of the phase, a unit quaternion [-], shape (frame_count,), quatd.
+    """
+
+    rotation: wp.array
+
+
+class FloatingStage:
+    """What `kernels.nodes.floating` reads and writes.
+
+    Attributes:
+        count: frames.
+    """
+
+    def __init__(self, model: Model, work: Workspace) -> None:
+        """Allocate on the current device."""
+        marker = model.floating.marker if model.floating else np.zeros((0, 4), np.int32)
+        self.work, self.count, self.node_count = work, len(marker), model.node_count
+        self.marker = wp.array(marker, dtype=wp.int32)
+
+    def new_state(self) -> FloatingState:
+        """Frames that have not turned, on the current device."""
+        return FloatingState(rotation=wp.array([(0.0, 0.0, 0.0, 1.0)] * self.count, dtype=wp.quatd))
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [floating.follow_bodies, floating.see_nodes] if self.count else []
+
+    def follow(self, step: Step) -> None:
+        """Turn the frames with their bodies."""
+        outputs = [step.state.floating.rotation]
+        wp.launch(floating.follow_bodies, self.count, inputs=[self.work.X, self.marker, step.state.u], outputs=outputs)
+
+    def see(self, step: Step) -> None:
+        """Displacements of all nodes in their frames."""
+        work, state = self.work, step.state
+
+        def launch(part: slice) -> None:
+            inputs = [work.X[part], work.frames(state, part), state.u[part]]
+            threads, outputs = part.stop - part.start, [work.u_seen[part]]
+            wp.launch(floating.see_nodes, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+        step.split(self.node_count, launch, NODES)

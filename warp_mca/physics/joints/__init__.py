@@ -1,0 +1,1 @@
+"""What binds nodes: joints, driven axes, couplings of clusters."""

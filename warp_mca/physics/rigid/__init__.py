@@ -1,0 +1,1 @@
+"""Rigid bodies beside finite elements."""

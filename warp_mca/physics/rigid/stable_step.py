@@ -1,0 +1,84 @@
+"""Owns what rigid bodies allow as a time step: the springs that may press them at once, and how fast they turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.model.assembly import Assembly
+from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE, StableStep
+from warp_mca.physics.rigid.bodies import RigidBody
+from warp_mca.scene import Contact, RigidPlane, Scene
+
+Array = NDArray[np.float64]
+
+WHOLE = 100.0
+TURN = 0.01  # of a body in a step at most [rad]: its scheme is then off by some 1e-5 of the angle
+
+
+def bounce_factor(contact: Contact, scene: Scene) -> float:
+    """How many times the springs of a contact count in the step: WHOLE of a rigid body on a plane or on a rigid one.
+
+    All that its motion has then goes through springs alone. A spring that closes within a step makes or takes up to
+    (omega dt)^2 of it.
+    """
+    alone = isinstance(contact.master, RigidPlane) or scene.body(contact.master.body).rigid
+    return WHOLE if alone and scene.body(contact.slave.body).rigid else 1.0
+
+
+def stable_with_rigid(parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array) -> StableStep:
+    """Stable step of a scene with rigid bodies.
+
+    Each spring between a rigid body and another one counts half to either, see docs/theory.md: that of the other
+    body is in the eigenvalues of its nodes. All springs of a rigid body may be closed at once; the largest
+    eigenvalue of the body on them counts as that of springs that open and close.
+
+    Args:
+        parts: of the scene.
+        bodies: its rigid bodies, one at least.
+        added: what contact springs would add to the eigenvalue at each node [1/s^2], shape (node_count,), float64.
+        velocity: initial velocities [m/s], shape (node_count, 3), float64.
+
+    Raises:
+        RequestError: as in `stable_step.stable_step`.
+    """
+    own = np.concatenate([body.own for body in bodies])
+    others = added.copy()
+    others[own] = 0.0
+    longest = parts.scene.impact.output_interval
+    found = StableStep(dt=longest, element=0, contact_share=0.0, shortened=1.0)
+    if not parts.rigid.all():
+        found = parts.stable(others)
+    for body in bodies:
+        element = parts.element_start[body.name]
+        worst = (2.0 * USUAL_SCALE) ** 2 / BOUNCE * _largest(body, parts.X, added[body.own] * parts.mass[body.own])
+        if worst * found.dt**2 > 4.0:
+            found = StableStep(dt=2.0 / math.sqrt(worst), element=element, contact_share=1.0, shortened=1.0)
+        rate = _rate(body, parts, velocity)
+        if rate * found.dt > TURN:
+            found = replace(found, dt=TURN / rate, element=element, contact_share=0.0)
+    return found
+
+
+def _largest(body: RigidBody, X: Array, stiffness: Array) -> float:
+    """Largest eigenvalue [1/s^2] of a free rigid body on springs at its own nodes, of any direction [N/m]."""
+    from scipy.linalg import eigh
+
+    arm = X[body.own] - body.centre
+    moment, squares = stiffness @ arm, np.einsum("n,ni,nj->ij", stiffness, arm, arm)
+    cross = np.cross(np.eye(3), moment)
+    K = np.block([[stiffness.sum() * np.eye(3), cross], [cross.T, np.trace(squares) * np.eye(3) - squares]])
+    M = np.block([[body.mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), body.inertia]])
+    return float(eigh(K, M, eigvals_only=True)[-1])
+
+
+def _rate(body: RigidBody, parts: Assembly, velocity: Array) -> float:
+    """Angular speed of a body at the start [rad/s]."""
+    nodes = body.nodes
+    arm, mass = parts.X[nodes] - body.centre, parts.mass[nodes]
+    spin = mass @ np.cross(arm, velocity[nodes])
+    return float(np.linalg.norm(np.linalg.solve(body.inertia, spin)))

@@ -1,0 +1,1 @@
+"""Nodes tied to faces."""

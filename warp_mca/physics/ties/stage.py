@@ -1,0 +1,68 @@
+"""Owns the stages of tied surfaces: their masters, which carry the slaves, and the slaves, which follow them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.kernels.nodes import tied
+from warp_mca.physics.elements.stage import BLOCK_DIM
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.step.node_stage import NodeStage
+    from warp_mca.step.stage import Step
+
+
+class TieStage:
+    """Advances the nodes of ties, which free and bound nodes leave out.
+
+    Attributes:
+        count: slaves.
+    """
+
+    def __init__(self, model: Model, nodes: NodeStage, precision: str) -> None:
+        """Allocate on the current device; `nodes` advances all others."""
+        self.nodes, self.count = nodes, len(model.ties)
+        if not self.count:
+            return
+        ties, self.lanes = model.ties, tied.LANES if wp.get_device().is_cuda else 1
+        kind = (nodes.touched, nodes.each, nodes.rated, self.lanes, nodes.turned)
+        self.masters_kernel = tied.masters_kernel(precision, *kind)
+        self.follow_kernel = tied.follow_kernel(nodes.touched)
+        entry, corner = np.nonzero(ties.weight)
+        master = ties.master[entry, corner]
+        order = np.argsort(master, kind="stable")
+        carriers, first = np.unique(master[order], return_index=True)
+        self.tied = tied.Tied()
+        self.tied.slave, self.tied.master = wp.array(ties.slave, dtype=wp.int32), wp.array(carriers, dtype=wp.int32)
+        self.tied.corner, self.tied.weight = (
+            wp.array(ties.master, dtype=wp.vec4i),
+            wp.array(ties.weight, dtype=wp.vec4d),
+        )
+        self.tied.first = wp.array(np.append(first, len(order)), dtype=wp.int32)
+        self.tied.carried = wp.array(ties.slave[entry[order]], dtype=wp.int32)
+        self.tied.share = wp.array(ties.weight[entry, corner][order], dtype=wp.float64)
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [self.masters_kernel, self.follow_kernel] if self.count else []
+
+    def advance(self, step: Step, level: int | None = None) -> None:
+        """Masters, with the forces on their slaves of elements up to a level, or of all."""
+        nodes, work, state = self.nodes, self.nodes.work, step.state
+        inputs = [work.inverse_mass, *nodes.slots(level), nodes.constraints.role, work.force]
+        inputs += [work.frames(state), nodes.scene, nodes.gravity, self.tied, nodes.dt]
+        before = work.v_before if step.records else None
+        outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
+        threads = self.lanes * len(self.tied.master)
+        wp.launch(self.masters_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+    def follow(self, step: Step) -> None:
+        """Slaves, once their masters have moved."""
+        work, state = self.nodes.work, step.state
+        before = work.v_before if step.records else None
+        outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
+        wp.launch(self.follow_kernel, self.count, inputs=[self.tied], outputs=outputs, block_dim=BLOCK_DIM)

@@ -1,1 +1,0 @@
-"""Owns whole runs: phases in turn, records, guards, batches, sweeps."""

@@ -1,0 +1,164 @@
+"""Owns the nodal stages where elements take steps of their own, see `warp_mca.model.rates`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import bad_value
+from warp_mca.kernels.nodes import node, rated_node
+from warp_mca.physics.elements.stage import BLOCK_DIM, list_slots
+from warp_mca.step.node_stage import NodeStage
+from warp_mca.step.threads import NODES, Split, whole
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.model.rates import Rates
+    from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.physics.joints.constraint_stage import ConstraintStage
+    from warp_mca.step.state import State
+    from warp_mca.step.workspace import Workspace
+
+
+@dataclass(frozen=True)
+class _Active:
+    """What a substep advances: `rated_node.integrate_kernel` says what the arrays hold."""
+
+    item: wp.array
+    first_slots: wp.array
+    more_slots: wp.array
+
+
+class RatedNodeStage(NodeStage):
+    """Advances the nodes up to a level by substeps of central differences.
+
+    Attributes:
+        v_record: velocities half a step after the latest record [m/s], shape (node_count,), vec3d.
+    """
+
+    rated = True
+
+    def __init__(
+        self,
+        model: Model,
+        work: Workspace,
+        constraints: ConstraintStage,
+        elements: Sequence[ElementStage],
+        precision: str,
+        dt: float,
+        rounds: int,
+    ) -> None:
+        """As `NodeStage`, with `dt` the step of contacts and joints [s].
+
+        Raises:
+            RequestError: the model is too large for the numbers of its nodes and slots.
+        """
+        super().__init__(model, work, constraints, precision, dt, rounds)
+        assert model.rates is not None
+        self.rates: Rates = model.rates
+        self.base = dt / (1 << self.rates.common)
+        self.active = self._lists(elements)
+        self.chains = [self._items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
+        self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
+
+    def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
+        """As `NodeStage._choose`, and the kernel of chains beside that of the fastest nodes."""
+        super()._choose(precision, kind)
+        contact, fixed, early = kind
+        beside = rated_node.integrate_kernel(precision, contact, fixed, self.constraints.bound, self.each, early, True)
+        self.beside_kernel = beside
+
+    def kernels(self) -> list[Any]:
+        """As `NodeStage.kernels`."""
+        return [*super().kernels(), *([self.beside_kernel] if wp.get_device().is_cuda else [])]
+
+    def _items(self, nodes: NDArray[np.intp]) -> wp.array:
+        """Nodes with their levels, as the kernel takes them."""
+        level = self.rates.node_level[nodes].astype(np.int32)
+        return wp.array(nodes.astype(np.int32) + (level << node.LEVEL_BIT), dtype=wp.int32)
+
+    def _lists(self, elements: Sequence[ElementStage]) -> list[_Active]:
+        """Nodes and slots of each level."""
+        node_level = self.rates.node_level.astype(np.int32)
+        node_of = np.concatenate([np.zeros(0, np.int32), *(stage.slot_node for stage in elements)])
+        level = np.concatenate([np.zeros(0, np.int32), *(stage.slot_level for stage in elements)])
+        if max(len(node_of), len(node_level)) >= 1 << node.LEVEL_BIT:
+            remedy = f"steps of their own reach up to {(1 << node.LEVEL_BIT) - 1:,}; leave multi_rate out"
+            raise bad_value("number of forces on nodes", len(node_of), remedy)
+        entry = np.arange(len(node_of), dtype=np.int32)
+        entry += (level - node_level[node_of]) << node.LEVEL_BIT
+        found = []
+        for k in range(self.rates.top + 1):
+            slots = level <= k
+            first, more = list_slots(entry[slots], node_of[slots], self.node_count)
+            item = self._items(np.flatnonzero(node_level <= k))
+            found.append(_Active(item, wp.array(first, dtype=wp.vec2i), wp.array(more, dtype=wp.vec4i)))
+        return found
+
+    def integrate(
+        self,
+        state: State,
+        kick: float,
+        drift: float,
+        role: wp.array,
+        split: Split = whole,
+        before: wp.array | None = None,
+        level: int | None = None,
+        chain: int | None = None,
+    ) -> None:
+        """As `NodeStage.integrate`, for the nodes up to a level, all if None, of one level where a chain is given.
+
+        kick and drift are those of level 0.
+        """
+        work, squares = self.work, state.speed_square
+        level = self.rates.top if level is None else level
+        active, common = self.active[level], self.rates.common
+        items = active.item if chain is None else self.chains[chain]
+        pressed = self.touched and (level >= common if chain is None else chain == common)
+        kernel = self.beside_kernel if chain else self.integrate_kernel
+
+        def launch(part: slice) -> None:
+            item, keepers = items[part], node.KEEPERS if pressed and part.start == 0 else 0
+            inputs = [item, work.inverse_mass, active.first_slots, active.more_slots, role, work.force]
+            inputs += [self.scene, self.gravity, kick, drift]
+            outputs = [work.contact_force, state.u, state.v, before, squares, state.normal_force if keepers else None]
+            threads = part.stop - part.start + keepers
+            wp.launch(kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+
+        split(len(items), launch, NODES)
+
+    def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
+        """As `NodeStage.slots`."""
+        active = self.active[self.rates.top if level is None else level]
+        return active.first_slots, active.more_slots
+
+    def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
+        """As `NodeStage.at_record`: what was kept of the record itself."""
+        return self.work.at_record(state), self.v_record, 0.0
+
+    def end_record(self, state: State) -> None:
+        """As `NodeStage.end_record`: keep the velocities, before the next substep changes them."""
+        wp.copy(self.v_record, state.v)
+
+
+def node_stage(
+    model: Model,
+    work: Workspace,
+    constraints: ConstraintStage,
+    elements: Sequence[ElementStage],
+    precision: str,
+    dt: float,
+    touched: bool,
+) -> NodeStage:
+    """The nodal stage of a model, of which bodies may be `touched`; other arguments as `RatedNodeStage` has them."""
+    rounds = 0  # of patches that the elements take, where nothing else waits for the nodes
+    if not (touched or constraints.bound):
+        rounds = min(0 if stage.block.plastic else stage.rounds for stage in elements)
+    if model.rates:
+        return RatedNodeStage(model, work, constraints, elements, precision, dt, rounds)
+    return NodeStage(model, work, constraints, precision, dt, rounds)

@@ -1,0 +1,51 @@
+"""Owns the figures of one scene that are read off a state when its run ends."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from warp_mca.step.solver import Solver
+    from warp_mca.step.state import State
+
+
+def max_plastic_strain(solver: Solver, state: State, scene: int = 0) -> float:
+    """Greatest equivalent plastic strain of any integration point of a scene [-]."""
+    ranges = zip(solver.elements, solver.layout.elements[scene].tolist(), strict=True)
+    found = (s.max_plastic_strain(state, slice(a - s.block.first, b - s.block.first)) for s, (a, b) in ranges)
+    return max(found, default=0.0)
+
+
+def max_penetration(solver: Solver, state: State, scene: int = 0) -> float:
+    """Greatest depth that a slave node of a scene reached below its master [m]."""
+    return max((float(stage.depths(state, scene).max()) for stage in solver.contacts), default=0.0)
+
+
+def max_normal_force(solver: Solver, state: State, scene: int = 0) -> float:
+    """Greatest sum of the normal forces on all slave nodes of a scene in any step [N]."""
+    return solver.normal_force.greatest(state.normal_force, scene)
+
+
+def max_speed(solver: Solver, state: State, scene: int = 0) -> float:
+    """Greatest speed of any node of a scene, from the start on [m/s]."""
+    first, end = solver.layout.nodes[scene : scene + 2]
+    squares = state.speed_square.numpy()
+    return math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
+
+
+def rigid_bodies(solver: Solver, state: State, scene: int = 0) -> dict[str, dict[str, object]]:
+    """Mass, momentum and spin of each rigid body of a scene at the latest half step, by name; see `RigidState`."""
+    momentum, spin = state.rigid.momentum.numpy(), state.rigid.spin.numpy()
+    return {
+        body.name: {"mass": body.mass, "momentum": momentum[k].tolist(), "spin": spin[k].tolist()}
+        for k, body in enumerate(solver.model.rigid_bodies)
+        if body.scene == scene
+    }
+
+
+def joint_impulses(solver: Solver, state: State, scene: int = 0) -> dict[str, list[float]]:
+    """Impulse that each joint of a scene gave to its first body [N s], by name."""
+    impulse = state.constraints.impulse.numpy()
+    joints = solver.model.joints[solver.layout.joints[scene] : solver.layout.joints[scene + 1]]
+    return {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}

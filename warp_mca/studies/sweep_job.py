@@ -1,0 +1,205 @@
+"""Owns what one worker of a sweep does: it runs the scenes of a batch, keeps their files, answers with their rows."""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warp_mca.base.errors import GuardError, McaError
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.phases.simulation import run
+from warp_mca.results.result import Result
+from warp_mca.results.storage import save
+from warp_mca.scene import Scene, catalogue, model_file
+from warp_mca.step.device import answers
+from warp_mca.studies.batch import run_batch
+from warp_mca.studies.sweep_plan import RunOptions, one_line, plain
+from warp_mca.watch.advice import LOGGER
+
+Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
+
+DONE, STOPPED, FAILED = "done", "stopped", "failed"  # what a row's status may be
+# entries of a summary that rows hold otherwise
+NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files", "units")
+BETWEEN = " | "  # between the warnings of a run
+
+
+class DeviceLost(BrokenExecutor):
+    """The device takes no more work of this process; another process may have it do the job."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """Runs of a sweep that one worker carries out together.
+
+    Attributes:
+        numbers: of the runs in the sweep.
+        scenes: one for each.
+        folders: of their files, None where these are not kept.
+        options: how they are run, on one device.
+        model: model file that has the meshes of the scenes, or None.
+    """
+
+    numbers: tuple[int, ...]
+    scenes: tuple[Scene, ...]
+    folders: tuple[Path | None, ...]
+    options: RunOptions
+    model: Path | None = None
+
+    def on(self, device: str) -> Job:
+        """The same job on a device."""
+        return replace(self, options=replace(self.options, device=device))
+
+    def __reduce__(self) -> tuple[Callable[..., Job], tuple[object, ...]]:
+        """Scenes travel as bytes, which can be read once the scene files with their classes have been."""
+        scenes = pickle.dumps(self.scenes)
+        return _received, (catalogue.files_of(scenes), self.numbers, scenes, self.folders, self.options, self.model)
+
+
+def _received(files: Iterable[Path], numbers: tuple[int, ...], scenes: bytes, *rest: Any) -> Job:
+    for file in files:
+        catalogue.load_source(file)
+    return Job(numbers, pickle.loads(scenes), *rest)
+
+
+def _meshes(job: Job) -> Mapping[str, Mesh] | None:
+    """The meshes of a job's model file, if it has one."""
+    return _stored_meshes(job.model, job.model.stat().st_mtime_ns) if job.model else None
+
+
+@lru_cache(maxsize=1)
+def _stored_meshes(path: Path, changed: int) -> Mapping[str, Mesh]:
+    """The meshes of the model file at `path`, `changed` at that time [ns]."""
+    return model_file.load(path).meshes
+
+
+def run_job(job: Job) -> list[Row]:
+    """Carry out the runs of a job, and keep the files of those that no guard stopped.
+
+    Scenes that cannot be run in one model run one by one. Nothing else that goes wrong in a run is raised.
+
+    Returns:
+        Of each run `status`, `reason`, `warnings`, figures and `wall`.
+
+    Raises:
+        DeviceLost: the device takes no more work of this process.
+    """
+    device = job.options.device
+    with _silent():
+        if len(job.scenes) > 1:
+            try:
+                results = _batch(job)
+            except Exception:
+                pass
+            else:
+                return [_attempt(lambda k=k: _kept(results[k], job.folders[k]), device) for k in range(len(results))]
+        return [_attempt(lambda k=k: _alone(job, k), device) for k in range(len(job.scenes))]
+
+
+def failure(reason: str) -> Row:
+    """The outcome of a run that failed."""
+    return {"status": FAILED, "reason": one_line(reason)}
+
+
+def _batch(job: Job) -> list[Result]:
+    options, meshes = job.options, _meshes(job)
+    return run_batch(
+        job.scenes,
+        device=options.device,
+        precision=options.precision,
+        threads=options.threads,
+        duration=options.duration,
+        meshes=[meshes] * len(job.scenes) if meshes else None,
+    )
+
+
+def _alone(job: Job, k: int) -> Row:
+    options = job.options
+    result = run(
+        job.scenes[k],
+        device=options.device,
+        precision=options.precision,
+        threads=options.threads,
+        multi_rate=options.multi_rate,
+        duration=options.duration,
+        out=job.folders[k],
+        force=True,
+        meshes=_meshes(job),
+    )
+    return _outcome(result)
+
+
+def _kept(result: Result, folder: Path | None) -> Row:
+    if result.stopped is not None:
+        raise GuardError(result.stopped)
+    return _outcome(save(result, folder, force=True) if folder else result)
+
+
+def check_device_after(error: Exception, device: str) -> None:
+    """Raise DeviceLost if the device takes no more work after that error."""
+    if not answers(device):
+        raise DeviceLost(f"{device} takes no more work of its process ({one_line(str(error))})") from error
+
+
+def _attempt(attempt: Callable[[], Row], device: str) -> Row:
+    """What the attempt returns, or the row of a run that was stopped or failed.
+
+    Raises:
+        DeviceLost: the device takes no more work of this process.
+    """
+    try:
+        return attempt()
+    except GuardError as error:
+        return {"status": STOPPED, "reason": one_line(str(error))}
+    except McaError as error:
+        return failure(str(error))
+    except Exception as error:  # whatever a user's own classes, the device or the disk raise
+        check_device_after(error, device)
+        return failure(f"{type(error).__name__}: {error}")
+
+
+def _outcome(result: Result) -> Row:
+    summary = result.summary
+    rest = {key: value for key, value in summary.items() if key not in NO_FIGURES}
+    wall = sum(summary["wall"].values())
+    return {
+        "status": DONE,
+        "reason": None,
+        **dict(figures(rest)),
+        "warnings": BETWEEN.join(map(one_line, result.warnings)) or None,
+        "wall": wall,
+    }
+
+
+def figures(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Every entry of a summary that is one value; those of nested objects under names with dots, as energy.kinetic."""
+    for key, value in summary.items():
+        if isinstance(value, Mapping):
+            yield from figures(value, f"{prefix}{key}.")
+        elif value is None or isinstance(value, str | bool | int | float | np.generic):
+            yield prefix + key, plain(value)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Warnings of runs are in their rows; the log leaves out those of this thread."""
+    thread = threading.get_ident()
+    _SILENT.add(thread)
+    try:
+        yield
+    finally:
+        _SILENT.discard(thread)
+
+
+_SILENT: set[int] = set()  # threads in which runs of a sweep are going on
+logging.getLogger(LOGGER).addFilter(lambda record: record.thread not in _SILENT)

@@ -1,0 +1,1 @@
+"""Guards, warnings and advice: what a run says of itself."""

@@ -1,0 +1,300 @@
+"""Owns the energy balance of a run and the guards that stop it, from the records that the device summed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import GuardError
+from warp_mca.kernels.records.columns import (
+    ABSORBED,
+    BEYOND_WORK,
+    CARRIAGE,
+    DRIVE_WORK,
+    ELASTIC,
+    FRICTION,
+    GRAVITY_WORK,
+    HOURGLASS,
+    JACOBIAN,
+    JOINT_HEAT,
+    KINETIC,
+    LOAD_WORK,
+    LOST,
+    MADE,
+    NORMAL_IMPULSE,
+    PASS,
+    PASS_COLUMNS,
+    PLANE_WORK,
+    PLASTIC,
+    PRESSURE,
+    SPRING_ENERGY,
+    SQUARES,
+    STRAIN,
+    absorbing_column,
+    column_count,
+)
+from warp_mca.step.records import SceneRecords
+from warp_mca.watch.ledger_scales import rounding, spin
+
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.step.steps import Steps
+
+Array = NDArray[np.float64]
+
+# Energy that contact springs may make or take as they close and open within a step, in tolerances. With a tolerance
+# below the usual one, or a penalty that the scene gives and can lower, they have no such allowance.
+MOST_MADE, USUAL = 10.0, 0.01
+MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not counted
+MIN_FREE_EXCHANGE = 1e-4  # the same without contact: what turns on joints in `mixed` gains 5e-6 by rounding in 6 ms
+SLIDING = 0.1  # share of the external work that friction takes, from which on a stop says that nodes slide
+TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
+
+_FLAGS = (
+    "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh "
+    "both sides more alike, or choose a smaller output_interval if they are fast",
+    "a node outran the contact search; choose a smaller output_interval, or, where no body is so fast, other cells "
+    "under the contact, since these have given way",
+    "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or, if penalty is high, "
+    "lower time_step_scale",
+)
+
+
+class Ledger:
+    """Takes in the records of one scene, keeps its rows and its energy balance, and stops it where a guard is broken.
+
+    Attributes:
+        kept: what it has taken in so far, a part of the run's state.
+        most_made: share of all energy that contact springs may make or take as they close and open within steps [-].
+    """
+
+    def __init__(
+        self, model: Model, steps: Steps, tolerance: float, precision: str, kept: SceneRecords, framed: bool = False
+    ) -> None:
+        """Go on from what is `kept`; the energy balance may be off by the share `tolerance`.
+
+        `framed`: elements compute in floating frames.
+        """
+        self.model, self.steps, self.tolerance, self.precision = model, steps, tolerance, precision
+        self.kept, self.framed = kept, framed
+        if not len(kept.peaks):
+            kept.peaks = np.zeros((len(model.passes), 2))
+        self.spin = spin(model)
+        given = any(item.penalty_given for item in model.passes)
+        self.most_made = 0.0 if given or tolerance < USUAL else MOST_MADE * tolerance
+        self.rounding = rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
+
+    @property
+    def contact_dt(self) -> float:
+        """Time step of contacts [s]."""
+        return self.steps.dt / self.model.common_steps
+
+    @property
+    def absorbs(self) -> bool:
+        """Whether the scene has absorbing boundaries."""
+        return len(self.model.absorbing.node) > 0
+
+    @property
+    def _width(self) -> int:
+        """Columns of a record."""
+        return column_count(len(self.model.passes), self.absorbs)
+
+    def read(self, written: int, records: Mapping[str, NDArray]) -> None:
+        """Take in the first `written` of a scene's `records`, see `Layout.records`, and hold them to the guards.
+
+        Raises:
+            GuardError: a record breaks a guard.
+        """
+        sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
+        *flags, turned = records["flag"]
+        self.kept.turned = bool(turned)
+        for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
+            if raised:
+                end = self.steps.time(self.kept.records + written)
+                raise GuardError(f"stopped before t = {end:.4g} s: {message}")
+        sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
+        good = written if sound.all() else int(np.argmin(sound))
+        share, unexplained, made, scale = self._balance(sums[:good])
+        over = (share > self.tolerance) & ((unexplained > self.tolerance) | (made > self.most_made))
+        end = int(np.argmax(over)) + 1 if over.any() else good
+        self._note_peaks(sums[:end])
+        rows = self.rows(end)
+        self.kept.sums.extend(sums[rows])
+        self.kept.velocities.extend(velocity[rows])
+        self.kept.count += len(rows)
+        self.kept.records += end
+        self.kept.max_strain = max(self.kept.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
+        self.kept.min_jacobian = min(self.kept.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
+        self.kept.energy_error = max(self.kept.energy_error, float(share[:end].max(initial=0.0)))
+        self.kept.made = max(self.kept.made, float(made[:end].max(initial=0.0)))
+        last, t = (self.steps.time(self.kept.records + k) for k in (-1, 0))
+        if over.any():
+            raise GuardError(
+                f"energy imbalance {100.0 * share[end - 1]:.3g}% at t = {last:.4g} s exceeds energy_tolerance = "
+                f"{self.tolerance:g} of {scale[end - 1]:.3g} J, initial energy and external work so far"
+                f"{self._cause(sums[end - 1], unexplained[end - 1])}: {self.remedy}, or raise the tolerance if that "
+                f"much is acceptable"
+            )
+        if good < written and not np.isfinite(sums[good]).all():
+            if not self.kept.records:
+                raise GuardError(
+                    "energy is not a number at t = 0, before the first step: speeds, sizes or moduli exceed the range "
+                    f"of numbers; check their units{', or choose float64' if self.precision == 'mixed' else ''}"
+                )
+            raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
+        if good < written:
+            raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
+
+    def rows(self, written: int) -> NDArray[np.int_]:
+        """Which of the next `written` records are rows of the history."""
+        return np.arange(-self.kept.records % self.steps.checks, written, self.steps.checks)
+
+    def _sums(self, partial: Array) -> Array:
+        """Columns of each record from its partial sums, shape (row_count, column_count)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is found out
+            sums = partial[:, : self._width].sum(axis=2)  # others of a batch may absorb
+        sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
+        return sums
+
+    def springs(self, sums: Array) -> Array:
+        """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
+        end = absorbing_column(len(self.model.passes))
+        return sums[..., PASS:end].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
+
+    def _energies(self, sums: Array) -> dict[str, Array]:
+        """The ledger [J] of a row of sums, or of each row."""
+        springs = self.springs(sums)
+        work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + sums[..., LOAD_WORK]
+        work = work + springs[..., PLANE_WORK].sum(axis=-1)
+        absorbed, beyond = self._absorbed(sums)
+        return {
+            "kinetic": sums[..., KINETIC] + sums[..., CARRIAGE],
+            "elastic": sums[..., ELASTIC],
+            "plastic": sums[..., PLASTIC],
+            "hourglass": sums[..., HOURGLASS],
+            "contact": springs[..., SPRING_ENERGY].sum(axis=-1),
+            "friction": springs[..., FRICTION].sum(axis=-1),
+            "contact_loss": springs[..., LOST].sum(axis=-1),
+            "damping": np.zeros(sums.shape[:-1]),
+            "joint": sums[..., JOINT_HEAT],
+            "absorbed": absorbed,
+            "external_work": work + beyond - self.kept.initial_work,
+        }
+
+    def _absorbed(self, sums: Array) -> tuple[Array, Array]:
+        """Energy that absorbing boundaries took up, and work of what lies beyond them [J], of each row of sums."""
+        if not self.absorbs:
+            return np.zeros(sums.shape[:-1]), np.zeros(sums.shape[:-1])
+        first = absorbing_column(len(self.model.passes))
+        return sums[..., first + ABSORBED], sums[..., first + BEYOND_WORK]
+
+    def _made(self, sums: Array) -> Array:
+        """Energy that contact springs made as they closed and opened within steps [J], of each row of sums."""
+        return self.springs(sums)[..., MADE].sum(axis=-1) - self.kept.initial_made
+
+    def _cause(self, sums: Array, unexplained: float) -> str:
+        """What a record's imbalance comes from, where contact explains it."""
+        if unexplained > self.tolerance:
+            return ""
+        found = f", of which contact springs made {self._made(sums):.3g} J as they closed and opened within steps"
+        energy = self._energies(sums)
+        if energy["friction"] > SLIDING * abs(energy["external_work"]) > 0.0:
+            found += f", whose nodes slide a little each time, {energy['friction']:.3g} J in all"
+        return found
+
+    def _balance(self, sums: Array) -> tuple[Array, Array, Array, Array]:
+        """Imbalance of each row of sums; that without what contact springs made; and this, see `switch`.
+
+        All as shares of initial energy and external work [-], which come last [J].
+        """
+        energy = self._energies(sums)
+        work = energy.pop("external_work")
+        stored = sum(energy.values(), np.zeros(len(sums)))
+        if np.isnan(self.kept.initial_energy) and len(sums):
+            self.kept.initial_energy, self.kept.initial_work = float(stored[0]), float(work[0])
+            self.kept.initial_kinetic = float(energy["kinetic"][0])
+            self.kept.initial_made = float(self._made(sums)[0])
+            work = work - self.kept.initial_work
+        initial = self.initial_energy
+        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.kept.energy_scale))
+        self.kept.energy_scale = float(scale.max(initial=self.kept.energy_scale))
+        self.kept.touched = self.kept.touched or bool(
+            (self.springs(sums)[..., NORMAL_IMPULSE] > 0.0).any() or (energy["contact"] > 0.0).any()
+        )
+        self.kept.worked = float(np.abs(work).max(initial=self.kept.worked))
+        made, net = self._made(sums), stored - work - initial
+        imbalance, moved = np.abs(net), np.abs(energy["kinetic"] - self.kept.initial_kinetic)
+        self.kept.imbalance = float(imbalance.max(initial=self.kept.imbalance))
+        self.kept.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.kept.exchanged))
+        scale = np.maximum(scale, self.rounding)
+        shares = np.zeros((3, len(sums)))
+        np.divide([imbalance, np.abs(net - made), np.abs(made)], scale, out=shares, where=scale > 0.0)
+        return shares[0], shares[1], shares[2], scale
+
+    @property
+    def initial_energy(self) -> float:
+        """Energy at the start [J]; 0 before the first record."""
+        return 0.0 if np.isnan(self.kept.initial_energy) else self.kept.initial_energy
+
+    @property
+    def remedy(self) -> str:
+        """What helps against an imbalance: penalty only where contact was touched, float64 only for what turns."""
+        found = "lower time_step_scale"
+        if self.kept.touched:
+            found += " or a contact's penalty"
+        if self.model.rates:
+            found += ", take fewer groups in multi_rate"
+        turned = self.spin * self.steps.time(self.kept.records)
+        if self.precision == "mixed" and turned > TURNED and not self.framed:
+            found += ", choose --precision float64 for bodies that turn so far"
+        return found
+
+    @property
+    def exchanges(self) -> bool:
+        """Whether bodies exchanged energy worth a word, by contact, joints or external work."""
+        least = (MIN_EXCHANGE if self.kept.touched else MIN_FREE_EXCHANGE) * self.kept.energy_scale
+        met = self.kept.touched or len(self.model.joint_first) > 0 or self.kept.worked > least
+        return met and self.kept.exchanged > max(least, self.rounding)
+
+    @property
+    def exchange_error(self) -> float:
+        """Largest imbalance as a share of `exchanged` [-]: the same for all who watch, however fast bodies move along.
+
+        What is exchanged counts as MIN_EXCHANGE of the initial energy and external work at least, and as the energy of
+        rounding, so that the rounding of motion alone counts for little.
+        """
+        scale = max(self.kept.exchanged, MIN_EXCHANGE * self.kept.energy_scale, self.rounding)
+        return self.kept.imbalance / scale if scale > 0.0 else 0.0
+
+    def nodes_at_peak(self, k: int) -> float:
+        """Nodes that carried contact pass k in the record of its greatest normal force: (sum F)^2 / sum F^2 [-]."""
+        force, squares = self.kept.peaks[k]
+        return float(force**2 / squares) if squares > 0.0 else 0.0
+
+    def _note_peaks(self, sums: Array) -> None:
+        """Keep what records say of contact at its greatest."""
+        springs = self.springs(sums)
+        for k, found in enumerate(
+            springs[springs[:, :, PRESSURE].argmax(axis=0), range(springs.shape[1])] if len(sums) else ()
+        ):
+            if found[PRESSURE] > self.kept.peaks[k, 0]:
+                self.kept.peaks[k] = found[PRESSURE], found[SQUARES]
+
+    def energy(self) -> dict[str, float]:
+        """The ledger at the end [J]; not numbers where no record was taken in."""
+        sums = self.kept.sums[-1] if self.kept.sums else np.full(self._width, np.nan)
+        last = {key: float(value) for key, value in self._energies(sums).items()}
+        error = sum(value for key, value in last.items() if key != "external_work")
+        initial = self.initial_energy
+        return {"initial": initial, **last, "error": error - last["external_work"] - initial}
+
+    def energies(self, first: int = 0) -> dict[str, Array]:
+        """The ledger [J] at each row of the history from row `first` on, see `energy`, each shape (row_count,)."""
+        return self._energies(self.table(first))
+
+    def table(self, first: int = 0) -> Array:
+        """Columns of each row of the history from row `first` on, shape (row_count, column_count), float64."""
+        return np.array(self.kept.sums[first:]).reshape(-1, self._width)

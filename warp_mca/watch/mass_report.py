@@ -1,0 +1,92 @@
+"""Owns what a run says of masses: those of bodies, how far meshes miss them, and what mass scaling added."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.geometry.quality import volumes
+from warp_mca.geometry.shape_volume import of_cells
+from warp_mca.model.mass_scaling import added_shares, peak_error, striking_body
+from warp_mca.physics.elements.cells import densities
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from warp_mca.geometry.mesh import Mesh
+    from warp_mca.model.model import Model
+    from warp_mca.scene import Body, Scene
+
+
+COARSE = 0.02  # error of a mesh's mass from which on a word is said: forces and stiffness are off by as much
+
+
+def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str, dict[str, float | None]]:
+    """Mass [kg] of each body, without what mass scaling adds, and error [-] of the mass of its cells, by its name.
+
+    The error is None where nothing is known of the shape that the mesh stands for.
+    """
+    found: dict[str, dict[str, float | None]] = {}
+    for body in bodies:
+        mesh = meshes[body.name]
+        mass = densities(body, mesh) * volumes(mesh)
+        ratio = of_cells(mesh)
+        cells, shape = (mass / ratio, mass) if body.exact_mass else (mass, mass * ratio)
+        error = float(cells.sum() / shape.sum()) - 1.0 if len(mesh.volume_ratio) else None
+        found[body.name] = {"mass": float(mass.sum()), "mass_error": error}
+    return found
+
+
+def mass_warnings(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> list[str]:
+    """One sentence for each body whose cells have 2 % less or more mass than its shape."""
+    found = []
+    coarse = [body for body in bodies if (np.abs(1.0 / meshes[body.name].volume_ratio - 1.0) > COARSE).any()]
+    for body in coarse:
+        error = body_report([body], meshes)[body.name]["mass_error"]
+        if error is not None and abs(error) > COARSE:
+            what = "the body has that mass"
+            if body.exact_mass:
+                what = "its mass is scaled to that of the shape, but its sections and stiffness are not"
+            share = f"{abs(error):.1%} {'less' if error < 0.0 else 'more'}"
+            found.append(
+                f"the cells of body {body.name} have {share} mass than its shape, because they are flat where it is "
+                f"round; {what}: refine its mesh, as with --refine 2"
+            )
+    return found
+
+
+def mass_report(scene: Scene, model: Model) -> dict[str, object]:
+    """Keys of the summary of a scene with mass scaling; none without.
+
+    Args:
+        scene: of the run.
+        model: of that scene alone.
+    """
+    scaling = model.scaling
+    if scaling is None:
+        return {}
+    shares = added_shares(scene, model.node_start, model.mass, scaling.added)
+    speed = np.linalg.norm(model.V, axis=1)
+    plain = model.mass - scaling.added
+
+    def changed(power: int) -> float:
+        """Change of the sum of m v^power at the start, as a share of it [-]; 0 at rest."""
+        before = float(plain @ speed**power)
+        return float(scaling.added @ speed**power) / before if before > 0.0 else 0.0
+
+    body = striking_body(scene, shares)
+    return {
+        "mass_added": shares,
+        "mass_scaling": {
+            "asked": scene.impact.mass_scaling,
+            "plain_stable_dt": scaling.plain_dt,
+            "elements": scaling.elements,
+            "greatest": max(shares.values()),
+            "striking_body": body,
+            "striking": shares[body],
+            "momentum": changed(1),
+            "kinetic_energy": changed(2),
+            "F_n_first_peak": peak_error(scene, model.node_start, model.mass, scaling.added),
+        },
+    }

@@ -1,0 +1,101 @@
+"""Owns the watch for bodies that go through each other, through a plane or through themselves, and what it says.
+
+A look takes the boxes of all bodies. Where two meet, edges of one skin are followed through the faces of the other
+(`runs.skins`): skins of bodies that overlap cross, whatever their cells. How far anything can have moved since the last
+look decides when the next one is due, so that nothing passes the thinnest part of a body in between.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.model import Model
+from warp_mca.scene import Scene
+from warp_mca.watch.passing_cases import Look, WithinBody, cases_of
+from warp_mca.watch.skins import Skin
+
+Array = NDArray[np.float64]
+
+PRESSED = 2.0  # times the depth of a contact's springs, up to which skins cross by the contact's own doing
+MEANT = 1.25  # times the overlap at the start, up to which it is meant
+FEWEST = 6  # looks in an impact phase at least
+CLOSEST = 4  # steps between two looks at least: in so few nothing passes two cells below half of the wave speed
+FASTER = 1.5  # times the greatest speed so far that nodes may reach until the next look
+
+DEPTH, TIME, PLACE, START = 0, 1, slice(2, 5), 5  # columns of `SceneRecords.passed`
+
+
+class Watch:
+    """What is looked at in one scene.
+
+    Attributes:
+        cases: what can go into each other.
+        nodes: of the skins, those of each in turn, in the model's numbering, int32; empty where there is no case.
+    """
+
+    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], model: Model, dt: float, span: float) -> None:
+        """Choose what to look at in an impact phase of `span` [s] with steps of `dt` [s]."""
+        self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
+        self._driven = float(np.abs(model.table_value).max(initial=0.0))
+        self._gravity = float(np.linalg.norm(scene.gravity))
+        self._skins = [Skin(b.name, meshes[b.name], model.X, model.node_start[b.name]) for b in scene.bodies]
+        self.cases = list(cases_of(scene, meshes, model, self._skins))
+        self.nodes = np.concatenate([skin.nodes for skin in self._skins])[: None if self.cases else 0]
+
+    def look(self, x: Array, speed: float, pressed: Array, time: float, passed: Array) -> tuple[Array, int]:
+        """What has been seen, with bodies as they are now, and how many steps may pass between two looks.
+
+        Args:
+            x: positions of `nodes` [m], shape (node_count, 3), float64.
+            speed: greatest of any node so far [m/s].
+            pressed: greatest depth of springs of each contact pass so far [m], shape (pass_count,), float64.
+            time: [s].
+            passed: what was seen before, as `SceneRecords.passed`; empty at the first look.
+        """
+        if not np.isfinite(x).all():
+            return passed, self._most
+        first = np.cumsum([len(skin.nodes) for skin in self._skins])[:-1]
+        for skin, own in zip(self._skins, np.split(x, first), strict=True):
+            skin.move(own)
+        look = Look(self._skins)
+        passed = passed.copy() if len(passed) else self._start(look)
+        for case, row in zip(self.cases, passed, strict=True):
+            allowed = case.slack + PRESSED * max((pressed[k] for k in case.passes), default=0.0)
+            depth, at = case.found(look, allowed)
+            if depth > allowed + MEANT * row[START]:
+                row[TIME] = row[TIME] if row[DEPTH] else time
+                if depth > row[DEPTH]:
+                    row[DEPTH], row[PLACE] = depth, at
+        return passed, self._steps(min(case.room(look) for case in self.cases), speed)
+
+    def _start(self, look: Look) -> Array:
+        """Rows with the overlap at the start."""
+        rows = np.zeros((len(self.cases), START + 1))
+        for case, row in zip(self.cases, rows, strict=True):
+            row[START] = case.found(look, 0.0)[0]
+            if isinstance(case, WithinBody) and not row[START] and case.holds(look):
+                row[START] = np.inf
+        return rows
+
+    def _steps(self, room: float, speed: float) -> int:
+        """Steps until a look, before two nodes have approached by `room` [m]: 2 (v t + g t^2 / 2) at most."""
+        v, g = FASTER * speed + self._driven, self._gravity
+        fastest = v + math.sqrt(v * v + g * room)
+        steps = room / fastest / self._dt if 0.0 < fastest < math.inf else math.inf
+        return int(max(CLOSEST, min(self._most, steps)))
+
+    def said(self, passed: Array, origin: float = 0.0) -> list[str]:
+        """A sentence for each case that was seen; times count from `origin` [s]."""
+        found = []
+        for case, row in zip(self.cases, passed, strict=False):
+            if row[DEPTH]:
+                digits = 1 - math.floor(math.log10(row[DEPTH]))  # place to a tenth of the depth or finer
+                at = ", ".join(f"{round(x, digits) + 0.0:g}" for x in row[PLACE].tolist())
+                seen = f"from t = {row[TIME] - origin:.3g} s on, up to {row[DEPTH]:.2g} m deep at ({at}) m"
+                found.append(f"{case.sentence} {seen}: {case.remedy}")
+        return found

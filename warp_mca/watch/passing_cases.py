@@ -1,0 +1,257 @@
+"""Owns what can go into each other in a scene: bodies, parts of a body, nodes below a plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.model import Model
+from warp_mca.scene import RigidPlane, Scene
+from warp_mca.watch.skins import NOWHERE, Found, Skin, SkinPair
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+
+SLACK = 0.05  # of the width of a face, and of the thickness of a body, by which skins may cross: they have flat faces
+SHARE = 0.5  # of the thinnest part of two bodies that they move on between two looks at most
+BEND = 0.25  # of the gap between parts of a body that its nodes move out of shape before it is looked at
+SLENDER = 8.0  # lengths over thickness from which on a body without gaps may meet itself
+ROOM = 1.5  # times the reach of the place where bound bodies meet at the start: there they may overlap
+
+APART = "no contact keeps them out there; take all of the surface, such as nodes='boundary', in a Contact"
+BETWEEN = (
+    "contact keeps only nodes of a slave out of its master, and edges pass between them; let nodes lie closer where "
+    "the bodies meet, and set two_way"
+)
+
+
+class Look:
+    """Skins as they are now.
+
+    Attributes:
+        boxes: least and greatest coordinates of each skin [m], shape (body_count, 2, 3), float64.
+        origin: a point amid the bodies [m], shape (3,), float64.
+    """
+
+    def __init__(self, skins: Sequence[Skin]) -> None:
+        self._skins = skins
+        self.boxes = np.array([skin.box for skin in skins])
+        self.origin = self.boxes.mean(axis=(0, 1))
+        self._bent: dict[int, float] = {}
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Between the boxes of two skins, along the axis where it is greatest; negative where they meet [m].
+
+        Shape (body_count, body_count), float64.
+        """
+        lower, upper = self.boxes[:, 0], self.boxes[:, 1]
+        apart = (lower[:, None] - upper).max(axis=2)
+        return np.maximum(apart, apart.T)
+
+    def bent(self, number: int) -> float:
+        """How far a skin is out of shape [m]."""
+        if number not in self._bent:
+            self._bent[number] = self._skins[number].bent()
+        return self._bent[number]
+
+
+@dataclass(frozen=True)
+class BelowPlane:
+    """Nodes of a body's surface that no contact keeps above a plane that others of its nodes are in contact with."""
+
+    skin: Skin
+    kept_out: Mask
+    plane: RigidPlane
+    passes: tuple[int, ...]
+
+    @property
+    def slack(self) -> float:
+        """How deep nodes may lie [m]."""
+        return SLACK * min(self.skin.width, self.skin.thickness)
+
+    def found(self, look: Look, least: float) -> Found:
+        """The deepest node below the plane, if it is deeper than `least` [m]."""
+        depth = -self._height()
+        best = int(depth.argmax())
+        return (float(depth[best]), self.skin.x[best]) if depth[best] > least else NOWHERE
+
+    def room(self, look: Look) -> float:
+        """How far nodes can move before a look is due [m]: none comes out of a plane on its other side."""
+        return SHARE * float(self.skin.extents[2])
+
+    def _height(self) -> Array:
+        """Of the nodes above the plane [m], shape (node_count,); inf of those that contact keeps out."""
+        normal = np.asarray(self.plane.normal, dtype=float)
+        height = (self.skin.x - self.plane.point) @ normal / np.linalg.norm(normal)
+        return np.where(self.kept_out, np.inf, height)
+
+    @property
+    def sentence(self) -> str:
+        """What a warning says of them, before time, depth and place."""
+        return f"nodes of {self.skin.name} that are not in its contact's surface went below the rigid plane"
+
+    remedy = APART
+
+
+@dataclass(frozen=True)
+class WithinBody:
+    """Two bodies, by their numbers among the skins."""
+
+    numbers: tuple[int, int]
+    pair: SkinPair
+    passes: tuple[int, ...]
+
+    @property
+    def slack(self) -> float:
+        """How deep they may lie in each other [m]."""
+        return SLACK * min(min(skin.width, skin.thickness) for skin in (self.pair.one, self.pair.other))
+
+    def found(self, look: Look, least: float) -> Found:
+        """Where they lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
+        if look.gaps[self.numbers] > 0.0:
+            return NOWHERE
+        one, other = (look.boxes[k] for k in self.numbers)
+        return self.pair.crossed((one, other), look.origin, least)
+
+    def room(self, look: Look) -> float:
+        """How far they can approach each other before they are through [m]."""
+        return max(SHARE * min(self.pair.one.thickness, self.pair.other.thickness), 0.5 * look.gaps[self.numbers])
+
+    def holds(self, look: Look) -> bool:
+        """Whether one lies in the other as a whole, given that their skins do not cross."""
+        one, other = (look.boxes[k] for k in self.numbers)
+        for inner, outer, boxes in (
+            (self.pair.one, self.pair.other, (one, other)),
+            (self.pair.other, self.pair.one, (other, one)),
+        ):
+            if (boxes[0][0] > boxes[1][0]).all() and (boxes[0][1] < boxes[1][1]).all():
+                return outer.deepest(inner.x[:1])[0] > 0.0
+        return False
+
+    @property
+    def sentence(self) -> str:
+        """What a warning says of them, before time, depth and place."""
+        return f"{self.pair.one.name} and {self.pair.other.name} went into each other"
+
+    @property
+    def remedy(self) -> str:
+        """What helps."""
+        return BETWEEN if self.passes else APART
+
+
+@dataclass(frozen=True)
+class WithinItself:
+    """A body whose parts can meet once it is out of shape by more than `play` [m]."""
+
+    number: int
+    pair: SkinPair
+    play: float
+    passes: tuple[int, ...]
+
+    @property
+    def slack(self) -> float:
+        """How deep parts may lie in each other [m]."""
+        return SLACK * min(self.pair.one.width, self.pair.one.thickness)
+
+    def found(self, look: Look, least: float) -> Found:
+        """Where its parts lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
+        if look.bent(self.number) < self.play:
+            return NOWHERE
+        box = look.boxes[self.number]
+        return self.pair.crossed((box, box), look.origin, least)
+
+    def room(self, look: Look) -> float:
+        """How far parts can approach each other before they are through [m]."""
+        return max(SHARE * self.pair.one.thickness, 0.5 * (self.play - look.bent(self.number)))
+
+    @property
+    def sentence(self) -> str:
+        """What a warning says of it, before time, depth and place."""
+        return f"parts of {self.pair.one.name} went through each other"
+
+    @property
+    def remedy(self) -> str:
+        """What helps."""
+        return (
+            BETWEEN
+            if self.passes
+            else "no contact keeps them apart; make bodies of them, welded where they hang together"
+        )
+
+
+Case = BelowPlane | WithinBody | WithinItself
+
+
+def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequence[Skin]) -> Iterator[Case]:
+    """What can go into each other of a scene's model, `skins` being those of its bodies."""
+    number = {skin.name: k for k, skin in enumerate(skins)}
+    passes: dict[frozenset[str], tuple[int, ...]] = {}
+    planes: dict[tuple[str, RigidPlane], tuple[int, ...]] = {}
+    for k, item in enumerate(model.passes):
+        slave, master = scene.contacts[item.contact].slave.body, scene.contacts[item.contact].master
+        if isinstance(master, RigidPlane):
+            planes[slave, master] = (*planes.get((slave, master), ()), k)
+        else:
+            names = frozenset((slave, master.body))
+            passes[names] = (*passes.get(names, ()), k)
+    for (name, plane), own in planes.items():
+        skin = skins[number[name]]
+        kept_out = np.isin(skin.nodes, np.concatenate([model.passes[k].slave for k in own]))
+        if not kept_out.all():
+            yield BelowPlane(skin, kept_out, plane, own)
+    bound = _bound_nodes(scene, meshes, model)
+    for numbers in combinations(range(len(skins)), 2):
+        one, other = (skins[k] for k in numbers)
+        names = frozenset((one.name, other.name))
+        edges = _free_edges(one, other, [model.X[nodes] for nodes in bound.get(names, ())])
+        yield WithinBody(numbers, SkinPair(one, other, edges), passes.get(names, ()))
+    for k, skin in enumerate(skins):
+        long = skin.extents[2] if skin.extents[2] > SLENDER * skin.extents[0] else np.inf
+        play = BEND * min(skin.gap, long)
+        if not scene.body(skin.name).rigid and np.isfinite(play):
+            yield WithinItself(k, SkinPair(skin, skin), play, passes.get(frozenset((skin.name,)), ()))
+
+
+def _bound_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> dict[frozenset[str], list[Index]]:
+    """Nodes that each joint or tie between two bodies binds, in the model's numbering, by the bodies' names."""
+    found: dict[frozenset[str], list[Index]] = {}
+    for joint, pairs in zip(scene.joints, model.joints, strict=True):
+        if joint.other is not None:
+            nodes = np.concatenate([at[pairs.start : pairs.end] for at in (model.joint_first, model.joint_second)])
+            found.setdefault(frozenset((joint.body, joint.other)), []).append(nodes[nodes >= 0])
+    for tie in scene.ties:
+        ends = ((side.body, model.node_start[side.body]) for side in (tie.slave, tie.master))
+        own = [np.arange(start, start + len(meshes[name].points)) for name, start in ends]
+        nodes = model.ties.slave[np.isin(model.ties.slave, own[0])]
+        found.setdefault(frozenset((tie.slave.body, tie.master.body)), []).append(nodes)
+    return found
+
+
+def _free_edges(one: Skin, other: Skin, bound: Sequence[Array]) -> tuple[Mask, Mask] | None:
+    """Edges of two skins off the places where joints and ties hold the bodies: hinges overlap there when they turn.
+
+    Such a place reaches as far from the bound nodes as the bodies lie at each other there at the start, and half as far
+    again. `bound` are positions of these nodes [m], each shape (count, 3); without any all edges are free, None.
+    """
+    from scipy.spatial import KDTree
+
+    if not bound:
+        return None
+    free = [np.ones(len(skin.edge), dtype=bool) for skin in (one, other)]
+    trees = [KDTree(skin.X) for skin in (one, other)]
+    near = 0.75 * (one.width + other.width)
+    for held in bound:
+        for k, skin in enumerate((one, other)):
+            meets = trees[1 - k].query(skin.X, distance_upper_bound=near)[0] < np.inf
+            away = np.asarray(KDTree(held).query(skin.X)[0])
+            reach = ROOM * float(away[meets].max(initial=skin.width))
+            free[k] &= (away > reach)[skin.edge].all(axis=1)
+    return free[0], free[1]
