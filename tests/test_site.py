@@ -14,6 +14,7 @@ import pytest
 
 pytest.importorskip("mkdocs", reason="the extra docs is not installed")
 pytest.importorskip("mkdocstrings")
+pytest.importorskip("latex2mathml")
 pytest.importorskip("pandas")
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -93,3 +94,11 @@ def test_the_notebook_was_run(site: Path):
     text = (site / "tutorials" / "study.html").read_text(encoding="utf-8")
     assert "mass on spring [N]</th>" in text and "runs and closed form differ by" in text
     assert list((site / "tutorials").glob("study-*.png"))
+
+
+def test_formulas_are_set_without_scripts(site: Path):
+    text = (site / "theory.html").read_text(encoding="utf-8")
+    assert text.count('<div class="formula"><math') > 30 and text.count("<math") > 200
+    assert "arithmatex" not in text and not re.search(r"<p>[^<]*\$", text)
+    formulas = "".join(re.findall(r"<math.*?</math>", text, re.S))
+    assert "\\" not in formulas and "merror" not in formulas

@@ -1,13 +1,15 @@
-"""Owns what mkdocs does beyond its plugins: pages of files beside docs/, links that leave docs/, notebooks."""
+"""Owns what mkdocs does beyond its plugins: files beside docs/, links that leave docs/, notebooks, formulas."""
 
 from __future__ import annotations
 
 import posixpath
 import re
 import textwrap
+from html import unescape
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 from notebooks import render  # beside this file: mkdocs looks there for what hooks import
@@ -18,6 +20,8 @@ PAGE_OF = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANG
 CITATION = "CITATION.cff"
 CODE = ("kernels/", "scenes/", "tests/", "benchmarks/", "warp_mca/")  # shown as pages of their own where linked
 _LINK = re.compile(r"(?P<before>\]\()(?P<target>[^)#\s:]+)(?P<anchor>#[^)\s]*)?(?P<after>\))")
+# A formula as pymdownx.arithmatex leaves it: in a span within a line, in a div of its own.
+_FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>', re.S)
 
 
 def on_files(files: Files, *, config: Any) -> Files:
@@ -54,6 +58,18 @@ def on_page_markdown(markdown: str, *, page: Page, **_: Any) -> str:
     if page.file.src_uri == "gallery.md":
         markdown = re.sub(r"Code: \[scenes/(\w+)\.py\]\([^)]*\)\.", _scene_code, markdown)
     return _relinked(markdown, "docs/" + page.file.src_uri, page.file.src_uri)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Formulas between dollar signs become MathML, which browsers set without scripts, fonts or a network."""
+    return _FORMULA.sub(_set_formula, html)
+
+
+def _set_formula(match: re.Match[str]) -> str:
+    """The `<math>` element of a formula; one of its own stands in a paragraph of its own."""
+    block = match["tag"] == "div"
+    math = convert(unescape(match["latex"]).strip(), display="block" if block else "inline")
+    return f'<div class="formula">{math}</div>' if block else math
 
 
 def _scene_code(match: re.Match[str]) -> str:
