@@ -226,7 +226,7 @@ def _replaced(settings: Settings, changes: Settings) -> Settings:
     return tuple((dict(settings) | dict(changes)).items())
 
 
-# cells of 0.45 mm at the tip, with which the penalty 0.1 gives the published first peak, see docs/hinges.md
+# cells of 0.45 mm at the tip: the penalty 0.1 gives the published first peak, see docs/measurements/hinges.md
 CHOICES = MeshChoice(
     "quick", cells=(("section", 8), ("axial_OA", 20), ("axial_AB", 20), ("focus_size", 0.45e-3), ("focus_layers", 5))
 )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from warp_mca.phases.rate_groups import MultiRate
     from warp_mca.scene import Body, Contact
 
-FULL = 100_000  # elements that fill a GPU: docs/batch.md has the measurement
+FULL = 100_000  # elements that fill a GPU: docs/measurements/methods.md has the measurement
 
 
 @dataclass(frozen=True)

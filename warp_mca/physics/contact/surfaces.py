@@ -19,7 +19,7 @@ SEARCH_MARGIN = 0.25  # margin of the search for faces, as a share of the edge o
 LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
 LONGEST_LIST = 4096  # slave nodes near a face at most
 # Default spring stiffness over E* A^2 / V, with E* = E / (1 - nu^2): at nu = 0.3 as penalty = 1 and 5. Few nodes carry
-# a curved contact, so softer springs lower its force peak; docs/theory.md has the measurement.
+# a curved contact, so softer springs lower its force peak; see docs/measurements/methods.md.
 FLAT, CURVED = 0.7583, 3.792
 
 
