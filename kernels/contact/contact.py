@@ -19,7 +19,7 @@ from warp_mca.kernels.records.extremes import add_normal_force
 wp.set_module_options({"enable_backward": False})
 
 BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
-LANES = 4  # of a GPU for each master: faces that it looks at side by side
+LANES = 4  # GPU threads per master node, which share the faces around it
 
 
 @cache
@@ -28,14 +28,15 @@ def surface_kernel(
 ) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
-    `nearest_face` says which face, `reachable` whether the node can have come to that depth. Slaves are those from
-    `first` on. With `each`, scenes of a batch have values of their own, and slaves know their scene.
+    `nearest_face` chooses the face, and `reachable` checks that the node can have come to that depth. The kernel takes
+    the slaves from `first` on. With `each`, values differ between the scenes of a batch, and each slave has the number
+    of its scene.
 
     The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
-    `stress_free`: springs of bodies that overlap at the start begin without force. `law`: module of the contact law.
-    `noted`: keep the recent force on each node, for passes whose masters have several sides.
+    `stress_free`: springs of bodies that overlap at the start begin without force. `law` names the module of the
+    contact law. `noted`: keep the recent force on each node, which masters with several sides need.
     """
     settle, let_go = settle_functions(friction, stress_free, law)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
@@ -96,8 +97,8 @@ def surface_kernel(
 def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
     """Kernel: each master node gathers its share of the reactions on the faces around it, in a fixed order.
 
-    Masters are those from `first` on; with more `lanes`, on a GPU, each looks at so many faces side by side.
-    `noted`: as of `surface_kernel`.
+    The kernel takes the masters from `first` on. On a GPU, `lanes` threads share the faces of a master. `noted` as in
+    `surface_kernel`.
     """
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     _, exchange = shared_functions("float64")
@@ -133,7 +134,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
             corners = wp.vec4i(face[f, 0], face[f, 1], face[f, 2], face[f, 3])
             for q in range(wp.min(face_count[f], face_slave.shape[1])):
                 s = face_slave[f, q]
-                w = spring.weight[s]  # read before it is known whether they count: memory answers late
+                w = spring.weight[s]  # read before it is known whether they count, to hide the latency of memory
                 force = spring.force[s]
                 if spring.face[s] == f:
                     touched = wp.float64(1.0)
@@ -156,7 +157,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
     return begins_early(react)
 
 
-react_kernel(False, 1)  # belongs to this module, so it is made before that is loaded; others have their own
+react_kernel(False, 1)  # this variant belongs to the module, so it must exist before the module is loaded
 
 
 @cache

@@ -4,8 +4,8 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-MOST = 32  # faces that an edge is followed through
-AHEAD = 1.0e-5  # of an edge's length, by which it is followed on behind a face
+MOST = 32  # faces through which an edge is followed at most
+AHEAD = 1.0e-5  # distance behind a face at which the next ray starts, as a share of the edge's length
 
 
 @wp.kernel(enable_backward=False)
@@ -54,12 +54,12 @@ def shares_node(triangle: wp.array2d(dtype=wp.int32), face: int, a: int, b: int)
 
 @wp.func
 def part_inside(entered: float, slope: float, t: float, cosine: float):
-    """Depth behind the planes of the faces around a part of an edge that ends at a face, and the place of that.
+    """Depth of a part of an edge behind the planes of the faces at its ends [m], and where along the edge [m].
 
     Args:
-        entered: where the edge went in [m]; negative where its first end lies inside.
+        entered: length along the edge at which it went in [m]; negative if its first end lies inside.
         slope: cosine between the edge and the normal there.
-        t, cosine: of the face where it comes out.
+        t: length along the edge at which it comes out [m]; `cosine` is that of the face there.
     """
     if entered < 0.0:
         return t * cosine, float(0.0)
@@ -75,11 +75,12 @@ def edges_inside(
     depth_out: wp.array(dtype=wp.float32),
     at_out: wp.array(dtype=wp.vec3f),
 ):
-    """How deep parts of edges lie behind the faces of a mesh that they cross [m], 0 of edges that cross none; where.
+    """Greatest depth of each edge behind faces of a mesh that it crosses [m] (0 if it crosses none), and its place.
 
-    A part between two faces counts by its middle, one that holds an end of the edge by that end: how far these lie
-    behind the planes of the faces, which is as deep as the part can lie below the mesh or deeper. `triangle` is empty
-    but where the edges are those of the mesh: faces around their nodes do not count then.
+    The depth of a part between two faces is that of its middle; the depth of a part that holds an end of the edge is
+    that of the end. Distances are measured to the planes of the faces, which bounds the depth below the mesh from
+    above. If the edges belong to the mesh itself, `triangle` has its faces, and those around the edge's nodes are
+    skipped; otherwise it is empty.
     """
     k = wp.tid()
     i = edge[k, 0]
@@ -90,7 +91,7 @@ def edges_inside(
     start = float(0.0)
     entered = float(-1.0)
     slope = float(0.0)
-    outside = bool(False)  # known to be, after it came out
+    outside = bool(False)  # known to be outside, because it came out
     depth = float(0.0)
     at = float(0.0)
     for _query in range(MOST):

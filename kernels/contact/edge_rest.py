@@ -22,8 +22,8 @@ wp.set_module_options({"enable_backward": False})
 
 
 _FLAT = 0.9  # least cosine between the reversed normal of a face that rests and that of the side
-_SLOW = 5e-5  # of an edge, by which a crossing that begins to rest moves into the side in a step at most
-_SLIDES = 0.01  # of an edge, by which it moves in all
+_SLOW = 5e-5  # largest motion into the side in a step with which a crossing begins to rest, as a share of an edge
+_SLIDES = 0.01  # the same for its whole motion
 
 
 @wp.struct
@@ -62,7 +62,7 @@ def lies_on(
     own: wp.vec3d,
     along: wp.vec3f,
 ) -> bool:
-    """Whether the node of spring e, at x, lies on a face of its side, or just in front of one, that `own` opposes."""
+    """Whether the node of spring e, at x, lies on or just in front of a face of its side that `own` opposes."""
     near = nearest_face(X, u, master, e, x, along)
     f = wp.max(near.face, near.front_face)
     found = bool(False)
@@ -89,8 +89,8 @@ def meet_edge(
 ) -> Touch:
     """How the crossing meets the side of spring e.
 
-    It is not caught in an impact, but begins to rest where it has come into the side slowly, by no more than nodes that
-    slide there; it is free of force then, and is pressed as the slave tips.
+    An impact does not catch the crossing. It begins to rest only if it came into the side as slowly as nodes that slide
+    there. It starts free of force and is pressed as the slave tips.
     """
     i = slaves.node[s]
     near = support.near
@@ -144,7 +144,7 @@ def support_function(sides: int) -> Any:
         along: wp.vec3f,
         spring: Spring,
     ) -> Support:
-        """An edge from the node to a neighbour that the side presses crosses the plane of the face across the edge.
+        """Find an edge of the slave from the node to a pressed neighbour that crosses the plane of the face.
 
         The normal is across both edges, so that the crossing may move along them without work.
         """
@@ -178,7 +178,7 @@ def support_function(sides: int) -> Any:
                 support.near = nearest_face(X, u, master, e, start + most * (x - start), along)
                 own = area_vector(X, u, slaves.face, support.edge // 2)
                 rests = support.near.face >= 0 and wp.dot(own, support.near.normal) < wp.float64(0.0)
-                if rests:  # Warp evaluates both sides of `and`
+                if rests:  # not `and`: Warp evaluates both of its sides
                     rests = lies_below(X, u, master.face, f, support.near.face, support.near.normal)
                 if not rests:  # a face across a fold stands above the side
                     support.edge = -1

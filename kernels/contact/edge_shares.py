@@ -1,4 +1,4 @@
-"""Owns what the inner nodes of resting edges take, and the search for faces that such edges rest on."""
+"""Owns the share of the force on a resting edge that its inner node takes, and the search for faces below edges."""
 
 from functools import cache
 from typing import Any
@@ -22,7 +22,7 @@ def slid_off(e: int, spring: Spring) -> bool:
 
 @cache
 def carry_kernel(sides: int) -> Any:
-    """Kernel: each slave node takes its share of what presses the edges to nodes that slid off, in a fixed order."""
+    """Kernel: each slave node takes its share of the forces on its edges to nodes that slid off, in a fixed order."""
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def carry(
@@ -57,7 +57,7 @@ def carry_kernel(sides: int) -> Any:
 
 @wp.func
 def sort_row(row: int, count: wp.array(dtype=wp.int32), candidate_out: wp.array2d(dtype=wp.int32)):
-    """Sort a list of faces: crossings lie on seams of faces, where the first of equally near ones is taken."""
+    """Sort a list of faces, so that ties between equally near faces at a seam do not depend on the search."""
     for a in range(1, count[row]):
         value = candidate_out[row, a]
         b = a - 1
@@ -110,7 +110,7 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
                     while wp.bvh_query_next(query, f):
                         row = wp.static(sides) * s + side[f]
                         found = count_out[row]
-                        known = found >= candidate_out.shape[1]  # then it rests on none beyond
+                        known = found >= candidate_out.shape[1]  # the list is full: no further faces
                         for c in range(found):
                             known = known or candidate_out[row, c] == f
                         if not known:

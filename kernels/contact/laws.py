@@ -18,11 +18,11 @@ LINEAR = "warp_mca.kernels.contact.penalty"
 class LawFunctions:
     """Device functions of a law, (depth, k, parameters, s) -> number, all in float64; its module has them by this name.
 
-    depth is how far the spring is pressed [m], 0 or above; k its stiffness [N/m], see `model.surfaces`; parameters[s]
+    depth [m], 0 or above, says how far the spring is pressed; k is its stiffness [N/m]; parameters[s]
     holds the law's own `parameters` for spring s, shape (spring_count, parameter_count).
 
     Attributes:
-        force: along the normal [N]; 0 at depth 0, and nowhere below.
+        force: along the normal [N]; 0 at depth 0, and never negative.
         energy: that the spring stores [J], the integral of the force from 0 to the depth.
     """
 

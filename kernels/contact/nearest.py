@@ -8,9 +8,9 @@ from warp_mca.kernels.contact.spring import FAR
 wp.set_module_options({"enable_backward": False})
 
 # Lengths, as fractions of the edges of a face
-_FOLD = 0.01  # how much deeper a node may be at once in a neighbour that rises, past the edge between them
-SLACK = 1e-4  # by how much more than its motion in a step the depth of a node may grow
-ABOVE = 0.04  # a node that arrives beside a face, but nearer than this above another one, passes by
+_FOLD = 0.01  # extra depth allowed at once when a node slides through a fold into the rising neighbour
+SLACK = 1e-4  # growth of the depth in a step allowed beyond the motion of the node
+ABOVE = 0.04  # a node that arrives beside a face passes by if another face is nearer than this below it
 
 _RIM = 1e-4  # fraction of half an edge by which a node may lie off a face and still count as above it
 _OPPOSED = -0.9  # least cosine between a node's last contact force and the normal of the face that presses it next
@@ -70,8 +70,8 @@ def master_velocity(
 def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.float64, edge: wp.float64) -> bool:
     """Whether a node can have come to this depth in a face since the last step.
 
-    Depth grows from zero, in a step by no more than the node moves along the normal. A node in front of one face at
-    the edge of a solid may lie behind the next face, which stands across, by up to a whole face: it does not touch.
+    Depth grows from zero, and in a step by no more than the node moves along the normal. At the edge of a solid a node
+    in front of one face may lie far behind the plane of the next face: it does not touch that face.
 
     Args:
         depth: behind the face [m].
@@ -81,7 +81,7 @@ def reachable(depth: wp.float64, held: wp.float64, front: wp.float64, moved: wp.
         edge: length of the face's edges [m].
     """
     slack = wp.float64(SLACK) * edge
-    if depth < front and held > wp.float64(0.0):  # inside already, and maybe past a fold since
+    if depth < front and held > wp.float64(0.0):  # already inside, and may have passed a fold since
         slack = held + wp.float64(_FOLD) * edge
     return depth <= held + wp.float64(2.0) * wp.abs(moved) + slack
 
@@ -96,7 +96,7 @@ def is_beside(at: wp.vec2d, triangle: bool, rim: wp.float64) -> bool:
 
 @wp.func
 def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float64) -> bool:
-    """Whether a node that arrives beside a face flies above another one instead; arguments as of `reachable`."""
+    """Whether a node that arrives beside a face is above another face instead. Arguments as in `reachable`."""
     return beside and held == wp.float64(0.0) and front < wp.float64(ABOVE) * edge
 
 
@@ -106,9 +106,9 @@ def nearest_face(
 ) -> Nearest:
     """Among the candidates of spring s, the face that may press a node at x, whose last contact force was `along`.
 
-    Choose the shallowest penetrated face; of faces that the node lies beside, the deepest, and only if it lies above
-    none: a concave fold needs that. Ties go to the lower number. Skip faces whose normal opposes the last contact
-    force: they are the far side of a thin body.
+    Choose the shallowest penetrated face that has the node right below it. If there is none, as in a concave fold,
+    choose the deepest face that the node lies beside. Ties go to the lower number. Skip faces whose normal opposes the
+    last contact force: they are the far side of a thin body.
     """
     return nearest_of(X, u, master, s, x, along, 0, 1)
 
@@ -125,7 +125,7 @@ def nearest_of(
     stride: int,
 ) -> Nearest:
     """`nearest_face` among every `stride`-th candidate, from `first` on."""
-    f = master.candidate[s, first]  # read before the count is known: memory answers late
+    f = master.candidate[s, first]  # read before the count is known, to hide the latency of memory
     best = Nearest()
     best.face = -1
     best.front = wp.float64(FAR)
@@ -138,7 +138,7 @@ def nearest_of(
             area = wp.length(area_normal)  # a quarter of it: a face as large has edges of 2 sqrt(area)
             normal = (wp.float64(1.0) / area) * area_normal
             gap = wp.dot(away, normal)
-            cosine = wp.dot(wp.vec3f(normal), along)  # times the size of the force
+            cosine = wp.dot(wp.vec3f(normal), along)  # the cosine times the size of the force
             kept = cosine >= 0.0 or cosine * cosine < wp.static(_OPPOSED**2) * wp.dot(along, along)
             if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
                 beside = is_beside(at, triangle, wp.float64(_RIM))
@@ -146,7 +146,7 @@ def nearest_of(
                 if beside != best.beside:
                     better = best.beside
                 elif gap == best.gap:
-                    better = f < best.face  # whatever the order of the search
+                    better = f < best.face  # so that the order of the search does not matter
                 if better or best.face < 0:
                     best.face = f
                     best.gap = gap

@@ -4,7 +4,7 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-# A node that leaves one face of a dented surface may project just beside both neighbours: faces reach this far out.
+# Faces reach this far beyond their edges: a node that leaves a face of a dented surface may project beside both.
 EDGE_REACH = 1.02
 
 
@@ -23,7 +23,7 @@ def shape(xi: wp.float64, eta: wp.float64) -> wp.vec4d:
 
 @wp.func
 def weights_at(at: wp.vec2d, triangle: bool) -> wp.vec4d:
-    """Weights of the corners at natural coordinates of a face, or at those of a triangle, whose last is 0."""
+    """Shape functions of the corners at natural coordinates of a face; those of a triangle end with 0."""
     if triangle:
         return wp.vec4d(wp.float64(1.0) - at[0] - at[1], at[0], at[1], wp.float64(0.0))
     return shape(at[0], at[1])
@@ -88,7 +88,7 @@ def closest_point(r0: wp.vec3d, e: wp.vec3d, f: wp.vec3d, t: wp.vec3d) -> wp.vec
         moved = wp.abs(xi_new - xi) + wp.abs(eta_new - eta)
         xi = xi_new
         eta = eta_new
-        if moved < wp.float64(1e-7):  # the next step would be its square
+        if moved < wp.float64(1e-7):  # convergence is quadratic: the next step would be its square
             break
     return wp.vec2d(xi, eta)
 

@@ -20,7 +20,7 @@ _EQUAL = 1e-6  # relative difference of distances up to which faces share the ne
 def bounds_kernel(each: bool) -> Any:
     """Kernel: bounding box of each face, extended inwards by the size of the face and by the margin on all sides.
 
-    Boxes are relative to `origin`, so that float32 is fine enough.
+    Boxes are relative to `origin`, so that float32 resolves them.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
@@ -61,10 +61,9 @@ def bounds_kernel(each: bool) -> Any:
 def candidates_kernel(each: bool, sides: int) -> Any:
     """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
 
-    Counts of the slaves are 0 before.
-
-    With `each`, faces are grouped by scene, and a slave looks only among the faces of its scene. Where a master has
-    several sides, a slave has one list for each side, and the faces list the number of that list in place of the slave.
+    The caller sets the counts of the slaves to 0. With `each`, faces are grouped by scene, and a slave searches the
+    faces of its scene only. If the master has several sides, a slave has a list for each side, and faces list the
+    number of that list in place of the slave.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
@@ -152,12 +151,10 @@ def distance_to_face(
 def clear_kernel(each: bool, sides: int) -> Any:
     """Kernel: set the depth at the start to 0 for slave nodes in front of their nearest face.
 
-    Where a master has several sides, a node behind its nearest face keeps a depth in the side of that face alone. The
-    candidate lists cannot be used: in a body thinner than its faces are long they may hold only the far side. So this
-    looks for faces as far away as the boxes of faces are deep.
-
-    Of faces that share the nearest point, an edge, the one counts whose plane is farthest: a node in the plane of a
-    face, but beyond its edge, is on the side of the edge that the other face tells.
+    If the master has several sides, a node behind its nearest face keeps a depth in the side of that face only. In a
+    body thinner than its faces are long the candidate lists may hold only the far side, so the kernel searches as far
+    as the boxes of faces are deep. If the nearest point lies on an edge, the face whose plane is farthest decides: for
+    a node in the plane of one face but beyond its edge, the other face tells inside from outside.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
     of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
@@ -215,7 +212,7 @@ def clear_kernel(each: bool, sides: int) -> Any:
     return find_clear
 
 
-# Those of a lone scene belong to this module, so they are made before it is loaded; a batch has its own modules.
+# Variants of a single scene belong to this module, so they must exist before it is loaded.
 bounds_kernel(False)
 candidates_kernel(False, 1)
 clear_kernel(False, 1)
@@ -226,7 +223,7 @@ def sort_lists(
     face_count: wp.array(dtype=wp.int32),
     face_slave_out: wp.array2d(dtype=wp.int32),
 ):
-    """Sort each face's slaves, because threads filled the list in any order and sums must repeat bit for bit."""
+    """Sort each face's slaves: threads filled the lists in any order, and sums must repeat bit for bit."""
     f = wp.tid()
     n = wp.min(face_count[f], face_slave_out.shape[1])
     for a in range(1, n):

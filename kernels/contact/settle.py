@@ -1,4 +1,4 @@
-"""Owns how a slave node is pressed on the face that was found for it, and how it is released where there is none."""
+"""Owns how a slave node is pressed by the face that was found for it, and how it is released if none was found."""
 
 from functools import cache
 from typing import Any
@@ -13,7 +13,7 @@ from warp_mca.kernels.records.extremes import add_normal_force
 
 wp.set_module_options({"enable_backward": False})
 
-_SHARP = 0.7  # cosine between successive normals below which a node turned a sharp edge
+_SHARP = 0.7  # a node has turned a sharp edge if successive normals have a smaller cosine
 
 
 @wp.struct
@@ -51,7 +51,7 @@ def meet(
     held: wp.float64,
     along: wp.vec3f,
 ) -> Touch:
-    """How node i meets the nearest face; whether the face presses it is still open."""
+    """How node i meets the nearest face. `touches` is not set here."""
     touch = Touch()
     touch.weight = weights_at(near.at, face[near.face, 2] == face[near.face, 3])
     touch.du = dt * (v[i] - master_velocity(v, face, near.face, touch.weight))
@@ -98,7 +98,7 @@ def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, 
         spring.held[s] = wp.where(touch.touches or near.front < wp.float64(FAR), -gap_kept, touch.held)
         if gap_pressed * gap_pressed > near.area:
             flag_out[scene, TOO_DEEP] = 1
-        cosine = wp.dot(wp.vec3f(normal_kept), touch.along)  # times the size of the force
+        cosine = wp.dot(wp.vec3f(normal_kept), touch.along)  # the cosine times the size of the force
         sharp = cosine * cosine < wp.static(_SHARP**2) * wp.dot(touch.along, touch.along)
         if touch.touches and (cosine < 0.0 or sharp):
             flag_out[scene, TURNED] = 1

@@ -13,7 +13,7 @@ from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_functio
 
 wp.set_module_options({"enable_backward": False})
 
-_ROUNDING = 1e-6  # fraction of an edge by which a node may be behind a side before it penetrates that
+_ROUNDING = 1e-6  # a node penetrates a side beyond this depth, as a fraction of an edge
 
 
 @wp.struct
@@ -51,7 +51,7 @@ class Choice:
         depth: depth behind that face before the step [m].
         approach: motion of the node into that face in this step [m].
         returns: whether the node comes to that face over an edge.
-        passed: springs, a bit for each side, that do not press the node, because another side of an edge does.
+        passed: bit of each side whose spring does not press the node, because the other side of an edge does.
         begins: compression with which the newcomer may begin, if it is deeper than it can reach by itself [m].
     """
 
@@ -68,7 +68,7 @@ class Choice:
 
 @wp.func
 def first_choice(node: NodeSprings) -> Choice:
-    """The choice before any side has been looked at: where a single side has candidates, it needs no comparison."""
+    """The choice before any side was compared; if only one side has candidates, it is already final."""
     choice = Choice()
     choice.newcomer = wp.where(node.listed > 1, -1, node.last_listed)
     choice.leaver = -1
@@ -130,7 +130,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         """Spring of a side that presses the node and meets face f at the edge of a solid, or -1."""
         found = int(-1)
         for e in range(begin, begin + wp.static(sides)):
-            if spring.face[e] >= 0:  # Warp evaluates both sides of `and`
+            if spring.face[e] >= 0:  # not `and`: Warp evaluates both of its sides
                 g = spring.face[e]
                 if is_edge(X, u, master.face, f, g, area_vector(X, u, master.face, g)):
                     found = e
@@ -148,7 +148,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         other: int,
         spring: Spring,
     ) -> bool:
-        """Whether the nearest face takes the node from spring `other`: it is no deeper there, and not on its way in."""
+        """Whether the nearest face takes the node over from spring `other`: no deeper in it, and not moving in."""
         across = area_vector(X, u, master.face, spring.face[other])
         better = opposition(X, u, slave_faces, s, near.normal) - opposition(X, u, slave_faces, s, across)
         enters = -wp.dot(du, near.normal) > -wp.dot(du, wp.normalize(across))
@@ -172,9 +172,9 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         spring: Spring,
         recent_force: wp.array(dtype=wp.vec3d),
     ) -> Choice:
-        """A free node goes to the side that it was least behind before the step; ties go to the fastest approach.
+        """A free node goes to the side behind which it was least deep before; ties go to the fastest approach.
 
-        One that comes over an edge goes to the side that it slides on.
+        A node that comes over an edge goes to the side on which it slides.
         """
         chosen = choice
         other = int(-1)

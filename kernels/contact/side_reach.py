@@ -1,4 +1,4 @@
-"""Owns which sides of a master can press a slave node: those in its reach, unless it slides above another side."""
+"""Owns which sides of a master can press a slave node: those within reach, but none if it slides above another."""
 
 from functools import cache
 from typing import Any
@@ -45,7 +45,8 @@ def belongs_to_other_side(
 def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float64, approach: wp.float64) -> bool:
     """Whether the node can have come to its depth in the nearest face, from this side or from one that released it.
 
-    `fold` is the distance to the nearest face in front of the node, or 0 for a side that did not press it before.
+    `fold` is the distance to the nearest face that has the node in front of it, or 0 if the side did not press it
+    before.
     """
     edge = wp.float64(2.0) * wp.sqrt(near.area)
     found = reachable(-near.gap, held, fold, approach, edge)
@@ -58,9 +59,9 @@ def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float6
 def front_functions(sides: int) -> tuple[Any, Any]:
     """The functions of the faces that have a node in front of them.
 
-    front_faces: of each side the nearest such face; distances [m], numbers, and the least distance. FAR where only one
-    side has candidates. may_press: whether the nearest face can press the node, which its side `pressed` before or
-    not, given those of the other sides.
+    `front_faces` gives the nearest such face of each side: distances [m], numbers, and the least distance; FAR if only
+    one side has candidates. `may_press` says whether the nearest face can press the node, given the faces of the other
+    sides and whether its own side `pressed` the node before.
     """
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 

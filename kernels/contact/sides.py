@@ -35,10 +35,10 @@ wp.set_module_options({"enable_backward": False})
 def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master with several sides.
 
-    Springs and lists are those of slave 0 with each side, then of slave 1, and so on. A node that no side presses goes
-    to the side that it was least behind before the step; ties go to the side with the greatest approach speed. There
-    it may be as deep as in the side that released it, for it may have slid over an edge. Where several sides have
-    candidates, step 0 chooses among them; step 1 presses the node.
+    Springs and lists are ordered by slave, then by side. A node that no side presses goes to the side behind which it
+    was least deep before the step; ties go to the side with the greatest approach speed. It may be as deep there as in
+    the side that released it, because it may have slid over an edge. If several sides have candidates, step 0 chooses
+    among them; step 1 presses the node.
     """
     settle, _ = settle_functions(friction, True, law)
     choose, confirm = choice_functions(sides)

@@ -26,7 +26,7 @@ from warp_mca.kernels.records.ledger import run_of
 
 wp.set_module_options({"enable_backward": False})
 
-FAR = 1e30  # further than anything [m]
+FAR = 1e30  # larger than any distance [m]
 ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
 
 Columns = wp.types.vector(length=PASS_COLUMNS, dtype=wp.float64)
@@ -83,16 +83,16 @@ def switch(
 ):
     """Book the energy that a spring makes in a step in which its normal force begins or ends.
 
-    Central differences do the work (before + after) . du / 2 of the forces at both ends of the step, which is that of a
-    spring pressed all the way: it makes `kept` - `stored` + this work. A linear spring that closes from a gap a to a
-    depth b takes k a b / 2, one that opens as far makes as much.
+    Central differences count the work (before + after) . du / 2 of the forces at both ends of the step, as if the
+    spring were pressed all the way; so the spring makes `kept` - `stored` + this work. A linear spring that closes from
+    a gap a to a depth b takes k a b / 2; one that opens by as much makes it.
     """
     spring.made[s] = spring.made[s] + (kept - stored + wp.float64(0.5) * wp.dot(before + after, du))
 
 
 @wp.func
 def normal_energy(s: int, pressed: wp.vec3d, k: wp.float64, spring: Spring):
-    """What a spring of stiffness k that was `pressed` along its normal holds of it [J]."""
+    """Energy of the normal spring of stiffness k that was `pressed` [J]."""
     if spring.normal_energy.shape[0] == 0:
         return wp.float64(0.5) * wp.dot(pressed, pressed) / k
     return wp.where(spring.face[s] < 0, wp.float64(0.0), spring.normal_energy[s])
@@ -100,7 +100,7 @@ def normal_energy(s: int, pressed: wp.vec3d, k: wp.float64, spring: Spring):
 
 @cache
 def rest_function(stress_free: bool) -> Any:
-    """The function that measures a gap from where a spring is free of force: the face, or the overlap at the start.
+    """The function that measures a gap from the depth at which a spring is free: 0, or the overlap at the start.
 
     That overlap shrinks as the node moves outwards, and does not grow again.
     """
@@ -120,8 +120,8 @@ def rest_function(stress_free: bool) -> Any:
 def spring_function(friction: bool, law: str) -> Any:
     """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential.
 
-    `law` names the module of the contact law. The energy of a linear spring, and what it loses, are written as
-    quotients of its force, in place of the law's energy W.
+    `law` names the module of the contact law. For a linear spring, energy and losses are computed from its force, not
+    from the energy W of the law.
     """
     functions, linear = law_functions(law), law == LINEAR
     law_force, law_energy = functions.force, functions.energy
@@ -161,7 +161,7 @@ def spring_function(friction: bool, law: str) -> Any:
         spring: Spring,
     ):
         """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force."""
-        # all is read before anything is written, so that a GPU waits for memory once
+        # read everything before writing anything, so that a GPU waits for memory once
         impulse = spring.impulse[s]
         normal_impulse = spring.normal_impulse[s]
         depth = spring.depth[s]
@@ -191,7 +191,7 @@ def spring_function(friction: bool, law: str) -> Any:
             squares += wp.dot(Ft, Ft)
             spring.tangential[s] = Ft
             spring.friction[s] = friction_work + work
-            if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have none
+            if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have no friction
                 spring.stick_impulse[s] = stick_impulse + Fn
         if wp.static(linear):
             spring.energy[s] = wp.float64(0.5) * squares / k
@@ -245,7 +245,7 @@ def sum_springs(
     sums = Columns()
     impulse = wp.vec3d()
     pressed = wp.vec3d()
-    pressed_energy = wp.float64(0.0)  # apart from `sums`, so that a GPU fuses its product and sum
+    pressed_energy = wp.float64(0.0)  # kept apart from `sums`, so that a GPU fuses product and sum
     begin, end = run_of(first[scene], first[scene + 1], k)
     for s in range(begin + lane, end, wp.block_dim()):
         held = spring.energy[s]
@@ -279,6 +279,6 @@ def sum_springs(
     r = row[0]
     for c in range(wp.static(PASS_COLUMNS)):
         total = wp.tile_sum(wp.tile(sums[c]))
-        value = total[0]  # by all threads: reading a tile waits for all
+        value = total[0]  # executed by all threads, because reading a tile synchronises them
         if lane == 0:
             partial_out[r, scene, column + c, k] = value

@@ -12,8 +12,8 @@ from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 wp.set_module_options({"enable_backward": False})
 
 OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
-_USUAL = 4.0  # depth at which a node may come over an edge, over that at which a spring bears the recent force
-_FADES = 0.99  # share that a recent force keeps from step to step
+_USUAL = 4.0  # largest depth of a node that comes over an edge, over the depth at which a spring bears the recent force
+_FADES = 0.99  # share of a recent force that is kept from step to step
 _ALONG = 0.7  # least cosine between that force and the normal
 
 
@@ -23,7 +23,7 @@ class WayBack:
 
     Attributes:
         spring: of that side, or -1 if there is none.
-        face: below which the node lies there.
+        face: the face of that side below which the node lies.
         normal: of that face.
         begins: compression with which the spring may begin [m].
     """
@@ -36,9 +36,9 @@ class WayBack:
 
 @wp.func
 def recent(before: wp.vec3d, force: wp.vec3d) -> wp.vec3d:
-    """The force that a contact pass gives a node now, or what has faded of a greater one before [N].
+    """The present force of a contact pass on a node, or the decayed value of a greater earlier force [N].
 
-    Springs of a sliding node tremble, and their depth of a single step may be next to none.
+    Springs of a sliding node tremble, and their depth in a single step may be close to zero.
     """
     faded = wp.float64(_FADES) * before
     return wp.where(wp.length_sq(force) > wp.length_sq(faded), force, faded)
@@ -62,8 +62,8 @@ def usual_depth(
 ) -> wp.float64:
     """Depth at which the spring of slave node s bears its recent contact force, or that on a corner of the face [m].
 
-    That of the node may come from another master, flush with this one. The corners know of a slave that is pressed by
-    other nodes, where this one has not been touched before.
+    The force on the node may come from another master, flush with this one. If this node has not been touched yet, the
+    forces on the corners of the face stand for those of other nodes of the slave.
     """
     force = along_normal(recent_force[slave_faces.node[s]], normal)
     for c in range(4):
@@ -73,7 +73,7 @@ def usual_depth(
 
 @wp.func
 def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
-    """Whether a node this far from a face, on either side, may slide on it, if `usual_depth` is usual."""
+    """Whether a node at this distance from a face, on either side, may slide on it, given the `usual_depth`."""
     return wp.abs(depth) <= wp.float64(_USUAL) * usual + wp.float64(SLACK) * edge
 
 
@@ -86,7 +86,7 @@ def way_ends(near: Nearest, elsewhere: bool) -> bool:
 
 @wp.func
 def note_way(e: int, presses: bool, ends: bool, spring: Spring):
-    """Keep how deep a side pressed the node last, until its way over the edge ends; no slave edge rests there."""
+    """Keep the last compression by a side until the node's way over the edge ends; no slave edge rests there."""
     spring.support[e] = -1
     if presses:
         spring.left[e] = spring.held[e] - spring.rest[e]
@@ -114,11 +114,11 @@ def way_back_function(sides: int) -> Any:
     ) -> WayBack:
         """The side across an edge of the nearest face of spring e, which slave node s has run into.
 
-        A node that slid off a side lies below that side as it comes back: by the depth of its spring, and by what the
-        slave sagged meanwhile. So does one that slides from another master, flush with this one. The face across the
-        edge is the one that it then runs into, though it slides on the side. It belongs to that side if faces of the
-        slave oppose the side, and it lies no deeper below it than usual; or than a node in front of it counts as above
-        it, where it slid off that side or where no face of the slave opposes the face that it runs into.
+        A node that slid off a side lies below that side as it comes back, by the depth of its spring and by the sag of
+        the slave. So does a node that slides over from another master, flush with this one. Such a node then runs into
+        the face across the edge, although it slides on the side. It belongs to the side if faces of the slave oppose
+        the side and if it lies no deeper below it than usual. If it slid off that side, or if no face of the slave
+        opposes the face that it runs into, it may lie as deep as nodes in front of a face count as above it.
         """
         i = slave_faces.node[s]
         way = WayBack()
