@@ -15,17 +15,17 @@ wp.set_module_options({"enable_backward": False})
 MIN_ARCH = 90  # compute capability times ten of the first devices that support it
 
 EARLY: set[str] = set()  # keys of kernels that wait
-LEADING: set[str] = set()  # keys of others, whose end kernels that wait may await
+LEADING: set[str] = set()  # keys of other kernels, for whose end waiting kernels may wait
 
 
 def begins_early(kernel: Any) -> Any:
-    """The kernel, all of whose threads wait before they write, and before they read what such kernels write."""
+    """Register a kernel whose threads wait before they write, and before they read what such kernels write."""
     EARLY.add(kernel.key)
     return kernel
 
 
 def lets_begin(kernel: Any) -> Any:
-    """The kernel, which begins when those before it have ended: its threads would take places for long."""
+    """Register a kernel that begins after its predecessors: its waiting blocks would occupy the GPU for long."""
     LEADING.add(kernel.key)
     return kernel
 
@@ -46,5 +46,5 @@ def wait_for_previous():
 
 @wp.func_native(_on_gpu("griddepcontrol.launch_dependents"))
 def let_next_begin():
-    """Let the kernel after this one begin, once all blocks of threads have said so."""
+    """Let the next kernel begin once all blocks of this one have called this."""
     ...

@@ -1,4 +1,4 @@
-"""Owns kernel arguments that differ between the scenes of a batch: a scalar for one scene, else an array by scene."""
+"""Owns kernel arguments that may differ between the scenes of a batch: a scalar for one scene, else an array."""
 
 from typing import Any
 

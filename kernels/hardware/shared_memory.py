@@ -1,6 +1,6 @@
-"""Owns what Warp leaves to CUDA: shared memory of a block of threads, barriers, copies that do not wait, lanes.
+"""Owns what Warp leaves to CUDA: shared memory of a block, barriers, asynchronous copies, lanes.
 
-Nothing of this can be run on a CPU.
+None of it runs on a CPU.
 """
 
 from functools import cache
@@ -11,9 +11,9 @@ import warp as wp
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.physics.elements.patches import PATCH, SLOTS
 
-ROW = PATCH + 1  # a component of the forces on the corners of one number, and a zero behind them
+ROW = PATCH + 1  # one force component of all elements at one corner, and a zero behind them
 FORCES = 24 * ROW
-HEADS = 4  # patches whose heads are in shared memory: this one, two to come, and one on its way
+HEADS = 4  # patches whose heads are in shared memory: the present one, the next two, and one that is being copied
 
 wp.set_module_options({"enable_backward": False})
 
@@ -32,13 +32,13 @@ def warp_barrier():
 
 @wp.func_native(f"__shared__ int pool[{PATCH + 1}]; return (unsigned long long)pool;")
 def list_pool() -> wp.uint64:
-    """Address of shared memory for a list of elements of a patch, its length first."""
+    """Address of shared memory for a list of elements of a patch, which begins with its length."""
     ...
 
 
 @wp.func_native(f"__shared__ int4 pool[{HEADS}]; return (unsigned long long)pool;")
 def head_ring() -> wp.uint64:
-    """Address of shared memory for the heads of the patches that a block of threads computes next."""
+    """Address of shared memory for the heads of the next patches of a block of threads."""
     ...
 
 
@@ -110,7 +110,7 @@ def copy_index(value: wp.array(dtype=wp.int32), k: int, slot: int, pool_out: wp.
 
 @wp.func_native("int4 a = ((const int4*)pool.data)[slot]; return wp::vec_t<3, int>(a.x, a.y, a.z);")
 def place_of(pool: wp.array(dtype=wp.vec4i), slot: int) -> wp.vec3i:
-    """Where a point lies on its grid; one instruction reads it whole."""
+    """Read a point's place on its grid in one instruction."""
     ...
 
 
@@ -122,7 +122,7 @@ def power_of_two(exponent: int) -> wp.float32:
 
 @wp.func_native('asm volatile("cp.async.wait_all;" ::: "memory");')
 def wait_for_copies():
-    """Wait until what this thread began to copy has arrived."""
+    """Wait until the copies that this thread began have arrived."""
     ...
 
 
@@ -130,7 +130,7 @@ def wait_for_copies():
 def row_functions(precision: str, size: int) -> tuple[Any, Any]:
     """Functions that read and write `size` entries of a column, which lie side by side, 16 bytes at a time.
 
-    What is written leaves the cache first: it is not read again in this step.
+    Written values are the first to leave the cache, because this step does not read them again.
     """
     R = scalars(precision).real
     name, width = ("float", 4) if precision == "mixed" else ("double", 2)

@@ -1,7 +1,7 @@
-"""Owns what a CPU makes of numbers too small to have all their digits: zeros, while it computes steps.
+"""Owns the treatment of subnormal numbers on a CPU: they are zero while steps are computed.
 
-Ahead of a wave float32 leaves such numbers, on which x86-64 is many times slower. Kernels of a GPU that use fast math
-take them for zero as well.
+Ahead of a wave float32 leaves such numbers, with which x86-64 is many times slower. GPU kernels that use fast math
+flush them to zero as well.
 """
 
 import warp as wp
@@ -26,23 +26,23 @@ def _exchange(wanted: str) -> str:
 
 @wp.func_native(_exchange(f"before | {_FLUSH}"))
 def flush() -> wp.uint32:
-    """Subnormal numbers are zero in the present thread from now on; returns its mode until now."""
+    """Flush subnormal numbers to zero in this thread from now on. Returns the previous mode."""
     ...
 
 
 @wp.func_native(_exchange("mode"))
 def set_mode(mode: wp.uint32) -> wp.uint32:
-    """The mode of the present thread; returns that until now."""
+    """Set the mode of this thread. Returns the previous mode."""
     ...
 
 
 @wp.kernel(enable_backward=False, grid_stride=False)
 def begin_flush(before_out: wp.array(dtype=wp.uint32)):
-    """Subnormal numbers are zero in this thread."""
+    """Flush subnormal numbers to zero in this thread."""
     before_out[0] = flush()
 
 
 @wp.kernel(enable_backward=False, grid_stride=False)
 def end_flush(before: wp.array(dtype=wp.uint32), flushed_out: wp.array(dtype=wp.uint32)):
-    """This thread's mode is what it was before `begin_flush`; and what it was until now."""
+    """Restore the mode from before `begin_flush`. Returns the mode until now."""
     flushed_out[0] = set_mode(before[0])

@@ -1,4 +1,4 @@
-"""Owns the sums of what absorbing boundaries take up, of each scene apart."""
+"""Owns the sums of energy and work at absorbing boundaries, for each scene separately."""
 
 import warp as wp
 
@@ -18,9 +18,9 @@ def sum_absorbed(
     absorbed: wp.array(dtype=wp.float64),
     partial_out: wp.array4d(dtype=wp.float64),
 ):
-    """Energy absorbed, and work of what lies beyond, which moves with `velocity`, into the columns from `column` on.
+    """Write absorbed energy, and work of the surroundings, which move with `velocity`, from `column` on.
 
-    `first` is the first node of absorbing boundaries of each scene; sums are those of `records.ledger`.
+    `first` has the first node of absorbing boundaries of each scene. Sums are formed as in `records.ledger`.
     """
     scene, k, lane = wp.tid()
     energy = wp.float64(0.0)

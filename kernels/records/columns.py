@@ -21,10 +21,10 @@ ABSORBING_COLUMNS = 2
 
 
 def absorbing_column(passes: int) -> int:
-    """First of the columns of absorbing boundaries."""
+    """First column of absorbing boundaries."""
     return PASS + PASS_COLUMNS * passes
 
 
 def column_count(passes: int, absorbing: bool) -> int:
-    """Columns of a record with so many passes of each scene."""
+    """Number of columns of a record of scenes with `passes` contact passes each."""
     return absorbing_column(passes) + (ABSORBING_COLUMNS if absorbing else 0)

@@ -11,15 +11,15 @@ wp.set_module_options({"enable_backward": False})
 STRAIN_SQUARE, VOLUME_LOSS = 0, 1
 
 
-# Values up to these are left to check records, so that most elements write nothing.
+# Smaller values are left to check records, so that most elements write nothing in a step.
 _FLOOR = {"strain": 1e-6, "volume": 0.02}  # e : e and 1 - J [-]
 
 
 def _keep(index: str, double: bool, floor: float) -> str:
     """Source of `array[index] = max(array[index], value)` for values above `floor`, which is not below 0.
 
-    Floats of one sign are ordered as the integers of their bits. On a GPU the atomic maximum has no result to wait for,
-    and a predicate in place of a branch leaves the registers of the kernel as they are.
+    Non-negative floats are ordered as the integers of their bits. On a GPU the atomic maximum returns nothing that a
+    thread would wait for, and a predicate in place of a branch costs no registers.
     """
     size, name, suffix, number, word = (64, "double", "", "d", "l") if double else (32, "float", "f", "f", "r")
     bits = "__double_as_longlong" if double else "__float_as_int"
@@ -70,7 +70,7 @@ _KEEP_SPEED = """
 
 @wp.func_native(_KEEP_SPEED)
 def keep_value(i: int, value: wp.float32, greatest_out: wp.array(dtype=wp.float32)):
-    """Keep in greatest_out[i] the greatest value so far, from 0 on."""
+    """Keep the greatest non-negative value so far in greatest_out[i]."""
     ...
 
 
@@ -84,7 +84,7 @@ def keep_speed(i: int, v: wp.vec3d, speed_square_out: wp.array(dtype=wp.float32)
 def add_normal_force(k: int, F_n: wp.float64, per_newton: wp.float64, normal_force_out: wp.array(dtype=wp.int64)):
     """Add the normal force of a spring [N] to the sum of scene k, which counts `per_newton` for a newton [1/N].
 
-    Sums of whole numbers are the same in any order.
+    Sums of integers do not depend on the order.
     """
     if F_n > wp.float64(0.0):
         wp.atomic_add(normal_force_out, k, wp.int64(F_n * per_newton))
@@ -108,7 +108,7 @@ _KEEP_SUMS = """
 def keep_normal_force(i: int, count: int, normal_force_out: wp.array2d(dtype=wp.int64)):
     """Keep in row 0 the greatest normal force of a step of each scene, and clear the sums for the next step.
 
-    Thread i of `count` takes every count-th scene. There is a row of sums for each range of slaves, which threads of a
-    CPU compute side by side.
+    Thread i of `count` takes every count-th scene. Each range of slaves, which CPU threads compute in parallel, has a
+    row of sums.
     """
     ...

@@ -1,8 +1,7 @@
-"""Owns the sums of the energy ledger, of each scene apart, in an order that is fixed.
+"""Owns the sums of the energy ledger, for each scene separately, in a fixed order.
 
-Entries of a scene are cut into equal runs, SUM_WIDTH at most, whose sums a record keeps apart. On a GPU a block of
-threads walks a run, side by side, and sums in a fixed order of its own what its threads found; on a CPU a block is one
-thread.
+Entries of a scene are cut into SUM_WIDTH equal runs at most, whose sums a record keeps separately. On a GPU the threads
+of a block share a run and add up their parts in a fixed order; on a CPU a block is one thread.
 """
 
 from functools import cache
@@ -25,12 +24,12 @@ from warp_mca.kernels.records.columns import (
 wp.set_module_options({"enable_backward": False})
 
 SUM_WIDTH = 256  # runs of a scene at most
-RUN = 256  # entries of a run at least, while there are so many: one for each thread of a block
+RUN = 256  # least number of entries of a run, one for each thread of a block
 
 
 @wp.func
 def run_of(first: int, end: int, k: int):
-    """Beginning and end of the k-th run of the entries [first, end), which is empty beyond the last."""
+    """Beginning and end of the k-th run of the entries [first, end); runs beyond the last are empty."""
     size = wp.max((end - first + wp.static(SUM_WIDTH - 1)) // wp.static(SUM_WIDTH), wp.static(RUN))
     begin = wp.min(first + k * size, end)
     return begin, wp.min(begin + size, end)
@@ -92,8 +91,8 @@ def record_motion(
 def sum_elements_kernel(precision: str) -> Any:
     """Kernel: sums of elastic, plastic and hourglass energy; extremes of strain and Jacobian ratio.
 
-    `ranges` are first and end of the elements of each scene in each block. A run goes on from one block to the next, so
-    that the order is that of the scene alone.
+    `ranges` are first and end of the elements of each scene in each block. Runs continue from one block to the next, so
+    that the order of summation does not depend on the other scenes of a batch.
     """
     R = scalars(precision).real
 

@@ -1,4 +1,4 @@
-"""Owns the sums of what a chain's joints and base do, of each scene apart."""
+"""Owns the sums of work and heat at a chain's joints and base, for each scene separately."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Owns what is read off the state for viewers: stress at nodes, skins, probes, contact points, fields of the volume."""
+"""Owns what viewers show of the state: stress at nodes, skins, probes, contact points, fields of the volume."""
 
 import warp as wp
 
@@ -8,7 +8,7 @@ wp.set_module_options({"enable_backward": False})
 
 vec6 = wp.types.vector(6, wp.float32)  # xx, yy, zz, xy, yz, xz
 OPEN, SLIP, STICK = 0, 1, 2  # states of a contact point
-_STICKING = 0.999999  # of mu F_n: a tangential force below this has not reached its limit
+_STICKING = 0.999999  # share of mu F_n below which a point sticks
 
 
 @wp.func
@@ -31,7 +31,7 @@ def nodal_stress(
     von_mises_out: wp.array(dtype=wp.float32),
     plastic_out: wp.array(dtype=wp.float32),
 ):
-    """Mean over the elements around each node of the values at its corners, and the von Mises stress of the mean.
+    """Mean of the corner values of the elements around each node, and the von Mises stress of the mean.
 
     Nodes of rigid bodies have no elements, and show no stress.
     """
@@ -56,7 +56,7 @@ def positions(
     node: wp.array(dtype=wp.int32),
     point_out: wp.array(dtype=wp.vec3f),
 ):
-    """Where some nodes are [m]."""
+    """Positions of some nodes [m]."""
     i = wp.tid()
     point_out[i] = wp.vec3f(X[node[i]] + u[node[i]])
 
@@ -105,7 +105,7 @@ def contact_points(
     point_out: wp.array(dtype=wp.vec3f),
     state_out: wp.array(dtype=wp.int32),
 ):
-    """Where the slave nodes of a pass are [m], and whether each is open, slips or sticks (on any side)."""
+    """Positions of the slave nodes of a pass [m], and whether each is open, slips or sticks (on any side)."""
     s = wp.tid()
     i = slave[s]
     point_out[first + s] = wp.vec3f(X[i] + u[i])

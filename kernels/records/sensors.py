@@ -15,7 +15,7 @@ LANES = 256  # threads of a block on a GPU; one on a CPU
 
 @wp.func
 def sum_of_block(x: wp.vec3d):
-    """Sum of a vector of each thread of a block, in an order of its own that is fixed."""
+    """Sum of the vectors of all threads of a block, in a fixed order."""
     found = wp.tile_sum(wp.tile(x, preserve_type=True))
     return found[0]
 
@@ -35,7 +35,7 @@ def mean_vectors(
 ):
     """Means of share (first + second) over the nodes of each probe, into three of its channels from `place` on.
 
-    `offset` is where the nodes of each probe begin in `node` and `weight`; a block of threads takes a probe.
+    `offset` says where the nodes of each probe begin in `node` and `weight`. A block of threads takes a probe.
     """
     p, lane = wp.tid()
     total = wp.vec3d()
@@ -98,7 +98,7 @@ def resultants_kernel(precision: str, turned: bool) -> Any:
 
 @cache
 def history_kernel(precision: str) -> Any:
-    """Kernel: yield flags and history of some elements, for others that compute the same."""
+    """Kernel: copy yield flags and history of some elements, for kernels that repeat their forces."""
     R = scalars(precision).real
 
     @wp.kernel(enable_backward=False, module="unique")

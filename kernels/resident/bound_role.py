@@ -20,7 +20,7 @@ MOST_BOUND = THREADS - KEEPERS
 
 @wp.struct
 class Moved:
-    """A node, or how it moves.
+    """A node with its motion; `node` is -1 for none.
 
     Attributes:
         node: its number, or -1.
@@ -37,7 +37,7 @@ class Moved:
 
 @wp.func
 def node_at(i: int, nodes: Nodes, u: wp.array(dtype=wp.vec3d), v: wp.array(dtype=wp.vec3d)):
-    """Node i before a step; nothing for -1."""
+    """Node i before a step; an empty entry for -1."""
     found = Moved()
     found.node = i
     if i >= 0:
@@ -91,7 +91,7 @@ def tie_function(partial: bool) -> Any:
 
 @cache
 def bound_role(precision: str, partial: bool, turned: bool) -> Any:
-    """The function that moves bound nodes and keeps the greatest normal force in each of some steps."""
+    """The function that moves bound nodes and keeps the greatest normal force, in each of the kernel's steps."""
     vec3 = scalars(precision).vec3
     gather_held, tie = gather_function(precision, turned), tie_function(partial)
 

@@ -1,6 +1,6 @@
-"""Owns the blocks of threads that press slave nodes on the faces of a master in every step: LANES threads for each.
+"""Owns the blocks of threads that press slave nodes on the faces of a master in every step.
 
-Each of these looks at candidate faces of its own; the one that found the face that presses the node goes on.
+LANES threads share the candidate faces of a slave; the thread that found the pressing face continues with it.
 """
 
 from functools import cache
@@ -32,7 +32,7 @@ class Slaves:
         u_search: displacement of each node at the latest search [m], shape (node_count,), vec3d.
         mu: coefficient of friction [-].
         margin: of the search [m].
-        per_newton: what sums of normal forces count for a newton [1/N].
+        per_newton: count of a newton in the integer sums of normal forces [1/N].
     """
 
     node: wp.array(dtype=wp.int32)
@@ -47,7 +47,7 @@ class Slaves:
 def comes_first(
     gap: wp.float64, beside: wp.bool, f: int, other_gap: wp.float64, other_beside: wp.bool, other: int
 ) -> bool:
-    """Whether face f presses a node rather than another face that it penetrates; the rule of `nearest_face`."""
+    """Whether face f comes before another penetrated face by the rule of `nearest_face`."""
     if beside != other_beside:
         return other_beside
     if gap == other_gap:
@@ -65,7 +65,7 @@ def nearest_of_lanes(
     along: wp.vec3f,
     q: int,
 ):
-    """`nearest_face`, by LANES lanes: what lane q found, and whether that, or its absence, holds for the node."""
+    """`nearest_face` by LANES lanes: what lane q found, and whether that, or nothing, holds for the node."""
     near = nearest_of(X, u, master, s, x, along, q, wp.static(LANES))
     gap = near.gap
     beside = near.beside
@@ -87,7 +87,7 @@ def nearest_of_lanes(
 
 @wp.func
 def last_pressure(s: int, friction: bool, spring: Spring):
-    """Contact force of a spring along the normal of the face that it pressed last [N]."""
+    """Contact force of a spring along the normal of its last face [N]."""
     pressed = spring.force[s]
     if friction:
         pressed -= spring.tangential[s]
@@ -96,7 +96,7 @@ def last_pressure(s: int, friction: bool, spring: Spring):
 
 @cache
 def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
-    """The function that gives slave nodes their contact forces in each of some steps."""
+    """The function that gives slave nodes their contact forces in each of the kernel's steps."""
     settle, let_go = settle_functions(friction, stress_free, law)
 
     @wp.func
@@ -115,7 +115,7 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        """As `contact.surface_kernel` presses a node, or lets it go."""
+        """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
             touch = meet(v, master.face, i, near, dt, held, along)
             edge = wp.float64(2.0) * wp.sqrt(near.area)
@@ -148,7 +148,7 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        """The first PATCH threads of each block; `movers`: blocks of threads that move nodes."""
+        """The work of the first PATCH threads of each block. `movers` is the number of blocks that move nodes."""
         item = (block * wp.static(PATCH) + lane) // wp.static(LANES)
         last = slaves.node.shape[0] - 1
         s = wp.min(item, last)

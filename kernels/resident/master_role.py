@@ -1,4 +1,4 @@
-"""Owns the blocks of threads that move nodes of master faces in every step: LANES threads for each, a face apiece."""
+"""Owns the blocks of threads that move nodes of master faces in every step; LANES threads share the faces of a node."""
 
 from functools import cache
 from typing import Any
@@ -46,7 +46,7 @@ class Faces:
 
 @wp.func
 def corners_of_node(f: int, i: int, faces: Faces):
-    """1 for the corners of face f that node i is."""
+    """1 for each corner of face f that is node i, else 0."""
     found = wp.vec4d()
     for c in range(4):
         if faces.face[f, c] == i:
@@ -56,7 +56,7 @@ def corners_of_node(f: int, i: int, faces: Faces):
 
 @wp.func
 def less_reaction(total: wp.vec3d, mine: wp.vec4d, pressed: int, f: int, w: wp.vec4d, force: wp.vec3d):
-    """Take from the force on a node its shares of the force of a spring, if that presses face f."""
+    """Subtract the node's share of the force of a spring that presses face f from the force on the node."""
     if pressed == f:
         for c in range(4):
             if mine[c] > wp.float64(0.0):
@@ -75,12 +75,12 @@ def less_listed(total: wp.vec3d, mine: wp.vec4d, f: int, begin: int, end: int, f
 
 @wp.struct
 class Near:
-    """What a lane knows of the first of its faces of a master node before forces have come.
+    """What a lane knows about the first of its faces of a master node before the forces are there.
 
     Attributes:
         face: its number.
         count: slaves in its list.
-        mine: 1 for the corners that the node is.
+        mine: 1 for each corner that is the node, else 0.
         s0, s1, s2, s3: the first of these slaves.
         begin, end: entries of the lane's other faces, every LANES-th.
     """
@@ -98,7 +98,7 @@ class Near:
 
 @wp.func
 def faces_near(m: int, lane: int, i: int, faces: Faces):
-    """What lane `lane` knows of the faces of the m-th master node, node i."""
+    """Read what `lane` needs of the faces of the m-th master node, node i."""
     near = Near()
     begin = faces.offset[m] + lane
     near.end = faces.offset[m + 1]
@@ -122,7 +122,7 @@ def reaction(i: int, near: Near, faces: Faces, spring: Spring):
     total = wp.vec3d()
     if near.count > 0:
         f = near.face
-        p0 = spring.face[near.s0]  # all are under way at once
+        p0 = spring.face[near.s0]  # all loads are under way at once
         p1 = wp.where(near.count > 1, spring.face[near.s1], -1)
         p2 = wp.where(near.count > 2, spring.face[near.s2], -1)
         p3 = wp.where(near.count > 3, spring.face[near.s3], -1)
@@ -148,7 +148,7 @@ def reaction(i: int, near: Near, faces: Faces, spring: Spring):
 
 @cache
 def master_role(precision: str, turned: bool) -> Any:
-    """The function that gives nodes of master faces their reactions and moves them, in each of some steps."""
+    """The function that gives nodes of master faces their reactions and moves them, in each of the kernel's steps."""
     vec3 = scalars(precision).vec3
     gather_held = gather_function(precision, turned)
 
@@ -169,7 +169,7 @@ def master_role(precision: str, turned: bool) -> Any:
         speed_square_out: wp.array(dtype=wp.float32),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        """The first PATCH threads of each block; `pushers`: blocks of threads that give forces."""
+        """The work of the first PATCH threads of each block. `pushers` is the number of blocks that give forces."""
         item = (block * wp.static(PATCH) + lane) // wp.static(LANES)
         last = faces.master.shape[0] - 1
         m = wp.min(item, last)

@@ -1,6 +1,6 @@
-"""Owns how blocks of threads that are on the device together wait for each other: counts of those that arrived.
+"""Owns the barriers between blocks of threads that are on the device together, which count the arrivals.
 
-Nothing of this can be run on a CPU.
+None of it runs on a CPU.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ TOGETHER: set[str] = set()  # keys of kernels whose blocks of threads wait for e
 
 
 def together(kernel: Any) -> Any:
-    """The kernel, all of whose blocks of threads must be on the device at once."""
+    """Register a kernel whose blocks of threads must all be on the device at once."""
     TOGETHER.add(kernel.key)
     return kernel
 
@@ -29,7 +29,7 @@ def together(kernel: Any) -> Any:
         asm volatile("red.release.gpu.global.add.u32 [%0], 1;" :: "l"(&count_out.data[entry]) : "memory");
 """)
 def arrive(entry: int, count_out: wp.array(dtype=wp.int32)):
-    """Count this block of threads; all that it wrote is seen by those who wait for it."""
+    """Count this block of threads. Those who wait for it see everything that it wrote."""
     ...
 
 

@@ -1,6 +1,6 @@
 """Owns the blocks of threads that move nodes in every step: free ones, those of master faces, and bound ones.
 
-What does not change from step to step is read before the forces have come.
+Values that do not change from step to step are read before the forces are there.
 """
 
 from functools import cache
@@ -45,7 +45,7 @@ class Nodes:
 
 @wp.struct
 class Held:
-    """What a thread knows of a node before forces have come.
+    """What a thread knows about a node before the forces are there.
 
     Attributes:
         node: its number.
@@ -54,8 +54,8 @@ class Held:
         turn: rotation of its floating frame.
         pair: its first slots.
         row0, row1, row2: rows of more slots, -1 where there is none.
-        row: of more slots that come after those, and the end of them.
-        end: see row.
+        row: first row of further slots after those.
+        end: end of those rows.
     """
 
     node: wp.int32
@@ -72,7 +72,7 @@ class Held:
 
 @wp.func
 def hold_node(i: int, nodes: Nodes):
-    """What is known of node i before forces have come."""
+    """Read what is known about node i before the forces are there."""
     held = Held()
     held.node = i
     if nodes.role.shape[0] > 0:
@@ -100,7 +100,7 @@ def hold_node(i: int, nodes: Nodes):
 
 @wp.func
 def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, nodes: Nodes, dt: wp.float64):
-    """As `kernels.nodes.node.integrate_kernel` has it [m/s]."""
+    """Velocity after the step, as `kernels.nodes.node.integrate_kernel` computes it [m/s]."""
     gravity = nodes.gravity
     if nodes.weight.shape[0] > 0:
         gravity = nodes.weight[held.node]
@@ -109,7 +109,7 @@ def next_velocity(held: Held, v: wp.vec3d, total: wp.vec3d, nodes: Nodes, dt: wp
 
 @cache
 def gather_function(precision: str, turned: bool) -> Any:
-    """The function that sums the forces of elements on a node; `turned`: they are those in its floating frame."""
+    """The function that sums the forces of elements on a node; with `turned` they are given in its floating frame."""
     vec3 = scalars(precision).vec3
 
     @wp.func
@@ -129,7 +129,7 @@ def gather_function(precision: str, turned: bool) -> Any:
 
     @wp.func
     def gather_held(held: Held, more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3)):
-        """In the order of `kernels.nodes.node.gather_function`; all forces are under way at once."""
+        """Sum in the order of `kernels.nodes.node.gather_function`, with all loads under way at once."""
         a0 = force_at(held.row0[0], force)
         a1 = force_at(held.row0[1], force)
         a2 = force_at(held.row0[2], force)
@@ -158,7 +158,7 @@ def gather_function(precision: str, turned: bool) -> Any:
 
 @cache
 def total_function(precision: str, contact: bool, turned: bool) -> Any:
-    """The function that sums all forces on a node, of elements and as a slave; that is given once."""
+    """The function that sums the forces of elements and contact on a node, and clears the latter."""
     vec3 = scalars(precision).vec3
     gather_held = gather_function(precision, turned)
 
@@ -172,7 +172,7 @@ def total_function(precision: str, contact: bool, turned: bool) -> Any:
         fc = wp.vec3d()
         if wp.static(contact):
             if held.role & wp.static(TOUCHABLE) != 0:
-                fc = contact_force_out[held.node]  # under way with the others
+                fc = contact_force_out[held.node]  # loaded together with the others
         total = gather_held(held, more_slots, force)
         if wp.static(contact):
             total += fc
@@ -185,7 +185,7 @@ def total_function(precision: str, contact: bool, turned: bool) -> Any:
 
 @cache
 def free_role(precision: str, contact: bool, turned: bool) -> Any:
-    """The function that moves free nodes in each of some steps."""
+    """The function that moves free nodes in each of the kernel's steps."""
     vec3 = scalars(precision).vec3
     all_forces = total_function(precision, contact, turned)
 
@@ -225,7 +225,7 @@ def free_role(precision: str, contact: bool, turned: bool) -> Any:
         v_out: wp.array(dtype=wp.vec3d),
         speed_square_out: wp.array(dtype=wp.float32),
     ):
-        """The first PATCH threads of each of some blocks; `pushers`: blocks of threads that give forces."""
+        """The work of the first PATCH threads of each block. `pushers` is the number of blocks that give forces."""
         free = nodes.free.shape[0]
         item = block * wp.static(PATCH) + lane
         mine = item < free and lane < wp.static(PATCH)

@@ -1,6 +1,6 @@
 """Owns the blocks of threads that compute one patch of elements in every step.
 
-What says where its points lie stays in shared memory from step to step.
+The places of its points stay in shared memory from step to step.
 """
 
 from functools import cache
@@ -50,7 +50,7 @@ ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread
 def element_role(precision: str, law_name: str) -> Any:
     """The function that computes the elements of a patch by all threads of a block.
 
-    Those of a law are computed by four lanes each, whether they yield or not.
+    Elements with a plastic law are computed by four lanes each, whether they yield or not.
     """
     t = scalars(precision)
     R, point = t.real, POINT[precision]
@@ -90,7 +90,7 @@ def element_role(precision: str, law_name: str) -> Any:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Forces as `hex8_patch` keeps them."""
+        """Compute the forces, and store them as `hex8_patch` does."""
         count = element_count(head)
         if lane < count:
             W, Xl, ul = rotate_element(lane, head, corners, points, pool, extreme_out)
@@ -119,7 +119,7 @@ def element_role(precision: str, law_name: str) -> Any:
 
 @cache
 def see_function(precision: str, turned: bool) -> Any:
-    """The function that takes displacements that a thread has copied to floating frames; nothing without `turned`."""
+    """The function that turns displacements copied by a thread to floating frames; without `turned` it does nothing."""
     point = POINT[precision]
 
     @wp.func
@@ -143,7 +143,7 @@ def see_function(precision: str, turned: bool) -> Any:
 
 @cache
 def patch_role(precision: str, law_name: str, turned: bool) -> Any:
-    """The function that computes the forces of a patch of `hex8` in each of some steps.
+    """The function that computes the forces of a patch of `hex8` in each of the kernel's steps.
 
     `turned`, in `mixed`: elements compute in floating frames.
     """
@@ -175,7 +175,7 @@ def patch_role(precision: str, law_name: str, turned: bool) -> Any:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
     ):
-        """`movers`: blocks of threads that move nodes."""
+        """Compute one patch. `movers` is the number of blocks that move nodes."""
         forces = wp.array(ptr=force_pool(), shape=(POOL,), dtype=R)
         kept_points = wp.array(ptr=point_pool(), shape=(2 * slots,), dtype=point)
         pool = wp.array(ptr=vector_pool(), shape=(2 * slots,), dtype=wp.vec3d)

@@ -1,6 +1,6 @@
-"""Owns what a hinge with pins is for one block of threads: the nodes of its clusters, their sums, and its impulses.
+"""Owns how one block of threads computes a hinge with pins: nodes of its clusters, their sums, its impulses.
 
-Threads share sums and what follows from them; two of them solve, one for each cluster.
+All threads take part in the sums; two of them solve, one for each cluster.
 `kernels.nodes.hinge` has the equations.
 """
 
@@ -152,7 +152,7 @@ def find_side(
     side_out: wp.array(dtype=Side),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
-    """What impulses of coupling j need of one of its clusters, and moments give."""
+    """What the impulses of coupling j need from the moments of one of its clusters."""
     P = joint_point(moments_at(wp.static(MOMENTS[0]), pool), turn[0], clusters.arm[j, 0])
     found = side_of(j, side, clusters, turn[side], moments_at(2 * side, pool), P, Mean())
     side_out[side] = found
@@ -182,7 +182,7 @@ def find_impulses(
     ahead: wp.array(dtype=Ahead),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
-    """Impulses of a coupling, and what moves the nodes of one of its clusters; `rate` is 1 / dt [1/s]."""
+    """Impulses of a coupling, and the resulting motion of the nodes of one cluster; `rate` is 1 / dt [1/s]."""
     J, T = hinge_impulses(inverse[0], ahead[0], ahead[1], rate)
     if side == 0:
         shared_out[wp.static(PULL)] = J
@@ -208,7 +208,7 @@ def carry_joint(
     shared_out: wp.array(dtype=wp.vec3d),
     place_out: wp.array(dtype=wp.vec3d),
 ):
-    """Rotation of a cluster of coupling j after the step, and with the first one its place and sum of impulses."""
+    """Store the rotation of a cluster of coupling j after the step; for the first one also place and impulses."""
     J = shared_out[wp.static(PULL)]
     T = shared_out[wp.static(TWIST)]
     sign = wp.where(side == 0, wp.float64(1.0), wp.float64(-1.0))
@@ -221,7 +221,7 @@ def carry_joint(
 
 @wp.func
 def pulled(one: Pinned, side: int, dt: wp.float64, shared: wp.array(dtype=wp.vec3d)):
-    """A node after the free step, which has changed its velocity alone, and the impulses on its cluster."""
+    """A node after the free step, which changed only its velocity, and after the impulses on its cluster."""
     r = (one.start + one.u) - shared[wp.static(VECTORS_OF_SIDE) * side + wp.static(CENTRE)]
     turn = wp.cross(shared[wp.static(VECTORS_OF_SIDE) * side + wp.static(TURN)], r)
     change = one.weight * (shared[wp.static(VECTORS_OF_SIDE) * side + wp.static(STRAIGHT)] + turn)

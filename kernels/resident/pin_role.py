@@ -1,7 +1,7 @@
 """Owns the blocks of threads that move the nodes of hinges with pins in every step: one block for each coupling.
 
-A thread has a node of the first and one of the second cluster. Moments, and what follows from them, are found before
-forces have come; sums of momenta, impulses and the motion of the nodes after that.
+A thread has a node of the first and one of the second cluster. Moments, and what follows from them, are computed before
+the forces are there; momenta, impulses and the motion of the nodes after that.
 """
 
 from functools import cache
@@ -54,7 +54,7 @@ _, exchange = shared_functions("float64")
 
 @wp.func
 def sum_in_warp(a: Row, lane: int) -> wp.float64:
-    """Of each value of all lanes of a warp, the sum, in the two lanes whose bits 1 to 4 are the value's number."""
+    """Sum each value over the lanes of a warp; the two lanes whose bits 1 to 4 are the value's number get its sum."""
     b = Half()
     for k in range(wp.static(COLUMNS // 2)):
         mine = wp.where(lane & 16 != 0, a[wp.static(COLUMNS // 2) + k], a[k])
@@ -122,7 +122,7 @@ def prepare_joint(
     inverse_out: wp.array(dtype=Inverse),
     shared_out: wp.array(dtype=wp.vec3d),
 ):
-    """What impulses need and moments give, by the first warp."""
+    """Compute what the impulses need from the moments, by the first warp."""
     if lane < 32:
         warp_barrier()
         if lane < 2:
@@ -168,7 +168,7 @@ def put_pinned(
 
 @cache
 def pin_role(precision: str, turned: bool) -> Any:
-    """The function that moves the nodes of one coupling in each of some steps; `turned` as in `gather_function`."""
+    """The function that moves the nodes of one coupling in each step; `turned` as in `gather_function`."""
     vec3 = scalars(precision).vec3
     gather_held = gather_function(precision, turned)
     _, shared_pool, _ = slot_pools(precision)
@@ -197,7 +197,7 @@ def pin_role(precision: str, turned: bool) -> Any:
         place_out: wp.array(dtype=wp.vec3d),
         orientation_out: wp.array2d(dtype=wp.quatd),
     ):
-        """All threads of a block; `pushers`: blocks of threads that give forces."""
+        """The work of all threads of a block. `pushers` is the number of blocks that give forces."""
         pool = wp.array(ptr=shared_pool(), shape=(SIDES,), dtype=wp.float64)
         sides = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * SIDES)), shape=(2,), dtype=Side)
         ahead = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * AHEAD)), shape=(2,), dtype=Ahead)
@@ -205,7 +205,7 @@ def pin_role(precision: str, turned: bool) -> Any:
         shared = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * SHARED)), shape=(VECTORS,), dtype=wp.vec3d)
         turn = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * TURNS)), shape=(2,), dtype=wp.quatd)
         begin = clusters.begin[j]
-        start = place_out[j]  # a copy, which a tuple of assignments would not make
+        start = place_out[j]  # an explicit copy: a tuple of assignments would not make one
         one = pinned_node(begin[0] + lane, begin[1], start, clusters, nodes, X, u_out, v_out)
         other = pinned_node(begin[1] + lane, begin[2], start, clusters, nodes, X, u_out, v_out)
         held, other_held = hold_node(wp.max(one.node, 0), nodes), hold_node(wp.max(other.node, 0), nodes)

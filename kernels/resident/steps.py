@@ -1,8 +1,8 @@
 """Owns the kernel that takes many steps in one launch, for models that a GPU holds at once.
 
 Blocks of threads keep their roles from step to step: patches of elements and slave nodes of a contact give forces;
-master, bound and free nodes move. Those that move nodes wait for all forces of a step, and those that give forces for
-all nodes. All blocks must be on the device together (`warp_mca.step.resident`).
+master, bound and free nodes move. Blocks that move nodes wait for all forces of a step; blocks that give forces wait
+for all nodes. All blocks must be on the device together (`warp_mca.step.resident`).
 """
 
 from functools import cache
@@ -29,7 +29,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Roles:
-    """First block of threads of each role but that of patches, and the number of blocks.
+    """First block of threads of each role except patches, which come first, and the number of blocks.
 
     Attributes:
         contact: slave nodes.
@@ -60,7 +60,7 @@ def resident_kernel(
     partial: bool,
     coupled: bool,
 ) -> Any:
-    """Kernel: `steps` steps of a model of one block of `hex8`, with a contact pass if `contact`, pins if `coupled`.
+    """Kernel: take `steps` steps of a model of one block of `hex8`, with contact if `contact`, pins if `coupled`.
 
     Arguments are those of the kernels that take the same steps one by one: `hex8_patch`, `contact`, `nodes.node`,
     `nodes.constraint`, `nodes.couple`. `turned`: elements compute in floating frames. count_out are the counts of
