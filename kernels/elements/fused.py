@@ -1,6 +1,6 @@
 """Owns products that are added to something, nested so that each fuses with one addition.
 
-Operators of vectors and matrices form the product first and add then: three more instructions for each vector.
+Vector and matrix operators form the product first and then add it: three more instructions for each vector.
 """
 
 from dataclasses import dataclass

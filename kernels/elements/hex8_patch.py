@@ -44,7 +44,7 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
-    """Functions: compute the element of a thread as if it were elastic, and list it where it yields; the first part."""
+    """Two functions: compute a thread's element as if elastic, and list it if it yields; the first part alone."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
     plastic, (list_element, *_) = bool(law_name), flow_functions(precision, law_name)
@@ -68,7 +68,7 @@ def element_functions(precision: str, law_name: str) -> tuple[Any, Any]:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Whether the element begins to yield; its forces do not hold then."""
+        """Whether the element begins to yield; if so, its forces are not valid."""
         G = R(scale) * law[m, 1]
         local = local_displacement(Xl, ul, W)
         f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
@@ -121,7 +121,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
     plastic = bool(law_name)
-    # otherwise lanes of elements that yield still need the nodes of this patch where those of the next would go
+    # otherwise lanes of yielding elements still need the nodes of this patch in the place of the next ones
     early = precision == "mixed" or not plastic
     begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     load_points, load_displacements, _ = load_functions(precision)

@@ -70,7 +70,7 @@ LINE_SCALE = 0.5 * _NEAR * _NEAR  # of half edges at the Gauss lines over what `
 
 @cache
 def line_functions(precision: str) -> tuple[Any, Any]:
-    """Functions as those of `edge_functions`, without their factors: one multiply-add in place of three operations.
+    """Functions like those of `edge_functions` without factors: one multiply-add in place of three operations.
 
     Edges are whole, and weights are divided by the larger one; LINE_SCALE brings the result back.
     """

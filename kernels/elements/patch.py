@@ -2,9 +2,9 @@
 
 A patch is up to PATCH elements, one for each thread. Its nodes are read once, into shared memory; its forces are summed
 there in a fixed order, so that what leaves the multiprocessor is one force for each node of a patch in place of eight
-for each element, and runs repeat bit for bit. What the next patch needs is on its way while one is computed:
-displacements of its nodes, and before these its points, which say what nodes they are, and before that its head. Of
-this module only the order of patches can be found on a CPU.
+for each element, and runs repeat bit for bit. While a patch is computed, data of the following ones are being copied:
+displacements of nodes of the next patch, points of the one after it, which name the nodes, and heads of later ones.
+Only the order of patches can be computed on a CPU.
 """
 
 from functools import cache
@@ -26,11 +26,11 @@ from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
 RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need
-# How many of these a chain of slower elements takes at most, so that the fastest find places beside it.
+# Most blocks for a chain of slower elements, so that the fastest elements find room beside it.
 BESIDE = {"mixed": 2, "float64": 1}
 HALVED = 2.5  # patches of half the size on a multiprocessor up to which those of the fastest elements are halved
-# Of a slot: where the node lies on its patch's grid, and its number; that alone in float64, where positions are not
-# rounded, so that shared memory has no room for displacements of the next patch.
+# A slot holds the place of its node on the patch's grid and the node's number. In float64, where positions are not
+# rounded, it holds the number alone, and shared memory has no room for displacements of the next patch.
 POINT = {"mixed": wp.vec4i, "float64": wp.int32}
 SLOTS_OF_THREAD = (max(SLOTS.values()) + PATCH - 1) // PATCH
 
@@ -61,7 +61,7 @@ class Patches:
 
 @wp.kernel(enable_backward=False)
 def count_flowing(flowing: wp.array(dtype=wp.int32), count_out: wp.array(dtype=wp.int32)):
-    """Patches in which elements yield, of each of SCHEDULERS equal runs of patches."""
+    """Count the patches with yielding elements in each of SCHEDULERS equal runs of patches."""
     run = wp.tid()
     size = (flowing.shape[0] + wp.static(SCHEDULERS - 1)) // wp.static(SCHEDULERS)
     count = int(0)
@@ -77,7 +77,7 @@ def schedule(
     head: wp.array(dtype=wp.vec4i),
     turn_out: wp.array(dtype=wp.vec4i),
 ):
-    """Patches in which elements yield first, then the others, both in the order they lie in."""
+    """Order patches: those with yielding elements first, then the others, each in their own order."""
     run = wp.tid()
     size = (flowing.shape[0] + wp.static(SCHEDULERS - 1)) // wp.static(SCHEDULERS)
     before = int(0)
@@ -96,7 +96,7 @@ def schedule(
 
 @wp.func
 def from_start(i: int):
-    """The same index, plainly not negative: Warp asks of each that may be whether it counts from the end."""
+    """The same index, known not to be negative: Warp checks others for counting from the end."""
     return i & 0x7FFFFFFF
 
 
@@ -120,9 +120,9 @@ def exponent_of(head: wp.vec4i):
 
 @wp.func
 def copy_head(patches: Patches, block: int, stride: int, k: int, ring_out: wp.array(dtype=wp.vec4i)):
-    """Begin to copy the head of the k-th patch of a block of threads; beyond the last, that of an empty one.
+    """Begin to copy the head of the k-th patch of a block of threads, an empty head beyond the last patch.
 
-    Blocks that had the first patches, which take longest, come last from then on: some have one fewer.
+    Blocks that had the first patches, which take longest, come last afterwards, and some of them get one patch fewer.
     """
     turn = (k + 1) * stride - 1 - block
     if turn < patches.turn.shape[0]:
@@ -142,7 +142,7 @@ def copy_places(patches: Patches, head: wp.vec4i, lane: int, places_out: wp.arra
 
 @wp.func
 def corners_of(patches: Patches, head: wp.vec4i, lane: int):
-    """Words of a thread's element within its patch; of any where it has none."""
+    """Words of a thread's element within its patch, or of any element if it has none."""
     e = from_start(head[0] + wp.min(lane, wp.max(element_count(head) - 1, 0)))
     return wp.vec4ui(patches.corner[0, e], patches.corner[1, e], patches.corner[2, e], patches.corner[3, e])
 
@@ -178,7 +178,7 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any, Any]:
         first: int,
         pool_out: wp.array(dtype=wp.vec3d),
     ):
-        """Begin to copy those of a patch, of whose points those that this thread copied have arrived."""
+        """Begin to copy displacements of a patch's nodes, for the points that this thread copied."""
         for k in range(wp.static(SLOTS_OF_THREAD)):
             n = lane + k * wp.static(PATCH)
             if n < slot_count(head):
@@ -229,7 +229,7 @@ def copy_functions(precision: str) -> tuple[Any, Any, Any, Any]:
         ring_out: wp.array(dtype=wp.vec4i),
         point_out: wp.array(dtype=point),
     ):
-        """At the k-th patch of a block of threads: begin to copy the points of the second after it, a later head."""
+        """At the k-th patch of a block: begin to copy the points of the patch after the next, and a later head."""
         if lane == wp.static(PATCH - 1):
             copy_head(patches, block, stride, k + wp.static(HEADS - 1), ring_out)
         copy_points(points, ring_out[(k + 2) % wp.static(HEADS)], lane, first, point_out)

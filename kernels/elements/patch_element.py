@@ -1,6 +1,6 @@
-"""Owns what a thread of a patch reads of its element, and how the forces of all elements are summed.
+"""Owns how a thread of a patch reads its element, and how the forces of all elements are summed.
 
-Nothing of this can be run on a CPU.
+None of it runs on a CPU.
 """
 
 from functools import cache
@@ -39,11 +39,11 @@ def material_of(first: wp.uint32, second: wp.uint32):
 
 @cache
 def load_functions(precision: str) -> tuple[Any, Any, Any]:
-    """Functions: points of an element relative to its first [m]; displacements so; both, of two of its corners."""
+    """Three functions: corners relative to corner 0 [m]; displacements likewise; both for two corners."""
     t = scalars(precision)
     R, vec3, mat83, slots = t.real, t.vec3, t.mat83, SLOTS[precision]
     point, mixed = POINT[precision], precision == "mixed"
-    # Fast math would also flush what is too small, in three instructions for each number.
+    # Fast math would also flush subnormal numbers, in three instructions for each number.
     convert = 'float f; asm("cvt.rn.f32.f64 %0, %1;" : "=f"(f) : "d"(value)); return f;'
 
     @wp.func_native(convert if precision == "mixed" else "return value;")
@@ -59,7 +59,7 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
         points: wp.array(dtype=point), pool: wp.array(dtype=wp.vec3d), slot: int, origin: int, first: int, exponent: int
     ):
         if wp.static(mixed):
-            d = place_of(points, first + slot) - place_of(points, first + origin)  # only what comes next rounds
+            d = place_of(points, first + slot) - place_of(points, first + origin)  # exact: the next operation rounds
             return power_of_two(exponent) * vec3(R(d[0]), R(d[1]), R(d[2]))
         return difference(pool, slot, pool[origin])
 
@@ -77,7 +77,7 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
 
     @wp.func
     def displacements_of(first: int):
-        """Where those of the patch begin whose points begin at `first`."""
+        """Where displacements of the patch begin whose points begin at `first`."""
         if wp.static(mixed):
             return first
         return wp.static(slots)
@@ -122,7 +122,7 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
 
 @cache
 def load_pattern_function(precision: str) -> Any:
-    """The function that loads the points of an element as `patterns.pattern_functions` has them [m]."""
+    """The function that loads the pattern sums of an element's points, see `patterns.pattern_functions` [m]."""
     t = scalars(precision)
     R, mat73, point = t.real, t.mat73, POINT[precision]
     to_patterns, _ = pattern_functions(precision)
@@ -139,7 +139,7 @@ def load_pattern_function(precision: str) -> Any:
             for k in range(4):
                 x[2 * k] = place_of(points, first + lower(corners[k]))
                 x[2 * k + 1] = place_of(points, first + upper(corners[k]))
-            sums = sums_of_places(x)  # exact, as sums of integers are
+            sums = sums_of_places(x)  # exact, because these are sums of integers
             p = mat73()
             for k in range(7):
                 for i in range(3):
@@ -152,9 +152,9 @@ def load_pattern_function(precision: str) -> Any:
 
 @cache
 def sum_functions(precision: str) -> tuple[Any, Any, Any, Any]:
-    """Functions.
+    """Four functions, which sum the forces of a patch.
 
-    (Prepare shared memory; store the forces of a thread's element there; sum those of a patch; sum those of a slot.)
+    They prepare shared memory; store the forces of a thread's element there; sum those of a patch; sum those of a slot.
 
     Component i of the force on corner a of a thread's element lies in row 3 a + i, in the thread's column.
     """
@@ -194,7 +194,7 @@ def sum_functions(precision: str) -> tuple[Any, Any, Any, Any]:
         slot: int,
         force_out: wp.array(dtype=vec3),
     ):
-        """Forces of a patch into its slots, when all threads have kept theirs."""
+        """Sum the forces of a patch into its slots, after all threads stored theirs."""
         for k in range(wp.static(SLOTS_OF_THREAD)):
             n = lane + k * wp.static(PATCH)
             if n < slot_count(head):

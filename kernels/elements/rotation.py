@@ -28,7 +28,7 @@ def nearest_rotation(precision: str, finite: bool = False) -> Any:
 
     @wp.func
     def polar_rotation(F: mat33):
-        A = F  # 2^n Q, which saves the halves
+        A = F  # 2^n Q, which saves the multiplications by 1/2
         factor = R(1.0)
         for _ in range(wp.static(iterations)):
             r0 = vec3(A[0, 0], A[0, 1], A[0, 2])

@@ -1,6 +1,6 @@
 """Owns the base of a chain: a carriage with the nodes of the ground hinge, which moves by a table or slides on a rail.
 
-After the free step, in which no joint holds them, these nodes and the carriage take one velocity,
+After the free step, these nodes and the carriage take one common velocity,
 
     v = b + e (e . (p / m - b)),
 

@@ -23,7 +23,7 @@ from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
 
-SUM_COUNT = 20  # sums over a cluster: q (1), q r (3), q r r (6), s q (1), s q r (3), s q r r (6); then momenta
+SUM_COUNT = 20  # sums over a cluster: q (1), q r (3), q r r (6), s q (1), s q r (3), s q r r (6); the momenta follow
 TOTALS = SUM_COUNT + 6
 Sums = wp.types.vector(length=TOTALS, dtype=wp.float64)
 
@@ -61,7 +61,7 @@ class Clusters:
 
 @wp.struct
 class Mean:
-    """Mean motion of a cluster, and how it answers impulses.
+    """Mean motion of a cluster, and its response to impulses.
 
     Attributes:
         mass: sum q [kg]; 0 for the ground.
@@ -86,7 +86,7 @@ class Mean:
 def arm_before(
     i: int, place: wp.vec3d, dt: wp.float64, X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), v: wp.vec3d
 ) -> wp.vec3d:
-    """Position of a node before the step that took it to u, from a place [m]."""
+    """Position of a node, relative to a place, before the step that took it to u [m]."""
     return (X[i] - place) + (u[i] - dt * v)
 
 
@@ -121,7 +121,7 @@ def cluster_sums(
     v: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
 ) -> Sums:
-    """Sums over some nodes with arms from `place` at t(n): moments with q and with s q, then momenta; by a block."""
+    """A block sums over some nodes, with arms from `place` at t(n): moments with q and with s q, then momenta."""
     total = Sums()
     for k in range(begin + lane, end, wp.block_dim()):
         i = clusters.node[k]
@@ -153,7 +153,7 @@ def cluster_sums(
 
 @wp.func
 def mean_response(total: Sums, P: wp.vec3d) -> Mean:
-    """Mean position from the moments of a cluster, and its response at the point P, with the same origin [m].
+    """Mean position of a cluster from its moments, and its response at the point P; both have one origin [m].
 
     With h = sum s q r and K = sum s q (r^2 - r r^T) about c, the mean motion answers F and T about c by
 
@@ -192,7 +192,7 @@ def mean_motion(total: Sums, P: wp.vec3d) -> Mean:
 
 @wp.func
 def spin_after(mean: Mean, free: wp.vec3d, J: wp.vec3d, T: wp.vec3d) -> wp.vec3d:
-    """w of a cluster with the impulse J and the angular impulse T at the point of the joint; `free` without [rad/s]."""
+    """Angular velocity [rad/s] after J and T act at the joint; `free` is the one without them."""
     return free + wp.transpose(mean.response.mixed) * J + mean.response.turn * T
 
 
@@ -212,7 +212,7 @@ def pull(
     v_out: wp.array(dtype=wp.vec3d),
     speed_square_out: wp.array(dtype=wp.float32),
 ):
-    """Give the impulse J and the angular impulse T about the mean position to the nodes."""
+    """Distribute the impulse J and the angular impulse T about the mean position to the nodes."""
     straight = J / mean.mass
     turn = mean.inverse * T
     for k in range(begin + lane, end, wp.block_dim()):

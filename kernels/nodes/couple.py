@@ -1,7 +1,7 @@
 """Owns the step of couplings: blocks of threads sum parts of clusters, then move the nodes of these by the impulses.
 
-`cluster` and `hinge` have the equations. What positions alone decide is found beside the forces. Each block then solves
-for the impulses of its coupling by itself, so that none waits.
+`cluster` and `hinge` have the equations. Quantities that depend on positions alone are computed beside the forces. Each
+block then solves for the impulses of its coupling by itself, so that no block waits for another.
 """
 
 import warp as wp
@@ -35,7 +35,7 @@ def ground_motion(
     clock: wp.array(dtype=wp.int32),
     dt: wp.float64,
 ) -> Mean:
-    """Motion of the ground or the base that joint j hangs on, without the joint's impulse."""
+    """Motion of the ground or the base on which joint j hangs, without the joint's impulse."""
     found = Mean()
     if clusters.base.shape[0] > 0:
         k = clusters.base[j]
@@ -59,7 +59,7 @@ def sum_moments(
     v: wp.array(dtype=wp.vec3d),
     sums_out: wp.array(dtype=Sums),
 ):
-    """Sums of each part of the clusters at t(n), by a block of threads."""
+    """Sum each part of the clusters at t(n); a block of threads takes a part."""
     part, lane = wp.tid()
     where = clusters.part[part]
     total = cluster_sums(where[2], where[3], lane, place[where[0]], clusters, X, mass, u, v, wp.float64(0.0))
@@ -69,7 +69,7 @@ def sum_moments(
 
 @wp.func
 def sum_of_parts(first: int, end: int, lane: int, sums: wp.array(dtype=Sums)) -> Sums:
-    """Sums of a cluster from those of its parts, by a block."""
+    """Add up the sums of a cluster's parts, by a block."""
     total = Sums()
     for k in range(first + lane, end, wp.block_dim()):
         total += sums[k]
@@ -79,7 +79,7 @@ def sum_of_parts(first: int, end: int, lane: int, sums: wp.array(dtype=Sums)) ->
 
 @wp.func
 def one_of(side: int, first: Sums, second: Sums) -> Sums:
-    """Those of the first or the second cluster."""
+    """Sums of the first or the second cluster."""
     if side == 0:
         return first
     return second
@@ -100,9 +100,9 @@ def find_responses(
     point_out: wp.array(dtype=wp.vec3d),
     place_out: wp.array(dtype=wp.vec3d),
 ):
-    """What the impulses of each coupling need and positions give, by a block of threads.
+    """Compute what the impulses of each coupling need from positions, by a block of threads.
 
-    point_out takes the point P of the joint, from its place at t(n) [m], which place_out takes. `bases`, `carriage` and
+    point_out is the point P of the joint relative to its place at t(n) [m], which is place_out. `bases`, `carriage` and
     `clock` are as in `base.move_bases`.
     """
     j, lane = wp.tid()
@@ -132,7 +132,7 @@ def sum_momenta(
     dt: wp.float64,
     momenta_out: wp.array(dtype=Momenta),
 ):
-    """Momenta of each part with arms of t(n), once `constraint.bound_kernel` has advanced its nodes as free ones."""
+    """Sum the momenta of each part with arms of t(n), after `constraint.bound_kernel` advanced its nodes as free."""
     part, lane = wp.tid()
     where = clusters.part[part]
     total = Momenta()
@@ -171,7 +171,7 @@ def couple_parts(
     orientation_out: wp.array2d(dtype=wp.quatd),
     latest_out: wp.array(dtype=wp.vec3d),
 ):
-    """Join the clusters of each coupling; a block of threads for each part.
+    """Join the clusters of each coupling; a block of threads takes a part.
 
     impulse_out [N s] sums J at the first node of the first cluster. place_out follows the joint, where the ground or a
     base holds it exactly; orientation_out the mean rotation of both clusters. latest_out takes J where some base moves

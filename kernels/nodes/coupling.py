@@ -71,7 +71,7 @@ def inverse_of(response: Response, held: wp.mat33d) -> Inverse:
     """What gives the impulses of a joint for the response of the relative motion; `held` projects on the directions
     about which it holds rotations.
 
-    T comes from the Schur complement of `point`, which the free rotations, those that `held` projects on 0, leave out.
+    T comes from the Schur complement of `point`, without the free rotations, which `held` projects on 0.
     """
     found = Inverse()
     found.point = wp.inverse(response.point)
@@ -86,7 +86,7 @@ def inverse_of(response: Response, held: wp.mat33d) -> Inverse:
 
 @wp.func
 def joint_impulses(inverse: Inverse, v: wp.vec3d, w: wp.vec3d):
-    """J and T on the first body that take the relative velocities v [m/s] and, where held, w [rad/s] away."""
+    """J and T on the first body that cancel the relative velocities v [m/s] and, where held, w [rad/s]."""
     T = inverse.held * (inverse.turn * (inverse.held * (inverse.across * v - w)))
     J = -(inverse.point * (v + inverse.mixed * T))
     return J, T

@@ -36,7 +36,7 @@ def follow_bodies(
     u: wp.array(dtype=wp.vec3d),
     rotation_out: wp.array(dtype=wp.quatd),
 ):
-    """Turn each frame by one step of Gauss and Newton towards the least squares fit of its markers.
+    """Turn each frame by one Gauss-Newton step towards the least-squares fit of its markers.
 
     With a = X less its mean and y = R^T x, where x is the place less its mean, d in sum |a + d x a - y|^2 follows from
     sum (|a|^2 I - a a^T) d = sum a x y; R turns by d.
@@ -62,7 +62,7 @@ def follow_bodies(
 
 @wp.func
 def seen(place: wp.vec3d, u: wp.vec3d, q: wp.quatd):
-    """Displacement of a node in a frame that has turned by q, from its reference position and displacement [m]."""
+    """Displacement of a node seen in a frame that has turned by q [m]."""
     return wp.quat_rotate_inv(q, place + u) - place
 
 

@@ -1,7 +1,7 @@
 """Owns the impulses of a hinge with pins between two clusters, or a cluster and the ground: pure functions.
 
-What follows from positions at t(n) is found before the free step, see `side_of` and `hinge_inverse`; the impulses take
-the velocities after it. `cluster` and `coupling` have the equations.
+`side_of` and `hinge_inverse` use positions at t(n) and run before the free step; the impulses use the velocities after
+it. `cluster` and `coupling` have the equations.
 """
 
 import warp as wp
@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Side:
-    """What a hinge joins, at t(n); origin is the place of the joint.
+    """One side of a hinge at t(n), relative to the place of the joint.
 
     Attributes:
         mean: position of the cluster and its response; of the ground, response and velocity.
@@ -29,7 +29,7 @@ class Side:
 
 @wp.struct
 class Ahead:
-    """Mean motion after the free step, and where it carries the joint.
+    """Mean motion after the free step, and the joint as it carries it.
 
     Attributes:
         velocity: V [m/s].
@@ -46,13 +46,13 @@ class Ahead:
 
 @wp.func
 def joint_point(total: Sums, q: wp.quatd, arm: wp.vec3d) -> wp.vec3d:
-    """The point P that the first cluster, turned by q, carries, from the origin of its sums [m]."""
+    """Point P of the first cluster, which has turned by q, relative to the origin of its sums [m]."""
     return wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(q, arm)
 
 
 @wp.func
 def side_of(j: int, side: int, clusters: Clusters, q: wp.quatd, total: Sums, P: wp.vec3d, ground: Mean) -> Side:
-    """The first or the second side of coupling j, turned by q, from the moments of its cluster if it has one."""
+    """One side of coupling j, which has turned by q, from the moments of its cluster if it has one."""
     found = Side()
     found.arm = wp.quat_rotate(q, clusters.arm[j, side])
     found.axis = wp.quat_rotate(q, clusters.axis[j])
@@ -65,14 +65,14 @@ def side_of(j: int, side: int, clusters: Clusters, q: wp.quatd, total: Sums, P: 
 
 @wp.func
 def hinge_inverse(a: Mean, b: Mean, axis: wp.vec3d) -> Inverse:
-    """What gives the impulses of a hinge about a unit vector, from the responses of what it joins."""
+    """Inverse that gives the impulses of a hinge about a unit vector, from the responses of its sides."""
     held = wp.identity(3, dtype=wp.float64) - wp.outer(axis, axis)
     return inverse_of(sum_of(a.response, b.response), held)
 
 
 @wp.func
 def turned_by_little(r: wp.vec3d, angle: wp.vec3d) -> wp.vec3d:
-    """A vector after a rotation by a small angle, by its series; the next step makes up for what is left of it."""
+    """A vector after a rotation by a small angle, by its series; the next step corrects the remainder."""
     a = wp.cross(angle, r)
     b = wp.cross(angle, a)
     return r + (a + (wp.float64(0.5) * b + wp.float64(1.0 / 6.0) * wp.cross(angle, b)))
@@ -92,14 +92,14 @@ def look_ahead(side: Side, p: wp.vec3d, L: wp.vec3d, dt: wp.float64) -> Ahead:
 
 @wp.func
 def hinge_impulses(inverse: Inverse, a: Ahead, b: Ahead, rate: wp.float64):
-    """J and T on the first side that let points and axes of both coincide after the step; `rate` is 1 / dt [1/s]."""
+    """J and T on the first side that make points and axes of both coincide after the step; `rate` is 1 / dt [1/s]."""
     J, T = joint_impulses(inverse, rate * (a.point - b.point), rate * wp.cross(b.axis, a.axis))
     return J, T
 
 
 @wp.func
 def quickly_turned(q: wp.quatd, angle: wp.vec3d) -> wp.quatd:
-    """`turned`, by series for small angles, which take no root and no quotient."""
+    """`turned` for small angles by series, which need neither root nor quotient."""
     h = wp.float64(0.25) * wp.dot(angle, angle)
     if h > wp.float64(1e-6):
         return turned(q, angle)
@@ -114,7 +114,7 @@ def quickly_turned(q: wp.quatd, angle: wp.vec3d) -> wp.quatd:
 def place_after(
     place: wp.vec3d, P: wp.vec3d, a: Side, b: Mean, first: Ahead, J: wp.vec3d, T: wp.vec3d, dt: wp.float64
 ) -> wp.vec3d:
-    """Where a joint at P from its `place` is after the step [m]; the ground or a base, without mass, holds it."""
+    """Place after the step of a joint at P from its `place` [m]; a side without mass, ground or base, holds it."""
     if b.mass == wp.float64(0.0):
         return place + dt * (b.velocity - b.response.point * J)
     v = first.velocity + wp.cross(first.spin, P - a.mean.centre)

@@ -19,7 +19,7 @@ from warp_mca.kernels.records.extremes import keep_speed
 wp.set_module_options({"enable_backward": False})
 
 SOLVES = 64  # steps of Newton's method at most
-PRECISION = 1e-14  # of the rate, at which they end
+PRECISION = 1e-14  # change of the rate, relative, at which the steps end
 
 
 @wp.struct
@@ -54,7 +54,7 @@ __syncthreads();
 
 @wp.func_native(_BARRIER)
 def wait_for_block():
-    """Wait for all threads of the block; on a CPU it is one."""
+    """Wait for all threads of the block, which on a CPU has one."""
     ...
 
 
@@ -161,7 +161,7 @@ def twist(
     v_out: wp.array(dtype=wp.vec3d),
     speed_square_out: wp.array(dtype=wp.float32),
 ):
-    """Let a couple about z [N m] act for `kick` [s] on nodes that move on for `drift` [s]; `motion` is theirs."""
+    """Apply a couple about z [N m] for `kick` [s] to nodes that move on for `drift` [s]; `motion` is theirs."""
     turn = kick * couple * inverse(motion[3])
     for k in range(begin + lane, end, wp.block_dim()):
         i = node[k]
@@ -188,7 +188,7 @@ def joint_torques(
     work_after_out: wp.array(dtype=wp.vec2d),
     clock_out: wp.array(dtype=wp.int32),
 ):
-    """Let torques act on nodes that all other forces have advanced; a block of threads takes a scene's hinges in turn.
+    """Apply torques to nodes that all other forces have advanced; a block of threads takes a scene's hinges in turn.
 
     The torque at t(n) works over half a step before t(n), which completes work_out [J], and over half a step after it,
     which work_after_out [J] holds for the next step; see `constraint.drive`. spin_out [kg m^2/s] keeps the spins of the
@@ -225,4 +225,4 @@ def joint_torques(
             spin_out[j] = wp.vec2d(inner[2] + kick * couple, outer[2] - kick * couple)
             if drift > wp.float64(0.0):
                 clock_out[j] = n + 1
-        wait_for_block()  # the next hinge may have nodes of this one
+        wait_for_block()  # the next hinge may share nodes with this one

@@ -12,8 +12,8 @@ The rotation F of a step, Q(n+1) = Q(n) F, follows from m = Q(n)^T L by Cayley's
     J f + f x J f = (dt / 2) (1 + f . f) m,
 
 J the inertia of the nodes in the body's frame (Lee, Leok and McClamroch, Comput. Methods Appl. Mech. Engrg. 196 (2007)
-2907, there with sin and cos of the angle). Sums over the nodes give P and L to rounding, and what no force acts on
-keeps them. The scheme is symplectic, so that the energy of a free body does not drift.
+2907, there with sin and cos of the angle). Sums over the nodes give P and L to rounding, and a free body keeps them.
+The scheme is symplectic, so that the energy of a free body does not drift.
 """
 
 import warp as wp
@@ -21,7 +21,7 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 SOLVES = 50  # steps of Newton's method at most
-ROUNDING = 1e-15  # of the rotation of a step, at which they end
+ROUNDING = 1e-15  # change of the rotation of a step, relative, at which the steps end
 
 
 @wp.struct

@@ -1,7 +1,7 @@
 """Owns pins between a rigid body and a cluster: nodes of a flexible body that share a mean motion.
 
-`cluster` says what the mean motion is and how it answers impulses. Here the cluster's side takes part in the rows of
-`rigid_rows`: three hold the pin's point on both sides together, two the directions of its axis.
+`cluster` defines the mean motion and its response to impulses. Here the cluster takes part in the rows of `rigid_rows`:
+three rows hold the pin's points of both sides together, two the directions of its axis.
 """
 
 import warp as wp
@@ -51,7 +51,7 @@ def move_pin(
     place_out: wp.array(dtype=wp.vec3d),
     axis_out: wp.array(dtype=wp.vec3d),
 ):
-    """Where the point of a pin, from its place at the start, and its axis are on the cluster at t(n+1)."""
+    """Point of a pin on the cluster at t(n+1), relative to its place at the start [m], and its axis there."""
     m = mean[p]
     J = impulse[p, 0]
     T = impulse[p, 1]
@@ -65,7 +65,7 @@ def move_pin(
 
 @wp.func
 def pin_lightness(mean: Mean, n: wp.vec3d, t: wp.vec3d, m: wp.vec3d, s: wp.vec3d) -> wp.float64:
-    """Speed of a cluster along n at its pin, and about t, that an impulse along m and an angular one about s give."""
+    """Speed of a cluster along n at its pin and about t, due to a unit impulse along m and one about s."""
     point = mean.response.point * m + mean.response.mixed * s
     turn = wp.transpose(mean.response.mixed) * m + mean.response.turn * s
     return wp.dot(n, point) + wp.dot(t, turn)
@@ -86,7 +86,7 @@ def pull_cluster(
     v_out: wp.array(dtype=wp.vec3d),
     speed_square_out: wp.array(dtype=wp.float32),
 ):
-    """Give the nodes of a cluster what its pin gave to their mean motion."""
+    """Distribute the impulses of a pin to the nodes of its cluster."""
     begin = clusters.begin[p]
     m = mean[p]
     J = impulse[p, 0]

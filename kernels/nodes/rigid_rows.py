@@ -1,4 +1,4 @@
-"""Owns what binds rigid bodies to each other and to the ground: rows, kept by impulses.
+"""Owns the conditions between rigid bodies and with the ground: rows, which impulses keep.
 
 A row is the scalar condition n . (x_first - x_second) = 0 at t(n+1) for a point that two bodies share. Equal and
 opposite impulses along n act at that point, so that momentum and angular momentum are kept. All rows of a group are
@@ -68,7 +68,7 @@ def lever(q: wp.quatd, arm: wp.vec3d, n: wp.vec3d) -> wp.vec3d:
 def lightness(
     b: int, c: int, bodies: RigidBodies, n: wp.vec3d, lever_b: wp.vec3d, m: wp.vec3d, lever_c: wp.vec3d
 ) -> wp.float64:
-    """Speed along n of a point of body b that a unit impulse along m at a point of body c gives [1/kg]."""
+    """Speed along n of a point of body b due to a unit impulse along m at a point of body c [1/kg]."""
     if b != c or b < 0:
         return wp.float64(0.0)
     return wp.dot(n, m) / bodies.mass[b] + wp.dot(lever_b, bodies.inverse_inertia[b] * lever_c)
@@ -86,7 +86,7 @@ def place_row(
     lever_out: wp.array2d(dtype=wp.vec3d),
     gap_out: wp.array(dtype=wp.float64),
 ):
-    """n and twist at t(n), levers on both bodies, and the speed that closes what is open along n in the step [m/s]."""
+    """n and twist at t(n), levers on both bodies, and the speed that closes the opening along n in the step [m/s]."""
     a = rows.first[r]
     b = rows.second[r]
     n = rows.direction[r]
@@ -114,7 +114,7 @@ def row_lightness(
     levers: wp.array2d(dtype=wp.vec3d),
     mean: wp.array(dtype=Mean),
 ) -> wp.float64:
-    """Entry of the matrix of a group: speed that opens row r by a unit impulse of row s [1/kg]; 0 of idle pins."""
+    """Entry of a group's matrix: opening speed of row r due to a unit impulse of row s [1/kg]; 0 for idle pins."""
     if not moves and (rows.pin[r] >= 0 or rows.pin[s] >= 0):
         return wp.float64(0.0)
     a = rows.first[r]
@@ -150,7 +150,7 @@ def opening(
     axis: wp.array(dtype=wp.vec3d),
     value_out: wp.array(dtype=wp.float64),
 ) -> wp.float64:
-    """Speeds at which rows would be open at t(n+1), negative [m/s]; the greatest. Directions open in rad/s."""
+    """Negative speeds at which rows would open by t(n+1) [m/s], and the greatest; directions open in rad/s."""
     worst = wp.float64(0.0)
     for r in range(begin, end):
         a = rows.first[r]
@@ -186,7 +186,7 @@ def give_impulses(
     impulse_out: wp.array(dtype=wp.vec3d),
     pin_impulse_out: wp.array2d(dtype=wp.vec3d),
 ):
-    """Impulses [N s] of rows on their bodies, equal and opposite at the common point, and those of pins' clusters."""
+    """Apply the impulses of rows to their bodies and to clusters of pins, equal and opposite at the common point."""
     for r in range(begin, end):
         a = rows.first[r]
         b = rows.second[r]
@@ -232,9 +232,9 @@ def satisfy(
     rate_out: wp.array(dtype=wp.mat33d),
     value_out: wp.array(dtype=wp.float64),
 ):
-    """Close the rows of group k, whose bodies' motion is that without them, until rounding is what opens them.
+    """Close the rows of group k, whose bodies moved without them, until only rounding opens them.
 
-    `counts`: impulses count, and pins act; neither does before the first step.
+    `counts` is false before the first step: then impulses are not counted, and pins do not act.
     """
     begin = rows.begin[k]
     end = rows.begin[k + 1]

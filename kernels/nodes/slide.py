@@ -12,8 +12,8 @@ from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
 
-SWEEPS = 200  # over the sliders of a rail at most; they disturb each other where they share its nodes
-TOLERANCE = 1e-12  # of the segment: distance from the rail at which sweeps end
+SWEEPS = 200  # greatest number of sweeps over the sliders of a rail, which disturb each other where they share nodes
+TOLERANCE = 1e-12  # distance from the rail at which sweeps end, as a share of the segment
 
 
 @wp.func
@@ -35,7 +35,7 @@ def segment(
     v: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
 ) -> int:
-    """Place in `node` of the first node of the rail's segment that x is on, or nearest to beyond its ends."""
+    """Index in `node` of the first node of the rail's segment on which x lies; beyond the ends, the nearest segment."""
     along = place_before(X, u, v, node[end - 1], dt) - place_before(X, u, v, node[begin], dt)
     low = begin
     high = end - 1
@@ -61,7 +61,7 @@ def hold_on_rail(
     v_out: wp.array(dtype=wp.vec3d),
     impulse_out: wp.array(dtype=wp.vec3d),
 ) -> wp.float64:
-    """Press slider node[k] back on its rail; the square of how far it was off, over that of the segment's length."""
+    """Press slider node[k] back on its rail. Returns its squared distance from it over the squared segment length."""
     i = node[k]
     x = place_before(X, u_out, v_out, i, dt)
     e = segment(node, begin, end, x, X, u_out, v_out, dt)
@@ -101,7 +101,7 @@ def slide(
     speed_square_out: wp.array(dtype=wp.float32),
     impulse_out: wp.array(dtype=wp.vec3d),
 ):
-    """Hold the sliders of each rail on it, once `constraint.bound_kernel` has advanced all its nodes as free ones.
+    """Hold the sliders of each rail on it, after `constraint.bound_kernel` advanced all its nodes as free ones.
 
     rail: first, begin and end of each, shape (rail_count,): node[first] to node[begin - 1] slide, node[begin] to
     node[end - 1] are the rail. impulse_out [N s] sums the impulse on each slider.

@@ -4,12 +4,12 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-DEPENDENT = 1e-10  # of its diagonal entry: pivot below which a row follows from those before it
+DEPENDENT = 1e-10  # a row is dependent if its pivot is below this share of its diagonal entry
 
 
 @wp.func
 def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
-    """L D L^T of a symmetric matrix in place, D on the diagonal; it is 0 for rows that follow from those before."""
+    """Factorise a symmetric matrix as L D L^T in place. D is on the diagonal; it is 0 for dependent rows."""
     for j in range(size):
         pivot = matrix_out[first + j * size + j]
         least = wp.float64(DEPENDENT) * pivot
@@ -33,7 +33,7 @@ def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
 
 @wp.func
 def solve(first: int, size: int, begin: int, matrix: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64)):
-    """Solution for the right-hand side in value_out[begin:]; 0 for rows that follow from others."""
+    """Solve for the right-hand side in value_out[begin:]; dependent rows get 0."""
     for i in range(size):
         x = value_out[begin + i]
         for k in range(i):
