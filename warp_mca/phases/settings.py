@@ -15,7 +15,7 @@ class Settings:
     Attributes:
         device: "cpu" or a CUDA device.
         precision: "mixed" or "float64".
-        threads: of a run on the CPU.
+        threads: CPU threads to use.
         multi_rate: groups of elements with steps of their own, see `runs.rate_groups`; None for one rate.
     """
 

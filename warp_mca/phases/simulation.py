@@ -64,7 +64,7 @@ def run(
         scene: what to run.
         device: "cpu" or a CUDA device as "cuda:0".
         precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
-        threads: of a run on the CPU, all cores that this process may use if None; results do not depend on it.
+        threads: CPU threads to use; None for all cores that this process may use. Results do not depend on it.
         multi_rate: groups of elements with steps of their own; "auto" chooses how many, None: all take one step.
         duration: of the impact phase [s]; the scene's own if None.
         out: folder for summary.json, history.csv and the figures; nothing is written if None.

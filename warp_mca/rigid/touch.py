@@ -15,8 +15,8 @@ ROOT = 4.0 * 2.0**-52  # accuracy of times, absolute [s] and relative [-], that 
 class Watch:
     """One gap along a swing, followed from step to step.
 
-    A gap that is closed at the start but opens (a tip that has just left its target, with a shape that does not fit
-    exactly) touches again when it falls below 0 after having been above, or when it shrinks before it got there.
+    If the gap starts closed and opening (a tip that has just left its target, with a shape that does not fit exactly),
+    the next touch is when it closes after having opened, or when it starts to shrink without having opened.
 
     Attributes:
         start: gap at the start [m].
