@@ -2,7 +2,7 @@
 
 Rows are added to FILE.json, in place of rows of the same element, size, precision and case, so that a long
 measurement can be made in parts (`--elements`, `--sizes`, `--parts`). `python -m benchmarks.report` makes
-docs/performance.md of it.
+performance.md of docs/measurements/ of it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import warp as wp
 from benchmarks.blocks import RATES, SIZES, assemble
 from benchmarks.ceilings import ceilings
 from benchmarks.flops import flops
+from benchmarks.measurements import device_name, note
 from benchmarks.rates import measure_host, measure_rates, measure_savings
 from benchmarks.startup import startup
 from benchmarks.timing import QUICK, Care
@@ -33,11 +34,7 @@ KEY = ("element", "size", "precision", "case")
 
 def facts(device: str) -> dict[str, Any]:
     """Device and versions."""
-    found = wp.get_device(device)
-    name = found.name
-    if not found.is_cuda and (info := Path("/proc/cpuinfo")).exists():
-        models = [line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
-        name = models[0] if models else name
+    found, name = wp.get_device(device), device_name(device)
     versions = {"warp": wp.__version__, "numpy": np.__version__, "python": platform.python_version()}
     versions |= {"warp_mca": __version__}
     if found.is_cuda:
@@ -107,6 +104,8 @@ def main(words: list[str] | None = None) -> dict[str, Any]:
                 keep("savings", measure_savings(model, where, args.precision, args.device, care))
             if "host" in args.parts and element == "hex8":
                 keep("host", [measure_host(model, where, args.device, care)])
+    if args.output:
+        note(args.output, args.device)
     print(f"{time.perf_counter() - begun:.0f} s")
     return data
 

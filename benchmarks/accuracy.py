@@ -10,8 +10,8 @@ python -m benchmarks.accuracy fit
 `learn` measures all variants of the families of `accuracy_families` on random scenes and writes the package's store,
 with `--add` beside the scenes that it has, which are not run again (seeds of other scenes); with `--lacking` it runs
 these with variants that they lack. `validate` runs `--accuracy 2%` and `5%` on other random scenes, compares with
-references, and writes docs/accuracy.json as it goes; `both` does the one and the other; `render` puts the tables into
-docs/accuracy.md; `fit` repeats the part of `learn` that runs nothing.
+references, and writes accuracy.json of docs/measurements/ as it goes; `both` does the one and the other; `render`
+puts the tables into accuracy.md beside it; `fit` repeats the part of `learn` that runs nothing.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ from benchmarks.accuracy_measure import (
     stored,
     truth_of,
 )
+from benchmarks.measurements import FOLDER, note
 from warp_mca.accuracy.prediction import processes_of
 from warp_mca.accuracy.store import OWN, family_from
 from warp_mca.studies.sweep_job import check_device_after
 
-ROOT = Path(__file__).resolve().parents[1]
-JSON = ROOT / "docs" / "accuracy.json"
-PAGE = ROOT / "docs" / "accuracy.md"
+JSON = FOLDER / "accuracy.json"
+PAGE = FOLDER / "accuracy.md"
 ASKED = (0.02, 0.05)
 LEARN, HELD_OUT = 1, (16, 17)  # seeds: choices are never tried on scenes that they were learnt from
 LEARNING = 0.45  # share of the time of `both` that is spent on the store
@@ -182,6 +182,7 @@ def validate(args: argparse.Namespace, families: list[Family], until: float) -> 
                     found.append(judged(family, values, table, truth, own, args.device))
         data = {"device": args.device, "version": mca.__version__, "reference": args.reference, "scenes": found}
         target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    note(target, args.device)
     print(f"{len(found)} scenes judged")
 
 

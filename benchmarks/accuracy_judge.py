@@ -8,6 +8,7 @@ from typing import Any
 
 from benchmarks.accuracy_families import Family, Values
 from benchmarks.accuracy_measure import COMPUTED, FINE, Row, Table, errors_of
+from benchmarks.measurements import measured
 from warp_mca.accuracy.choice import cost_of
 from warp_mca.accuracy.convergence import Limit
 from warp_mca.accuracy.figures import BOUND, bound_errors
@@ -151,7 +152,7 @@ def cost_ratio(data: Mapping[str, Any]) -> float | None:
 
 
 def render(page: str, data: Mapping[str, Any]) -> str:
-    """The page with the tables of `docs/accuracy.json` in place of what stands between the marks."""
+    """The page with the tables of `accuracy.json` in place of what stands between the marks."""
     before, rest = page.split(START)
     after = rest.split(END)[1]
     return "".join([before, START, "\n\n", "\n".join(_lines(data)), "\n\n", END, after])
@@ -166,7 +167,7 @@ def _lines(data: Mapping[str, Any]) -> list[str]:
     head = ("scene", "asked", "first peak", "impulse", "duration", "elements", "deciding", "cost over the cheapest's")
     lines += [
         "",
-        f"Device, where a scene names no other: {data['device']}.",
+        f"{measured('accuracy')} Device, where a scene names no other: {data['device']}.",
         "",
         f"| {' | '.join(head)} |",
         "|" + "---|" * len(head),

@@ -25,7 +25,9 @@ from warp_mca.studies.sweep_job import check_device_after
 from warp_mca.studies.sweep_workers import WorkerDied, Workers
 
 BATCH = 8  # scenes side by side at most
-WORK = {"hex8r": 0.65}  # processor time of an element over that of hex8 with plasticity (docs/performance.md) [-]
+WORK = {
+    "hex8r": 0.65
+}  # processor time of an element over that of hex8 with plasticity (measurements/performance.md) [-]
 COMPUTED = 0.4  # share of the elements that a step computes on a CPU with several rates, where it was not measured
 FINE = -1  # number of the reference among the variants
 

@@ -1,6 +1,6 @@
-"""Owns docs/gallery.md: runs each built-in scene on the CPU, pictures it, and writes its figure beside the known value.
+"""Owns gallery.md of docs/measurements/: runs and pictures each built-in scene, with its figure beside the known one.
 
-python -m benchmarks.gallery                 run all scenes, then write docs/gallery.json, gallery.md and the pictures
+python -m benchmarks.gallery                 run all scenes, then write gallery.json, gallery.md and the pictures
 python -m benchmarks.gallery two_link        run one again; the others stay
 python -m benchmarks.gallery --render        write gallery.md from gallery.json again
 """
@@ -15,12 +15,12 @@ from typing import Any
 
 import warp_mca as mca
 from benchmarks.gallery_scenes import SCENES
+from benchmarks.measurements import FOLDER, measured, note
 from benchmarks.pictures import shrink
 from warp_mca.recorders import SnapshotFile
 from warp_mca.scene.catalogue import load_source
 
-DOCS = Path(__file__).parent.parent / "docs"
-PICTURES = DOCS / "images" / "gallery"
+PICTURES = FOLDER / "images" / "gallery"
 
 
 def run_scene(name: str, folder: Path = PICTURES) -> dict[str, Any]:
@@ -42,7 +42,8 @@ def run_scene(name: str, folder: Path = PICTURES) -> dict[str, Any]:
 
 def render(rows: list[dict[str, Any]]) -> str:
     """The page."""
-    return (DOCS / "gallery.template.md").read_text(encoding="utf-8") + "".join(_section(row) for row in rows)
+    text = (FOLDER / "gallery.template.md").read_text(encoding="utf-8").replace("{measured}", measured("gallery"))
+    return text + "".join(_section(row) for row in rows)
 
 
 def figure(value: float, unit: str) -> str:
@@ -70,7 +71,7 @@ def _section(row: dict[str, Any]) -> str:
 warp-mca run {name}
 ```
 
-{number}. {row["n_elements"]} elements, {row["n_steps"]} steps. Code: [scenes/{name}.py](../scenes/{name}.py).
+{number}. {row["n_elements"]} elements, {row["n_steps"]} steps. Code: [scenes/{name}.py](../../scenes/{name}.py).
 """
 
 
@@ -80,15 +81,16 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", choices=[[], *SCENES], help="which; all without a name")
     parser.add_argument("--render", action="store_true", help="write the page again, without any run")
     asked = parser.parse_args()
-    stored = DOCS / "gallery.json"
+    stored = FOLDER / "gallery.json"
     rows = {row["scene"]: row for row in json.loads(stored.read_text(encoding="utf-8"))} if stored.exists() else {}
     for name in [] if asked.render else asked.scenes or SCENES:
         rows[name] = run_scene(name)
         print(f"{name}: {rows[name]['measured']:.6g} {rows[name]['unit']}, known {rows[name]['known']}", flush=True)
         ordered = [rows[scene] for scene in SCENES if scene in rows]
         stored.write_text(json.dumps(ordered, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        note(stored, "cpu")
     ordered = [rows[scene] for scene in SCENES if scene in rows]
-    (DOCS / "gallery.md").write_text(render(ordered), encoding="utf-8")
+    (FOLDER / "gallery.md").write_text(render(ordered), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Owns what docs/gallery.md shows of each built-in scene: the time of its picture, a figure, and its known value."""
+"""Owns what the gallery shows of each built-in scene: the time of its picture, a figure, and its known value."""
 
 from __future__ import annotations
 

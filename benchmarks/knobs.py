@@ -1,6 +1,6 @@
 """Owns the table of what options save and what they cost: runs of `two_link` with and without each of them.
 
-python -m benchmarks.knobs --device cuda:0 --preset paper -o docs/performance.cuda.json
+python -m benchmarks.knobs --device cuda:0 --preset paper -o docs/measurements/performance.cuda.json
 
 Each row is one run, compared with the first: wall time of its impact phase, and the change of each figure. Runs take
 turns with the first one on one device, which should do nothing else. Rows of a preset replace its earlier ones.
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
+from benchmarks.measurements import note
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.options import with_options
 
@@ -180,6 +181,7 @@ def main() -> None:
                 others = [row for row in data.get("knobs", []) if row["preset"] != args.preset]
                 data["knobs"] = others + rows
                 args.output.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+                note(args.output, args.device)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""What the verification notices: `python -m benchmarks.mutations [NAME ...]`, stored in docs/mutations.json.
+"""What the verification notices: `python -m benchmarks.mutations [NAME ...]`, stored in mutations.json.
+
+The file is in docs/measurements/.
 
 Makes each deliberate error of `warp_mca.verify.mutations` in a copy of the package and runs, at the quick level, the
 cases that say they catch it: a row of each must then be out of its tolerance or order. The copy runs without the guard
@@ -18,13 +20,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.measurements import FOLDER, note
 from warp_mca.verify import cases
 from warp_mca.verify.case import Case
 from warp_mca.verify.mutation import Mutation
 from warp_mca.verify.mutations import MUTATIONS
 
 ROOT = Path(__file__).parent.parent
-STORE = ROOT / "docs" / "mutations.json"
+STORE = FOLDER / "mutations.json"
 GUARD = ("warp_mca/scene/phases.py", "energy_tolerance: float = 0.01", "energy_tolerance: float = 1e9")
 TREES = {"warp_mca": "warp_mca", "kernels": "warp_mca/kernels", "scenes": "warp_mca/scenes"}
 
@@ -117,6 +120,7 @@ def main() -> None:
             rest = [row for pair, row in known.items() if pair not in {(r["error"], r["case"]) for r in rows}]
             STORE.write_text(json.dumps(rows + rest, indent=1) + "\n", encoding="utf-8")  # in case it is stopped
     STORE.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    note(STORE, "cpu")
     sys.exit(any(not row["failed"] for row in rows))
 
 

@@ -1,6 +1,6 @@
 """How far the time of a step moves with where its arrays lie: `python -m benchmarks.placement [--device cuda:0]`.
 
-Times one row of docs/performance.md again and again, each time with another amount of memory allocated before the
+Times one row of the page on performance again and again, each time with another amount of memory allocated before the
 solver. Checkouts are compared by what each one's own copy gives: a single placement may differ by 2 %.
 """
 

@@ -1,8 +1,8 @@
-"""Owns docs/performance.md: tables and the roofline picture, rendered from what the benchmarks stored.
+"""Owns performance.md of docs/measurements/: tables and the roofline picture, rendered from what the benchmarks stored.
 
 python -m benchmarks.report                 print the page
-python -m benchmarks.report --write         write docs/performance.md and docs/images/roofline.png
-python -m benchmarks.report FILE.json …     of these files in place of docs/performance.*.json
+python -m benchmarks.report --write         write the page and images/roofline.png beside it
+python -m benchmarks.report FILE.json …     of these files in place of performance.*.json
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from typing import Any
 
 from benchmarks import knobs
 from benchmarks.blocks import SIZES
+from benchmarks.measurements import FOLDER, measured
 
-DOCS = Path(__file__).parent.parent / "docs"
-TEMPLATE = DOCS / "performance.template.md"
-PICTURE = DOCS / "images" / "roofline.png"
+TEMPLATE = FOLDER / "performance.template.md"
+PICTURE = FOLDER / "images" / "roofline.png"
 Data = dict[str, Any]
 
 
 def stored() -> list[Path]:
     """Files that the page is made of."""
-    return sorted(DOCS.glob("performance.*.json"))
+    return sorted(FOLDER.glob("performance.*.json"))
 
 
 def load(paths: list[Path]) -> tuple[list[Data], list[dict]]:
@@ -225,16 +225,15 @@ def peers_taylor(rows: list[dict]) -> str:
 
 
 def render(paths: list[Path]) -> str:
-    """docs/performance.md: its text with tables in place of marks."""
+    """The page: its text with tables in place of marks."""
     devices, rows = load(paths)
     errors = [r["force_error"] for d in devices for r in d.get("rates", []) if "force_error" in r]
-    lines = [
-        [title(d), d["device"], *(d["versions"].get(k, "") for k in ("warp_mca", "warp", "numpy", "python", "driver"))]
-        for d in devices
-    ]
+    names = ("warp_mca", "warp", "numpy", "python", "driver")
+    lines = [[title(d), d["device"], *(d["versions"].get(k, "") for k in names)] for d in devices]
     unsound = [r for d in devices for part in ("rates", "savings") for r in d.get(part, []) if not r["sound"]]
     assert not unsound, f"contact search or state failed in {unsound[0]}"
     marks = {
+        "measured": "\n".join(f"- `{path.name}`: {measured(path.stem)}" for path in paths if path.parent == FOLDER),
         "devices": table(["device", "name", "warp_mca", "Warp", "NumPy", "Python", "driver"], lines),
         "rates": sections(devices, rates),
         "force_error": f"{max(errors):.0e}" if errors else "not measured",
@@ -293,14 +292,14 @@ def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.report", description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="*", type=Path)
-    parser.add_argument("--write", action="store_true", help="write docs/performance.md and docs/images/roofline.png")
+    parser.add_argument("--write", action="store_true", help="write performance.md and images/roofline.png")
     args = parser.parse_args()
     paths = args.files or stored()
     text = render(paths)
     if not args.write:
         print(text, end="")
         return
-    (DOCS / "performance.md").write_text(text, encoding="utf-8")
+    (FOLDER / "performance.md").write_text(text, encoding="utf-8")
     roofline(paths, PICTURE)
 
 

@@ -1,6 +1,6 @@
-"""Owns docs/results.md: runs every case of its tables and writes them, with the command that makes each.
+"""Owns results.md of docs/measurements/: runs each case of its tables, with the command that makes it.
 
-    python -m benchmarks.results --device cuda:0            run all cases, then write docs/results.json and results.md
+    python -m benchmarks.results --device cuda:0            run all cases, then write results.json and results.md
     python -m benchmarks.results --render                   write results.md from results.json again
 
 Models come from `--models DIR` (built with `warp-mca build two_link --preset NAME -o DIR/NAME.mca`) where gmsh is not.
@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 import warp_mca as mca
+from benchmarks.measurements import FOLDER, measured, note
 
-DOCS = Path(__file__).parent.parent / "docs"
 PRESETS = ("quick", "standard", "paper")
 KEPT = (
     "t_contact v_n v_t F_n_first_peak F_n_peaks F_t_min F_t_max F_t_reverses contacts contact_duration energy_error "
@@ -115,8 +115,8 @@ def table_row(row: dict[str, Any]) -> str:
 
 
 def render(rows: list[dict[str, Any]]) -> str:
-    """docs/results.md: its text with the tables in place of {group} marks."""
-    text = (DOCS / "results.template.md").read_text(encoding="utf-8")
+    """The page: its text with the tables in place of {group} marks."""
+    text = (FOLDER / "results.template.md").read_text(encoding="utf-8")
     for group in dict.fromkeys(row["group"] for row in rows):
         lines = [HEAD, RULE, *(table_row(row) for row in rows if row["group"] == group)]
         text = text.replace(f"{{{group}}}", "\n".join(lines))
@@ -154,7 +154,7 @@ def claims(rows: list[dict[str, Any]], base: dict[str, dict[str, Any]]) -> dict[
         r for r in rows if r["group"] == "penalty" and r["preset"] == "paper" and "penalty=3.0" in r["command"]
     )
     found["stiff_first"] = f"{stiff['F_n_first_peak'] / 1e3:.3f} kN"
-    found["device"], found["version"] = paper["device"], paper["version"]
+    found["version"], found["measured"] = paper["version"], measured("results")
     return found
 
 
@@ -163,7 +163,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__.splitlines()[0])
     parser.add_argument("--device", default="cuda:0")
     parser.add_argument("--models", type=Path, help="folder of built models, one for each preset")
-    parser.add_argument("--data", type=Path, default=DOCS / "results.json", help="where the figures are kept")
+    parser.add_argument("--data", type=Path, default=FOLDER / "results.json", help="where the figures are kept")
     parser.add_argument("--render", action="store_true", help="only write results.md from the figures kept")
     args = parser.parse_args()
     if not args.render:
@@ -172,9 +172,9 @@ def main() -> None:
             rows.append(run_case(case, args.device, args.models))
             print(table_row(rows[-1]), flush=True)
             args.data.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    if (DOCS / "results.template.md").exists():
-        rows = json.loads(args.data.read_text(encoding="utf-8"))
-        (DOCS / "results.md").write_text(render(rows), encoding="utf-8")
+        note(args.data, args.device)
+    rows = json.loads(args.data.read_text(encoding="utf-8"))
+    (FOLDER / "results.md").write_text(render(rows), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Owns docs/tradeoff.md: tables and pictures of trade-offs, rendered from what `warp-mca tradeoff` wrote.
+"""Owns tradeoff.md of docs/measurements/: tables and pictures, rendered from what `warp-mca tradeoff` wrote.
 
-python -m benchmarks.tradeoff                 write the page and its pictures from docs/tradeoff.*.json
-python -m benchmarks.tradeoff NAME DIR        take DIR/tradeoff.json as docs/tradeoff.NAME.json first
+python -m benchmarks.tradeoff                 write the page and its pictures from tradeoff.*.json
+python -m benchmarks.tradeoff NAME DIR        take DIR/tradeoff.json as tradeoff.NAME.json first
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from benchmarks.measurements import FOLDER, measured, note
 from benchmarks.report import table
 from warp_mca.accuracy.worth import frontier_rows, knob_rows, reference_lines, words
 
-DOCS = Path(__file__).parent.parent / "docs"
-TEMPLATE = DOCS / "tradeoff.template.md"
+TEMPLATE = FOLDER / "tradeoff.template.md"
 
 # Sections of the page in this order: name of the stored file, heading, command.
 CASES = (
@@ -72,12 +72,12 @@ NOTES = {
 
 def stored() -> dict[str, dict[str, Any]]:
     """Trade-offs that the page shows, by name, in its order."""
-    files = {name: DOCS / f"tradeoff.{name}.json" for name, _, _ in CASES}
+    files = {name: FOLDER / f"tradeoff.{name}.json" for name, _, _ in CASES}
     return {name: json.loads(file.read_text(encoding="utf-8")) for name, file in files.items() if file.exists()}
 
 
 def render(found: dict[str, dict[str, Any]]) -> str:
-    """docs/tradeoff.md: its text, and a section for each trade-off."""
+    """The page: its text, and a section for each trade-off."""
     titles = {name: (heading, command) for name, heading, command in CASES}
     sections = [_section(name, *titles[name], contents) for name, contents in found.items()]
     return TEMPLATE.read_text(encoding="utf-8").replace("{sections}", "\n\n".join(sections))
@@ -85,7 +85,7 @@ def render(found: dict[str, dict[str, Any]]) -> str:
 
 def picture(name: str) -> Path:
     """Where the picture of a trade-off is kept."""
-    return DOCS / "images" / f"tradeoff-{name}.png"
+    return FOLDER / "images" / f"tradeoff-{name}.png"
 
 
 def _section(name: str, heading: str, command: str, contents: dict[str, Any]) -> str:
@@ -93,7 +93,16 @@ def _section(name: str, heading: str, command: str, contents: dict[str, Any]) ->
     refused = len(contents["variants"]) - len(runs)
     count = f"{len(runs)} variants in {contents['spent']:.0f} s"
     count += f", and {refused} that were refused or stopped" if refused else ""
-    lines = [f"## {heading}", "", "```bash", command, "```", "", f"{count}. The reference:", ""]
+    lines = [
+        f"## {heading}",
+        "",
+        "```bash",
+        command,
+        "```",
+        "",
+        f"{measured(f'tradeoff.{name}')} {count}. The reference:",
+        "",
+    ]
     _, *figures = reference_lines(contents)
     lines += [
         "- " + reference_lines(contents)[0].removeprefix("reference: "),
@@ -134,9 +143,11 @@ def main() -> None:
     args = parser.parse_args()
     if args.folder:
         text = (args.folder / "tradeoff.json").read_text(encoding="utf-8")
-        (DOCS / f"tradeoff.{args.name}.json").write_text(text, encoding="utf-8")
+        target = FOLDER / f"tradeoff.{args.name}.json"
+        target.write_text(text, encoding="utf-8")
+        note(target, json.loads(text)["device"].split()[0])
     found = stored()
-    (DOCS / "tradeoff.md").write_text(render(found), encoding="utf-8")
+    (FOLDER / "tradeoff.md").write_text(render(found), encoding="utf-8")
     for name, contents in found.items():
         if not picture(name).exists() or name == args.name:
             save_png(plot_tradeoff(contents), picture(name))

@@ -1,11 +1,11 @@
-"""Owns docs/verification.md: runs the full level, whose cases several processes share, and writes what it gave.
+"""Owns verification.md of docs/measurements/: runs the full level in several processes, and writes what it gave.
 
-    python -m benchmarks.verification --device cuda:0 --processes 20    run, write docs/verification.json and the page
+    python -m benchmarks.verification --device cuda:0 --processes 20    run, write verification.json and the page
     python -m benchmarks.verification chain_mujoco                      run these cases only, on a CPU
     python -m benchmarks.verification --render                          write the page from verification.json again
 
 Outcomes replace those of the same case, element and precision; a case that is skipped, because a module is missing,
-leaves the one that is stored. The text above the tables is docs/verification.template.md.
+leaves the one that is stored. The text above the tables is verification.template.md.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).parent.parent / "docs"
+from benchmarks.measurements import FOLDER, measured, note
+
 PRECISIONS = ("mixed", "float64")
 Task = tuple[str, str, str, str, str]  # case, element, precision, device, level
 
@@ -84,7 +85,10 @@ def write_page(stored: list[dict[str, Any]], folder: Path) -> None:
                 case=known[name], setup=setup, rows=tuple(rows), failure=item["failure"], wall=item["wall"]
             )
             outcomes.append(outcome)
-    write(folder, outcomes, (DOCS / "verification.template.md").read_text(encoding="utf-8").rstrip())
+    header = (FOLDER / "verification.template.md").read_text(encoding="utf-8").rstrip()
+    for name in ("verification", "mutations"):
+        header = header.replace(f"{{{name}}}", measured(name))
+    write(folder, outcomes, header)
 
 
 def main() -> None:
@@ -94,14 +98,15 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--level", default="full", choices=("quick", "full"))
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--data", type=Path, default=DOCS / "verification.json", help="where outcomes are kept")
+    parser.add_argument("--data", type=Path, default=FOLDER / "verification.json", help="where outcomes are kept")
     parser.add_argument("--render", action="store_true", help="only write the page from the outcomes kept")
     args = parser.parse_args()
     stored = json.loads(args.data.read_text(encoding="utf-8")) if args.data.exists() else []
     if not args.render:
         stored = run(tasks(args.cases, args.device, args.level), stored, args.processes)
         args.data.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
-    write_page(stored, DOCS)
+        note(args.data, args.device)
+    write_page(stored, FOLDER)
 
 
 if __name__ == "__main__":

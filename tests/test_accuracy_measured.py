@@ -1,4 +1,4 @@
-"""Tests how choices of `--accuracy` are measured and judged, and that docs/accuracy.md shows what was measured."""
+"""Tests how choices of `--accuracy` are measured and judged, and that the page accuracy.md shows what was measured."""
 
 from __future__ import annotations
 

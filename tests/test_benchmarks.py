@@ -5,7 +5,8 @@ from pathlib import Path
 
 from benchmarks.__main__ import main
 from benchmarks.blocks import RATES, SAVINGS
-from benchmarks.report import DOCS, render, roofline, stored
+from benchmarks.measurements import FOLDER
+from benchmarks.report import render, roofline, stored
 
 
 def test_command_measures_what_the_report_needs(tmp_path: Path, capsys):
@@ -44,6 +45,6 @@ def test_about_five_per_cent_yield():
 
 
 def test_page_is_rendered_from_what_was_stored(tmp_path: Path):
-    assert (DOCS / "performance.md").read_text(encoding="utf-8") == render(stored())
+    assert (FOLDER / "performance.md").read_text(encoding="utf-8") == render(stored())
     roofline(stored(), tmp_path / "roofline.png")
     assert (tmp_path / "roofline.png").stat().st_size > 10_000

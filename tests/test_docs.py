@@ -1,18 +1,19 @@
-"""docs/results.md says what the runs gave."""
+"""The page results.md says what the runs gave."""
 
 import json
 
-from benchmarks.results import DOCS, PRESETS, cases, render
+from benchmarks.measurements import FOLDER
+from benchmarks.results import PRESETS, cases, render
 
 
 def test_results_page_is_rendered_from_the_recorded_runs():
-    rows = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))
-    assert (DOCS / "results.md").read_text(encoding="utf-8") == render(rows)
+    rows = json.loads((FOLDER / "results.json").read_text(encoding="utf-8"))
+    assert (FOLDER / "results.md").read_text(encoding="utf-8") == render(rows)
     assert [row["command"] for row in rows] == [case.command for case in cases()]
 
 
 def test_recorded_runs_meet_what_the_page_claims():
-    rows = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))
+    rows = json.loads((FOLDER / "results.json").read_text(encoding="utf-8"))
     runs = [row for row in rows if "failed" not in row]
 
     def first(group: str, preset: str) -> list[dict]:

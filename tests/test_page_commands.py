@@ -42,8 +42,8 @@ def test_no_entry_of_the_tables_is_left_over(pages: dict[str, Done]):
 
 
 def test_all_commands_of_a_page_are_carried_out(pages: dict[str, Done]):
-    commands = [" ".join(command["words"]) for command in pages["docs/gallery.md"].commands]
-    assert commands == [block.text.strip() for block in bash_blocks("docs/gallery.md")]
+    commands = [" ".join(command["words"]) for command in pages["docs/measurements/gallery.md"].commands]
+    assert commands == [block.text.strip() for block in bash_blocks("docs/measurements/gallery.md")]
     assert all((Path(__file__).parents[1] / "scenes" / f"{line.split()[-1]}.py").exists() for line in commands)
 
 

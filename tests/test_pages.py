@@ -16,6 +16,7 @@ from PIL import Image
 import warp_mca as mca
 from benchmarks.gallery import render, run_scene
 from benchmarks.gallery_scenes import SCENES
+from benchmarks.measurements import FOLDER
 from benchmarks.pages import DOCS, PAGES, blocks, page_blocks, pictures, run_page, shown
 from benchmarks.pictures import WIDTH
 from warp_mca.cli.parser import make_parser
@@ -78,18 +79,18 @@ def test_the_material_of_the_tutorial_is_that_of_the_tests():
 
 
 def test_the_gallery_has_every_scene_and_is_rendered_from_its_runs():
-    rows = json.loads((DOCS / "gallery.json").read_text(encoding="utf-8"))
-    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == render(rows)
+    rows = json.loads((FOLDER / "gallery.json").read_text(encoding="utf-8"))
+    assert (FOLDER / "gallery.md").read_text(encoding="utf-8") == render(rows)
     assert sorted(row["scene"] for row in rows) == sorted(SCENES) == sorted(scene_names())
     for row in rows:
-        with Image.open(DOCS / "images" / "gallery" / f"{row['scene']}.png") as picture:
+        with Image.open(FOLDER / "images" / "gallery" / f"{row['scene']}.png") as picture:
             assert picture.width <= WIDTH
         if row["known"] is not None:
             assert row["measured"] == pytest.approx(row["known"], rel=0.03, abs=1e-12), row["scene"]
 
 
 def test_a_run_gives_the_figure_of_the_gallery(tmp_path: Path):
-    rows = {row["scene"]: row for row in json.loads((DOCS / "gallery.json").read_text(encoding="utf-8"))}
+    rows = {row["scene"]: row for row in json.loads((FOLDER / "gallery.json").read_text(encoding="utf-8"))}
     assert run_scene("pulse_bar", tmp_path)["measured"] == pytest.approx(rows["pulse_bar"]["measured"], rel=1e-4)
 
 

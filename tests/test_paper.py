@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.measurements import FOLDER
 from warp_mca.base.errors import RequestError
 from warp_mca.cli.main import main
 from warp_mca.paper import studies
@@ -38,7 +39,6 @@ from warp_mca.results.result import Result
 from warp_mca.results.storage import load
 from warp_mca.studies.sweep import LATE
 
-DOCS = Path(__file__).parent.parent / "docs"
 COARSE = MeshChoice("quick", refine=0.5)
 SMALL = replace(
     LEVELS["quick"],
@@ -202,7 +202,7 @@ def test_claims_are_told_apart():
 
 
 def test_the_page_in_docs_has_every_claim():
-    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+    text = (FOLDER / "paper.md").read_text(encoding="utf-8")
     assert [claim.id for claim in CLAIMS if f"| {claim.what} | {claim.source} |" not in text] == []
 
 

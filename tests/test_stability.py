@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import warp_mca as mca
+from benchmarks.measurements import FOLDER
 from benchmarks.stability import turns
 from benchmarks.stability.axis import AXES, with_element
 from benchmarks.stability.bars import cantilever, struck
@@ -18,13 +18,12 @@ from benchmarks.stability.measure import cell, wrong
 from benchmarks.stability.page import WORDS, shown, word, write_page
 from benchmarks.stability.table import key, keys, merged
 
-DOCS = Path(__file__).parent.parent / "docs"
-STORED = json.loads((DOCS / "stability.json").read_text(encoding="utf-8"))
+STORED = json.loads((FOLDER / "stability.json").read_text(encoding="utf-8"))
 
 
 def test_page_is_written_from_what_was_stored(tmp_path):
     write_page(STORED, tmp_path / "stability.md")
-    page = (DOCS / "stability.md").read_text(encoding="utf-8")
+    page = (FOLDER / "stability.md").read_text(encoding="utf-8")
     assert (tmp_path / "stability.md").read_text(encoding="utf-8") == page
     for axis in AXES.values():
         assert f"### {axis.title}\n\n{axis.reference}" in page

@@ -1,11 +1,12 @@
-"""docs/tradeoff.md says what the stored trade-offs found; these hold what their readers need."""
+"""The page tradeoff.md says what the stored trade-offs found; these hold what their readers need."""
 
-from benchmarks.tradeoff import DOCS, picture, render, stored
+from benchmarks.measurements import FOLDER
+from benchmarks.tradeoff import picture, render, stored
 from warp_mca.accuracy.figures import BOUND, NAMES, errors
 
 
 def test_page_is_rendered_from_the_stored_trade_offs():
-    assert (DOCS / "tradeoff.md").read_text(encoding="utf-8") == render(stored())
+    assert (FOLDER / "tradeoff.md").read_text(encoding="utf-8") == render(stored())
     assert all(picture(name).exists() for name in stored())
 
 

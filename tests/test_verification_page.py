@@ -1,19 +1,18 @@
-"""docs/verification.md and docs/mutations.json say what the code says, of every case, element and precision."""
+"""verification.md and mutations.json say what the code says, of every case, element and precision."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
+from benchmarks.measurements import FOLDER
 from benchmarks.verification import key, measure, tasks, write_page
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.verify import cases
 from warp_mca.verify.mutations import MUTATIONS
 
-DOCS = Path(__file__).parent.parent / "docs"
-PAGE = (DOCS / "verification.md").read_text(encoding="utf-8")
+PAGE = (FOLDER / "verification.md").read_text(encoding="utf-8")
 CASES = cases()
 
 
@@ -30,7 +29,7 @@ def test_page_has_each_case(case):
 
 
 def test_every_case_was_seen_to_fail():
-    rows = json.loads((DOCS / "mutations.json").read_text(encoding="utf-8"))
+    rows = json.loads((FOLDER / "mutations.json").read_text(encoding="utf-8"))
     ran = {(row["error"], row["case"]): row for row in rows}
     assert set(ran) == {(name, case.name) for case in CASES for name in case.catches}
     assert {case for _, case in ran} == {case.name for case in CASES}
@@ -46,7 +45,7 @@ def test_page_says_at_its_head_whether_every_row_is_met():
 
 
 def test_page_is_written_from_what_was_stored(tmp_path):
-    stored = json.loads((DOCS / "verification.json").read_text(encoding="utf-8"))
+    stored = json.loads((FOLDER / "verification.json").read_text(encoding="utf-8"))
     write_page(stored, tmp_path)
     assert (tmp_path / "verification.md").read_text(encoding="utf-8") == PAGE
     assert {key(found) for found in stored} == {task[:3] for task in tasks((), "", "")}

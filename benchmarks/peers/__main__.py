@@ -15,6 +15,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from benchmarks.measurements import note
+
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 PEERS = ("akantu", "kratos", "calculix")
@@ -84,6 +86,7 @@ def main() -> None:
         found += measure(problem, args.python, args.repeats)
         if args.output:
             args.output.write_text(json.dumps({"peers": found}, indent=1) + "\n", encoding="utf-8")
+            note(args.output, "cpu")
 
 
 if __name__ == "__main__":

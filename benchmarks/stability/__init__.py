@@ -1,1 +1,1 @@
-"""Owns docs/stability.md: runs at the extremes of every parameter, each held to a closed form or a finer run."""
+"""Owns stability.md of docs/measurements/: runs at extremes of each parameter, held to closed forms or finer runs."""

@@ -1,6 +1,6 @@
 """Command line of the table of extremes.
 
-    python -m benchmarks.stability                              the table, minutes on one core; writes docs/stability.*
+    python -m benchmarks.stability                              the table, minutes on one core; writes stability.*
     python -m benchmarks.stability --level long                 millions of steps: minutes to an hour
     python -m benchmarks.stability --only poisson friction      these axes only
     python -m benchmarks.stability --level quick                a few values of each; prints, stores nothing
@@ -18,8 +18,9 @@ import logging
 from pathlib import Path
 from typing import Any
 
-DESCRIPTION = "Run the table of extremes, and write docs/stability.md."
-DOCS = Path(__file__).parent.parent.parent / "docs"
+from benchmarks.measurements import FOLDER, note
+
+DESCRIPTION = "Run the table of extremes, and write stability.md of docs/measurements/."
 
 
 def main() -> None:
@@ -37,7 +38,7 @@ def main() -> None:
     parser.add_argument("--level", default="full", choices=("quick", "full", "long"))
     parser.add_argument("--only", nargs="*", default=(), choices=tuple(AXES), metavar="AXIS")
     parser.add_argument("--missing", action="store_true", help="only cells that are not stored")
-    parser.add_argument("--data", type=Path, default=DOCS / "stability.json", help="where cells are kept")
+    parser.add_argument("--data", type=Path, default=FOLDER / "stability.json", help="where cells are kept")
     parser.add_argument("--render", action="store_true", help="only write the page from the cells kept")
     args = parser.parse_args()
     stored: list[dict[str, Any]] = json.loads(args.data.read_text(encoding="utf-8")) if args.data.exists() else []
@@ -53,7 +54,8 @@ def main() -> None:
         print(f"{len(new)} cells, {sum(map(wrong, new))} of them wrong without a warning")
         if args.level == "quick":
             return
-    write_page(stored, DOCS / "stability.md")
+        note(args.data, args.device)
+    write_page(stored, FOLDER / "stability.md")
 
 
 if __name__ == "__main__":

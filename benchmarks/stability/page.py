@@ -1,4 +1,4 @@
-"""Owns how cells are shown: a line on the terminal, and the tables of docs/stability.md."""
+"""Owns how cells are shown: a line on the terminal, and the tables of stability.md."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 
+from benchmarks.measurements import FOLDER, measured
 from benchmarks.stability.axis import Axis, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, wrong
 from warp_mca.physics.elements import ELEMENTS
 
-TEMPLATE = Path(__file__).parent.parent.parent / "docs" / "stability.template.md"
+TEMPLATE = FOLDER / "stability.template.md"
 
 # Words for what runs say: a part of the sentence, the word, and what to do. Stops come first: they share words.
 WORDS = (
@@ -152,4 +153,5 @@ def write_page(cells: Sequence[Cell], path: Path) -> None:
     used = {word(sentence) for cell in cells for sentence in cell["said"]}
     words = [f"| {short} | {meaning} |" for _, short, meaning in WORDS if short in used]
     text = TEMPLATE.read_text(encoding="utf-8").replace("SUMMARY", summary(cells)).replace("WORDS", "\n".join(words))
+    text = text.replace("MEASURED", measured("stability"))
     path.write_text(text.replace("TABLES", "\n".join(lines).rstrip()), encoding="utf-8")

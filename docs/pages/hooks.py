@@ -55,7 +55,7 @@ def on_page_markdown(markdown: str, *, page: Page, **_: Any) -> str:
     """Links out of docs/ lead to the pages that these files become; the gallery shows the code of its scenes."""
     if page.file.generated_by:
         return markdown
-    if page.file.src_uri == "gallery.md":
+    if page.file.src_uri == "measurements/gallery.md":
         markdown = re.sub(r"Code: \[scenes/(\w+)\.py\]\([^)]*\)\.", _scene_code, markdown)
     return _relinked(markdown, "docs/" + page.file.src_uri, page.file.src_uri)
 

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,8 @@ def _made(runs: Runs, precision: str) -> str:
     done = next((row for row in runs.rows.values() if row["status"] == DONE), {})
     command = f"warp-mca paper --level {runs.level.name}" + (f" --device {runs.device}" if runs.device != "cpu" else "")
     device = done.get("device", runs.device)
-    return f"Made by {command}: {len(runs.rows)} runs on {device}, {precision}, warp_mca {__version__}."
+    made = f"{precision}, warp_mca {__version__}, {datetime.now(UTC).date().isoformat()}"
+    return f"Made by {command}: {len(runs.rows)} runs on {device}, {made}."
 
 
 def _written(out: Path, files: Mapping[str, bytes]) -> list[Path]:
