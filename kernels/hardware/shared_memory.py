@@ -8,8 +8,8 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 ROW = PATCH + 1  # a component of the forces on the corners of one number, and a zero behind them
 FORCES = 24 * ROW

@@ -120,7 +120,7 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
 
 def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
     """Error over element size, for every row that demands or shows an order; None when there is none."""
-    from warp_mca.report.style import BLUE, GREEN, VERMILION, new_figure, save_png, tidy
+    from warp_mca.results.figure_style import BLUE, GREEN, VERMILION, new_figure, save_png, tidy
 
     looks = {"hex8": (BLUE, "o", "-"), "hex8r": (VERMILION, "s", "--"), "tet4": (GREEN, "^", ":")}
     curves = [(o, row) for o in outcomes for row in o.rows if row.order is not None and row.order > 0.3]
