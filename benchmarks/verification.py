@@ -18,6 +18,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from benchmarks.deliberate import notes
+
 DOCS = Path(__file__).parent.parent / "docs"
 PRECISIONS = ("mixed", "float64")
 Task = tuple[str, str, str, str, str]  # case, element, precision, device, level
@@ -84,7 +86,7 @@ def write_page(stored: list[dict[str, Any]], folder: Path) -> None:
                 case=known[name], setup=setup, rows=tuple(rows), failure=item["failure"], wall=item["wall"]
             )
             outcomes.append(outcome)
-    write(folder, outcomes, (DOCS / "verification.template.md").read_text(encoding="utf-8").rstrip())
+    write(folder, outcomes, (DOCS / "verification.template.md").read_text(encoding="utf-8").rstrip(), notes())
 
 
 def main() -> None:
