@@ -2,7 +2,7 @@
 
 The file is in docs/measurements/.
 
-Makes each deliberate error of `warp_mca.verify.mutations` in a copy of the package and runs, at the quick level, the
+Makes each deliberate error of `benchmarks.deliberate` in a copy of the package and runs, at the quick level, the
 cases that say they catch it: a row of each must then be out of its tolerance or order. The copy runs without the guard
 on the balance of energy, which would stop many of them first; other guards may.
 Without names, pairs are run whose error, case or changed file is not as it was when they last were.
@@ -20,11 +20,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.deliberate import CATCHES, MUTATIONS
+from benchmarks.deliberate.mutation import Mutation
 from benchmarks.measurements import FOLDER, note
 from warp_mca.verify import cases
 from warp_mca.verify.case import Case
-from warp_mca.verify.mutation import Mutation
-from warp_mca.verify.mutations import MUTATIONS
 
 ROOT = Path(__file__).parent.parent
 STORE = FOLDER / "mutations.json"
@@ -112,7 +112,7 @@ def main() -> None:
     known = {(row["error"], row["case"]): row for row in stored}
     rows = []
     for case in cases():
-        for name in case.catches:
+        for name in CATCHES[case.name]:
             old = known.get((name, case.name))
             stale = old is None or not old["failed"] or old["state"] != state(name, case)
             wanted = name in args.names if args.names else args.all or stale

@@ -255,7 +255,7 @@ def render(paths: list[Path]) -> str:
 
 def roofline(paths: list[Path], target: Path) -> None:
     """The picture: ceilings of each device, and elastic elements at the largest size."""
-    from warp_mca.report.style import BLACK, BLUE, GREEN, VERMILION, new_figure, save_png, tidy
+    from warp_mca.results.figure_style import BLACK, BLUE, GREEN, VERMILION, new_figure, save_png, tidy
 
     devices = [d for d in load(paths)[0] if {"ceilings", "flops", "rates"} <= set(d)]
     page = new_figure(4.6 * max(1, len(devices)), 3.6)

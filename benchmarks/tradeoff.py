@@ -133,7 +133,7 @@ def _code_last(rows: list[list[str]]) -> str:
 def main() -> None:
     """Command line."""
     from warp_mca.accuracy.picture import plot_tradeoff
-    from warp_mca.report.style import save_png
+    from warp_mca.results.figure_style import save_png
 
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.tradeoff", description=(__doc__ or "").partition("\n")[0]

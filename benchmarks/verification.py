@@ -18,6 +18,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from benchmarks.deliberate import notes
 from benchmarks.measurements import FOLDER, measured, note
 
 PRECISIONS = ("mixed", "float64")
@@ -88,7 +89,7 @@ def write_page(stored: list[dict[str, Any]], folder: Path) -> None:
     header = (FOLDER / "verification.template.md").read_text(encoding="utf-8").rstrip()
     for name in ("verification", "mutations"):
         header = header.replace(f"{{{name}}}", measured(name))
-    write(folder, outcomes, header)
+    write(folder, outcomes, header, notes())
 
 
 def main() -> None:

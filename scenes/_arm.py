@@ -15,6 +15,21 @@ from warp_mca.base.errors import bad_value
 Angles = tuple[float, ...]
 
 
+def fine(axial: int) -> dict[str, object]:
+    """The preset "fine" of arms whose rods have `axial` cells along their cylinders."""
+    return {
+        "section": 12,
+        "ring": 4,
+        "axial": axial,
+        "focus_size": 0.33e-3,
+        "focus_layers": 7,
+        "plate_core": 18,
+        "plate_core_depth": 5,
+        "plate_layers": 12,
+        "plate_extension": 20,
+    }
+
+
 @lru_cache(maxsize=64)  # who chooses a model of the scene builds it again
 def _approach_angle(
     names: tuple[str, ...], length: float, radius: float, H: float, gravity: float, theta: Angles

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import warp_mca as mca
 from warp_mca import Param
+from warp_mca.scenes import _arm_parameters as common
 from warp_mca.scenes._arm import arm
 from warp_mca.scenes._tied import with_coarse_rods, with_nested_plate
 
@@ -63,23 +64,19 @@ def _paths(length: float, radius: float) -> tuple[mca.Path, ...]:
 
 def build(
     *,
-    mu: Annotated[float, Param("coefficient of friction", low=0.0, high=10.0)] = 0.47,
+    mu: common.Friction = 0.47,
     v_plate: Annotated[float, Param("initial velocity of the plate along x", unit="m/s", low=-50.0, high=50.0)] = 0.0,
-    H: Annotated[float, Param("height of hinge O above the plate", unit="m", low=0.0, exclusive=True)] = 0.37,
-    gravity: Annotated[float, Param("acceleration of gravity", unit="m/s^2", low=0.0, exclusive=True)] = 9.8,
-    theta_OA: Annotated[
-        float, Param("initial angle of OA from the downward vertical", unit="deg", low=-180.0, high=180.0)
-    ] = 90.0,
-    theta_AB: Annotated[
-        float, Param("initial angle of AB from the downward vertical", unit="deg", low=-180.0, high=180.0)
-    ] = 90.0,
-    length: Annotated[float, Param("length of each rod", unit="m", low=0.0, exclusive=True)] = 0.21,
-    radius: Annotated[float, Param("radius of rods and tip", unit="m", low=0.0, exclusive=True)] = 0.013,
+    H: common.HeightOfO = 0.37,
+    gravity: common.Gravity = 9.8,
+    theta_OA: common.AngleOA = 90.0,
+    theta_AB: common.AngleAB = 90.0,
+    length: common.RodLength = 0.21,
+    radius: common.RodRadius = 0.013,
     plate_length: Annotated[float, Param("length of the plate, along x", unit="m", low=0.0, exclusive=True)] = 1.2,
     plate_width: Annotated[float, Param("width of the plate, along z", unit="m", low=0.0, exclusive=True)] = 0.1,
     plate_height: Annotated[float, Param("thickness of the plate", unit="m", low=0.0, exclusive=True)] = 0.05,
-    rho: Annotated[float, Param("density", unit="kg/m^3", low=0.0, exclusive=True)] = 2700.0,
-    nu: Annotated[float, Param("Poisson's ratio", low=-1.0, high=0.5, exclusive=True)] = 0.27,
+    rho: common.Density = 2700.0,
+    nu: common.PoissonRatio = 0.27,
     E_tip: Annotated[
         float, Param("Young's modulus of the hemispherical tip", unit="Pa", low=0.0, exclusive=True)
     ] = 70e9,
@@ -90,65 +87,36 @@ def build(
     E_t_tip: Annotated[float, Param("tangent modulus of the tip", unit="Pa", low=0.0)] = 27e9,
     E_t_body: Annotated[float, Param("tangent modulus of the rods' cylinders", unit="Pa", low=0.0)] = 27e9,
     E_t_plate: Annotated[float, Param("tangent modulus of the plate", unit="Pa", low=0.0)] = 27e9,
-    sigma_y: Annotated[float, Param("yield stress", unit="Pa", low=0.0, exclusive=True)] = 110e6,
-    beta: Annotated[float, Param("hardening: 0 kinematic, 1 isotropic", low=0.0, high=1.0)] = 0.0,
+    sigma_y: common.YieldStress = 110e6,
+    beta: common.Hardening = 0.0,
     plastic: Annotated[bool, Param("bodies yield; off: linear elastic")] = True,
-    rigid_inertia: Annotated[str, Param("inertia in the rigid phase", choices=("slender", "mesh"))] = "slender",
-    hinge: Annotated[
-        str,
-        Param(
-            "plain: joint_nodes of rods that meet on the axis; lug: fork and eye, with a pin in their holes",
-            choices=("plain", "lug"),
-        ),
-    ] = "plain",
-    joint_nodes: Annotated[str, Param("nodes tied at each hinge", choices=("axis", "ends", "pin"))] = "ends",
-    pin_radius: Annotated[
-        float | None,
-        Param(
-            "reach of a pin around the axis, with joint_nodes=pin; None: 0.75 radius",
-            unit="m",
-            low=0.0,
-            exclusive=True,
-        ),
-    ] = None,
+    rigid_inertia: common.RigidInertia = "slender",
+    hinge: common.Hinge = "plain",
+    joint_nodes: common.JointNodes = "ends",
+    pin_radius: common.PinRadius = None,
     rigid_bodies: Annotated[
         str | None, Param("bodies that stay rigid in the impact, as OA or OA,plate; None: none")
     ] = None,
-    penalty: Annotated[float, Param("factor of the contact stiffness", low=0.0, exclusive=True, words=("auto",))] = 0.1,
+    penalty: common.PenaltyFactor = 0.1,
     two_way: Annotated[bool, Param("contact checks the nodes of both sides")] = False,
-    t_end: Annotated[
-        float | None,
-        Param(
-            "end of a run of swings and impacts in turn, from the release; None: one impact",
-            unit="s",
-            low=0.0,
-            exclusive=True,
-        ),
-    ] = None,
-    duration: Annotated[
-        float,
-        Param("simulated time after contact, with t_end of each impact at most", unit="s", low=0.0, exclusive=True),
-    ] = 0.6e-3,
-    output_interval: Annotated[
-        float, Param("time between rows of the history", unit="s", low=0.0, exclusive=True)
-    ] = 1e-6,
+    t_end: common.EndTime = None,
+    duration: common.Duration = 0.6e-3,
+    output_interval: common.OutputInterval = 1e-6,
     time_step_scale: Annotated[float, Param("share of the stable time step", low=0.0, high=1.0)] = 0.9,
-    section: Annotated[int, Param("cells along each side of a rod's core, even", low=2)] = 6,
-    ring: Annotated[int, Param("cells from a rod's core to its surface", low=1)] = 3,
+    section: common.Section = 6,
+    ring: common.Ring = 3,
     axial_OA: Annotated[int, Param("cells along OA", low=1)] = 16,
     axial_AB: Annotated[int, Param("cells along the cylinder of AB", low=1)] = 15,
     axial_ratio: Annotated[
         float, Param("length of AB's cells at the hinge over those at the tip", low=0.0, exclusive=True)
     ] = 2.0,
-    focus_size: Annotated[
-        float, Param("cell size at the contact, on the tip and on the plate", unit="m", low=0.0, exclusive=True)
-    ] = 0.6e-3,
-    focus_layers: Annotated[int, Param("cells from the fine patch of the tip to its coarse mesh", low=1)] = 4,
+    focus_size: common.FocusSize = 0.6e-3,
+    focus_layers: common.FocusLayers = 4,
     plate_core_x: Annotated[int, Param("fine cells of the plate along x, even", low=2)] = 10,
     plate_core_z: Annotated[int, Param("fine cells of the plate along z, even", low=2)] = 6,
-    plate_core_depth: Annotated[int, Param("fine cells of the plate downwards", low=1)] = 3,
-    plate_layers: Annotated[int, Param("cells from the plate's fine core to its local box", low=1)] = 8,
-    plate_extension: Annotated[int, Param("cells along x from the local box to each end", low=1)] = 14,
+    plate_core_depth: common.PlateCoreDepth = 3,
+    plate_layers: common.PlateLayers = 8,
+    plate_extension: common.PlateExtension = 14,
     plate_absorbs: Annotated[
         str,
         Param(

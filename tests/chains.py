@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.model.build import Grouping, build_model
+from warp_mca.model.paths import locate
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.prepare import Prepared
 from warp_mca.physics.elements.cells import nodal_masses
-from warp_mca.results.paths import locate
 from warp_mca.rigid.handback import HandBack, carriage_motion, hand_back
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.rigid.scene_chain import pins

@@ -21,8 +21,8 @@ from pathlib import Path
 IMPORTED = """
     gmsh h5py matplotlib.backends.backend_agg matplotlib.figure PIL.Image pxr.UsdGeom pxr.UsdLux pxr.UsdShade
     scipy.integrate scipy.signal scipy.sparse.csgraph warp warp_mca.accuracy.tradeoff warp_mca.cli.main
-    warp_mca.paper.report warp_mca.recorders warp_mca.recorders.rerun_blueprint warp_mca.report.energies
-    warp_mca.report.forces warp_mca.report.paths warp_mca.phases.impact warp_mca.phases.simulate
+    warp_mca.paper.report warp_mca.recorders warp_mca.recorders.rerun_blueprint warp_mca.results.energy_figure
+    warp_mca.results.force_figure warp_mca.results.path_figures warp_mca.phases.impact warp_mca.phases.simulate
     warp_mca.phases.simulation warp_mca.verify.runner
 """.split()
 STAND_IN = """\
@@ -79,10 +79,10 @@ def _prepare() -> None:
     from matplotlib.figure import Figure
 
     from warp_mca.recorders.rerun_viewer import load_rerun
-    from warp_mca.report import style
+    from warp_mca.results import figure_style
 
     load_rerun()
-    style.DOTS_PER_INCH = 50  # of figures: with 200 they take half a second longer
+    figure_style.DOTS_PER_INCH = 50  # of figures: with 200 they take half a second longer
     warp.config.log_level = warp.LOG_WARNING
     warp.init()
     figure = Figure()

@@ -8,8 +8,9 @@ from impacts import begun
 from sharp_edges import in_frame
 
 import warp_mca as mca
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
-from warp_mca.physics.elements.patches import PATCH, make_patches
+from warp_mca.physics.elements.patches import make_patches
 from warp_mca.results.storage import ALL_FILES, PROBE_FILES
 from warp_mca.studies.batch import check_alike
 

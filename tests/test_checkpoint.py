@@ -40,7 +40,7 @@ class StoppedError(Exception):
 @pytest.fixture(autouse=True)
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing them takes longer than the runs."""
-    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from warp_mca.report.console import MAX_PHASES, print_summary
+from warp_mca.cli.console import print_summary
+from warp_mca.results.headlines import MAX_PHASES
 from warp_mca.results.result import Result
 
 

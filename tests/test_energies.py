@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.report.energies import plot_energies, save_energies
-from warp_mca.report.style import engineering
+from warp_mca.results.energy_figure import plot_energies, save_energies
+from warp_mca.results.figure_style import engineering
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 
 TIME = np.arange(1, 401) * 1e-6

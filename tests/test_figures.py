@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warp_mca.pictures.snapshot import Look, Skin, plot_snapshot, save_snapshot
 from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
-from warp_mca.report.energies import plot_energies, save_energies
-from warp_mca.report.paths import plot_paths, plot_waves, save_path_figures
-from warp_mca.report.snapshot import Look, Skin, plot_snapshot, save_snapshot
-from warp_mca.report.style import engineering
+from warp_mca.results.energy_figure import plot_energies, save_energies
+from warp_mca.results.figure_style import engineering
+from warp_mca.results.path_figures import plot_paths, plot_waves, save_path_figures
 from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 from warp_mca.scene.materials import Elastic

@@ -28,11 +28,11 @@ MOVES = len(FILES) + len(PATH_FILES)
 @pytest.fixture(autouse=True)
 def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures that take no time."""
-    for figure in ("forces", "energies"):
+    for figure, name in (("force", "forces"), ("energy", "energies")):
         draw = lambda file, result: file.write_text(str(result.summary))  # noqa: E731
-        monkeypatch.setattr(f"warp_mca.report.{figure}.save_{figure}", draw)
+        monkeypatch.setattr(f"warp_mca.results.{figure}_figure.save_{name}", draw)
     both = lambda folder, result: [(folder / name).write_text(str(result.summary)) for name in PATH_FILES[1:]]  # noqa: E731
-    monkeypatch.setattr("warp_mca.report.paths.save_path_figures", both)
+    monkeypatch.setattr("warp_mca.results.path_figures.save_path_figures", both)
 
 
 def result(number: int, *, paths: bool = True) -> Result:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from warp_mca.report.forces import compression_phases, plot_forces, save_forces
-from warp_mca.report.style import STICK
+from warp_mca.results.figure_style import STICK
+from warp_mca.results.force_figure import compression_phases, plot_forces, save_forces
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 
 TIME = np.arange(1, 501) * 1e-6

@@ -10,8 +10,8 @@ from flying_bars import FlyingBars
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
+from warp_mca.pictures.interactive import plotter
 from warp_mca.recorders import VtkHdfFile
-from warp_mca.report.interactive import plotter
 
 BELT = mca.RigidPlane(point=(0.0, 0.0, -0.001), normal=(0.0, 0.0, 1.0), velocity=(2.0, 0.0, 0.0))
 

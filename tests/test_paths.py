@@ -11,7 +11,7 @@ import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.model.build import build_model
-from warp_mca.results.paths import Probes, locate
+from warp_mca.model.paths import Probes, locate
 from warp_mca.verify.small_meshes import mixed_cube
 
 STEEL = mca.Elastic(E=2e11, nu=0.3, rho=7850.0)

@@ -15,11 +15,11 @@ from warp_mca.base.errors import RequestError
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.cli import run
 from warp_mca.cli.parser import make_parser
+from warp_mca.pictures.magnify import magnified
+from warp_mca.pictures.snapshot import FIELDS, Look, Picture, Skin, field_limit
 from warp_mca.recorders import AnimationFile, SnapshotFile
 from warp_mca.recorders.pictures import Subject
 from warp_mca.recorders.recorder import SURFACE, VOLUME
-from warp_mca.report.magnify import magnified
-from warp_mca.report.snapshot import FIELDS, Look, Picture, Skin, field_limit
 
 RNG = np.random.default_rng(3)
 

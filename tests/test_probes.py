@@ -270,7 +270,7 @@ def test_a_rigid_body_carries_its_probes():
 
 
 def test_results_are_written_and_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)  # drawing them takes longer than the run
     scene = watched(oblique())
     result = mca.run(scene, out=tmp_path / "out", threads=1)

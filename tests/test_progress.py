@@ -15,7 +15,7 @@ from test_run import bar
 import warp_mca as mca
 from warp_mca.base import progress
 from warp_mca.base.progress import Lines, duration_words
-from warp_mca.studies.forecast import expected_time, forecast
+from warp_mca.phases.forecast import expected_time, forecast
 
 
 def test_lines_come_every_ten_seconds_and_twentieth(capsys: pytest.CaptureFixture[str]):

@@ -64,7 +64,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "scene.py").write_text(SCENE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pure_fem, "BLOCK", BLOCK)
-    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)  # drawing them takes longer than the runs
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from warp_mca.geometry.creases import Creases
 from warp_mca.geometry.sphere import Sphere
-from warp_mca.report.raster import rasterise
+from warp_mca.pictures.raster import rasterise
 
 
 def test_triangles_of_a_square_cover_each_of_its_pixels_once():
@@ -36,7 +36,7 @@ def test_values_are_linear_between_corners():
 def test_large_pictures_are_looked_at_in_parts(monkeypatch):
     corners = np.random.default_rng(5).uniform(0.0, 60.0, (40, 3, 3))
     whole = rasterise(corners, 60, 60)
-    monkeypatch.setattr("warp_mca.report.raster.AT_ONCE", 50)
+    monkeypatch.setattr("warp_mca.pictures.raster.AT_ONCE", 50)
     parts = rasterise(corners, 60, 60)
     np.testing.assert_array_equal(whole.pixel, parts.pixel)
     np.testing.assert_array_equal(whole.triangle, parts.triangle)

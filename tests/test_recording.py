@@ -14,11 +14,11 @@ from rrd import rows
 import warp_mca as mca
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.model.build import build_model
+from warp_mca.model.paths import locate
 from warp_mca.recorders import AnimationFile, Cadence, FinalState, RerunStream, SnapshotFile, UsdFile, VtkHdfFile
 from warp_mca.recorders.checks import check_files
 from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Frame
-from warp_mca.results.paths import locate
 from warp_mca.step.output import Output
 from warp_mca.step.solver import Solver
 

@@ -33,7 +33,7 @@ OPTIONS = ["--set", "mu=0.3", "--set", "v=2", "--duration", "3e-5", "--threads",
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working directory with a scene file; figures take longer than the runs."""
-    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)
     monkeypatch.chdir(tmp_path)
     Path("block.py").write_text(SCENE)

@@ -10,7 +10,7 @@ from flying_bars import FlyingBars
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.report.setting import plane_mesh, rigid_planes, up_of, view_axes
+from warp_mca.pictures.setting import plane_mesh, rigid_planes, up_of, view_axes
 
 FLOOR = mca.RigidPlane(point=(0.0, 0.0, -0.01), normal=(0.0, 0.0, 2.0))
 

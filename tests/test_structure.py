@@ -70,11 +70,11 @@ def modules() -> dict[str, Path]:
     return found
 
 
-def imported(node: ast.AST, names: set[str]) -> set[str]:
-    """Modules of `names` that a tree imports, in functions as well; not what only a type checker reads."""
+def imported(node: ast.AST, names: set[str], types: bool = False) -> set[str]:
+    """Modules of `names` that a tree imports, in functions as well; with `types` those of type checkers too."""
     found = set()
     for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
+        if not types and isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
             continue
         if isinstance(child, ast.Import):
             found |= {item.name for item in child.names} & names
@@ -82,7 +82,7 @@ def imported(node: ast.AST, names: set[str]) -> set[str]:
             whole = {f"{child.module}.{item.name}" for item in child.names}
             found |= (whole & names) or ({child.module} & names)
         else:
-            found |= imported(child, names)
+            found |= imported(child, names, types)
     return found
 
 

@@ -51,8 +51,8 @@ def no_pictures() -> Iterator[None]:
     """Drawing takes longer than the runs; blocks are so short that the swing has several."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pure_fem, "BLOCK", 2)
-        for figure in ("forces.save_forces", "energies.save_energies"):
-            patch.setattr(f"warp_mca.report.{figure}", lambda *_: None)
+        for figure in ("force_figure.save_forces", "energy_figure.save_energies"):
+            patch.setattr(f"warp_mca.results.{figure}", lambda *_: None)
         yield
 
 

@@ -13,8 +13,8 @@ from test_gpu import oblique
 from test_probes import PROBES, SECTIONS, watched
 
 import warp_mca as mca
-from warp_mca.report.probes import plot_probes
 from warp_mca.results import tables
+from warp_mca.results.probe_figure import plot_probes
 from warp_mca.results.units import unit_of
 
 

@@ -9,6 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import GuardError, McaError, RequestError
+from warp_mca.base.version import __version__
+from warp_mca.physics import elements as _elements  # noqa: F401, fills the table of elements
 from warp_mca.scene import (
     Absorbing,
     BaseMotion,
@@ -42,8 +44,8 @@ if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
     from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
+    from warp_mca.phases.quality import quality_table
     from warp_mca.phases.simulation import mesh, run
-    from warp_mca.report.quality import quality_table
     from warp_mca.results.cfc import cfc_filter
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -51,8 +53,6 @@ if TYPE_CHECKING:
     from warp_mca.scene.parameters import Param
     from warp_mca.studies.batch import run_batch
     from warp_mca.studies.sweep import sweep
-
-__version__ = "0.1.0"
 
 _LAZY = {
     "Box": "warp_mca.geometry",
@@ -74,7 +74,7 @@ _LAZY = {
     "cfc_filter": "warp_mca.results.cfc",
     "load": "warp_mca.results.storage",
     "tradeoff": "warp_mca.accuracy.tradeoff",
-    "quality_table": "warp_mca.report.quality",
+    "quality_table": "warp_mca.phases.quality",
     "mesh": "warp_mca.phases.simulation",
     "run": "warp_mca.phases.simulation",
     "run_batch": "warp_mca.studies.batch",

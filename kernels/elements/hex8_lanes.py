@@ -13,11 +13,11 @@ from warp_mca.kernels.elements.hex8_small import stress_functions
 from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
 from warp_mca.kernels.elements.patch import POINT, Patches, exponent_of, from_start
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
 from warp_mca.kernels.records.extremes import keep_functions
-from warp_mca.physics.elements.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 

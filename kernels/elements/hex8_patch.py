@@ -24,6 +24,7 @@ from warp_mca.kernels.elements.patch import (
     from_start,
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
+from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
 from warp_mca.kernels.hardware.early_launch import begins_early
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
@@ -37,7 +38,6 @@ from warp_mca.kernels.hardware.shared_memory import (
     wait_for_copies,
 )
 from warp_mca.kernels.records.extremes import keep_functions
-from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
 from warp_mca.kernels.hardware.early_launch import let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.shared_memory import (
     HEADS,
@@ -22,7 +23,6 @@ from warp_mca.kernels.hardware.shared_memory import (
     copy_words,
     wait_for_copies,
 )
-from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 SCHEDULERS = 256  # threads that put patches in order
 RESIDENT = {"mixed": 4, "float64": 2}  # blocks of threads that a multiprocessor holds, by the registers they need

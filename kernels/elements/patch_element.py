@@ -9,10 +9,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.patch import POINT, SLOTS_OF_THREAD, Patches, from_start, slot_count
+from warp_mca.kernels.elements.patch_layout import MATERIAL_BITS, NOWHERE, PATCH, SECOND_SLOT, SLOT_BITS, SLOTS
 from warp_mca.kernels.elements.patterns import pattern_functions, pattern_sum_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, place_of, power_of_two
-from warp_mca.physics.elements.patches import MATERIAL_BITS, NOWHERE, PATCH, SECOND_SLOT, SLOT_BITS, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 

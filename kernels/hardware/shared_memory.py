@@ -8,8 +8,8 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 ROW = PATCH + 1  # one force component of all elements at one corner, and a zero behind them
 FORCES = 24 * ROW

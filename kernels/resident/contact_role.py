@@ -13,9 +13,9 @@ from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of, passes
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
-from warp_mca.physics.elements.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 

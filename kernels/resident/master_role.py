@@ -8,12 +8,12 @@ import warp as wp
 from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes, gather_function, hold_node, next_velocity
-from warp_mca.physics.elements.patches import PATCH
 
 wp.set_module_options({"enable_backward": False})
 

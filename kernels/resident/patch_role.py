@@ -23,6 +23,7 @@ from warp_mca.kernels.elements.patch import (
     slot_count,
 )
 from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
+from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import FORCES as POOL
 from warp_mca.kernels.hardware.shared_memory import (
@@ -37,7 +38,6 @@ from warp_mca.kernels.nodes.floating import seen
 from warp_mca.kernels.records.extremes import keep_functions
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes
-from warp_mca.physics.elements.patches import PATCH, SLOTS
 
 wp.set_module_options({"enable_backward": False})
 

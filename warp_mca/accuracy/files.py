@@ -16,6 +16,7 @@ from warp_mca.accuracy.worth import worth_of
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import check_folder, given_path
 from warp_mca.base.folder import Folder, held
+from warp_mca.base.version import __version__
 
 JSON, PICTURE = "tradeoff.json", "tradeoff.png"
 FILES = (JSON, PICTURE)
@@ -59,7 +60,7 @@ def write_tradeoff(found: TradeOff, folder: Folder) -> None:
         OSError: the disk is full or fails.
     """
     from warp_mca.accuracy.picture import plot_tradeoff
-    from warp_mca.report.style import save_png
+    from warp_mca.results.figure_style import save_png
 
     contents = as_json(found)
     with folder.staging() as staging:
@@ -72,8 +73,6 @@ def write_tradeoff(found: TradeOff, folder: Folder) -> None:
 
 def as_json(found: TradeOff) -> dict[str, Any]:
     """The contents of tradeoff.json."""
-    from warp_mca import __version__
-
     reference, limits = found.reference, found.reference.limits
     fronts = {name: found.frontier(name) for name in NAMES} | {"bound": found.frontier()}
     return {

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.accuracy.worth import HEADINGS, present
-from warp_mca.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, tidy
+from warp_mca.results.figure_style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

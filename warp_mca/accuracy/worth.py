@@ -108,7 +108,7 @@ def frontier_rows(contents: Mapping[str, Any]) -> list[list[str]]:
 
 def print_tradeoff(contents: Mapping[str, Any]) -> None:
     """The reference, what each knob is worth, and the frontier."""
-    from warp_mca.report.console import console
+    from warp_mca.base.console import console
 
     out = console()
     bound = ", ".join(HEADINGS[name] for name in BOUND)

@@ -15,7 +15,7 @@ from warp_mca.scene.model_file import SUFFIX
 
 def build(args: argparse.Namespace) -> None:
     """Mesh a scene and store it as a model file."""
-    from warp_mca.report.console import print_quality
+    from warp_mca.cli.console import print_quality
 
     target = model_file.check_path(args.output)
     if Path(args.scene).suffix == SUFFIX:
@@ -30,7 +30,7 @@ def build(args: argparse.Namespace) -> None:
 
 def scenes(args: argparse.Namespace) -> None:
     """List scenes with their presets and parameters."""
-    from warp_mca.report.console import print_scenes
+    from warp_mca.cli.console import print_scenes
 
     print_scenes([catalogue.load_source(name) for name in args.scene or catalogue.scene_names()])
 

@@ -82,8 +82,8 @@ def _carry_out(args: argparse.Namespace) -> None:
 
 def _print(report: Report) -> None:
     """How many claims agree, each that does not, and the files."""
+    from warp_mca.base.console import console
     from warp_mca.paper.page import value_text
-    from warp_mca.report.console import console
 
     out = console()
     for said, state in (("agree", True), ("differ", False), ("have no run", None)):

@@ -232,8 +232,8 @@ def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
 
 
 def _add_recorders(parser: argparse.ArgumentParser) -> None:
+    from warp_mca.pictures.snapshot import FIELDS
     from warp_mca.recorders import FILES
-    from warp_mca.report.snapshot import FIELDS
 
     example = "two_link --viewer rerun --usd impact.usdc --snapshot 60e-6; options with FILE may be given several times"
     group = _group(parser, "see the run", example)

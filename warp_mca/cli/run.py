@@ -28,7 +28,7 @@ DRAWING = {"frames": 100, "field": "von_mises", "magnify": 1.0}  # options for r
 def run(args: argparse.Namespace) -> None:
     """Run a scene or a sweep, and print what came of it; of a part, print a scene file."""
     from warp_mca.base.progress import progress_bar
-    from warp_mca.report.console import print_summary
+    from warp_mca.cli.console import print_summary
     from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
     if args.sweeps:

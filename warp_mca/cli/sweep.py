@@ -123,7 +123,7 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
     """
     from rich.table import Table
 
-    from warp_mca.report.console import console
+    from warp_mca.base.console import console
     from warp_mca.studies.sweep_job import BETWEEN, DONE
     from warp_mca.studies.sweep_table import CSV, PARQUET
 

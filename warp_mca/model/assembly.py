@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.model.stable_step import StableStep, at_elements, element_steps, stable_step
 from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
-from warp_mca.physics.elements.patches import PATCH, compact_order
+from warp_mca.physics.elements.patches import compact_order
 from warp_mca.scene import Point, Scene, Surface
 from warp_mca.scene.materials import Material
 

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.physics.elements import ELEMENTS
-from warp_mca.physics.elements.patches import PATCH, compact_order
+from warp_mca.physics.elements.patches import compact_order
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Block

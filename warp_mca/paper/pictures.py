@@ -14,7 +14,7 @@ from warp_mca.paper.evidence import Evidence, MissingRunError
 from warp_mca.paper.readings import path, row_at
 from warp_mca.paper.studies import MESHES, STUDIES
 from warp_mca.paper.table_2 import MCA, PURE
-from warp_mca.report.style import BLACK, BLUE, DOTS_PER_INCH, VERMILION, legend_beside, new_figure, tidy
+from warp_mca.results.figure_style import BLACK, BLUE, DOTS_PER_INCH, VERMILION, legend_beside, new_figure, tidy
 from warp_mca.results.result import Result
 
 if TYPE_CHECKING:

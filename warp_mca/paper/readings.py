@@ -10,7 +10,7 @@ import numpy as np
 from warp_mca.paper.claims import Found, Words
 from warp_mca.paper.evidence import Evidence, MissingRunError
 from warp_mca.paper.studies import STUDIES
-from warp_mca.report.forces import compression_phases
+from warp_mca.results.force_figure import compression_phases
 from warp_mca.results.force_history import Interval
 from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result

@@ -13,6 +13,7 @@ from typing import Any
 
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.files import write_atomically
+from warp_mca.base.version import __version__
 from warp_mca.paper.choices import choice_rows, duration_rows
 from warp_mca.paper.claim_table import CLAIMS
 from warp_mca.paper.claims import Verdict, judge
@@ -135,8 +136,6 @@ def figure_rows(runs: Runs) -> dict[str, list[dict[str, Any]]]:
 
 def _made(runs: Runs, precision: str) -> str:
     """How the page was made, in a sentence."""
-    from warp_mca import __version__
-
     done = next((row for row in runs.rows.values() if row["status"] == DONE), {})
     command = f"warp-mca paper --level {runs.level.name}" + (f" --device {runs.device}" if runs.device != "cpu" else "")
     device = done.get("device", runs.device)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.sensors import locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.impact_driver import ImpactDriver
@@ -17,7 +18,6 @@ from warp_mca.phases.prepare import Clock
 from warp_mca.phases.settings import Settings
 from warp_mca.phases.swing_driver import SwingDriver
 from warp_mca.physics.elements.cells import nodal_masses
-from warp_mca.results.sensors import locate_sensors
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import Scene

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.model.sensors import CHANNELS
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.parts import Part, SwingPart
-from warp_mca.results.sensors import CHANNELS
 from warp_mca.rigid.placement import link_placements
 
 Array = NDArray[np.float64]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.sensors import Sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.motion import Motion
 from warp_mca.phases.prepare import Clock
 from warp_mca.phases.settings import Settings
-from warp_mca.results.sensors import Sensors
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handoff import HandOff
 from warp_mca.rigid.placement import Placement

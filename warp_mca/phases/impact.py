@@ -14,12 +14,12 @@ from warp_mca.base.errors import GuardError
 from warp_mca.base.garbage import few_collections
 from warp_mca.model.batch_model import join_models
 from warp_mca.model.layout import offsets
+from warp_mca.model.paths import join_probes
+from warp_mca.model.sensors import join_sensors
 from warp_mca.phases.division import divide_alike
 from warp_mca.phases.initial_overlap import settle_initial_overlap
 from warp_mca.phases.scene_run import SceneRun
 from warp_mca.physics.floating.frames import with_floating_frames
-from warp_mca.results.paths import join_probes
-from warp_mca.results.sensors import join_sensors
 from warp_mca.step.output import Output
 from warp_mca.step.records import SceneRecords
 from warp_mca.step.sensor_stage import SensorStage

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.model.build import build_model
+from warp_mca.model.paths import Found, locate
 from warp_mca.model.precision import check_range
 from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.motion import Motion
 from warp_mca.phases.parts import ImpactPart
@@ -23,11 +25,9 @@ from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.residual import Relaxation, Shape
 from warp_mca.phases.return_to_rigid import return_to_rigid
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.results.paths import Found, locate
 from warp_mca.rigid.placement import link_placements
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
-from warp_mca.studies.forecast import announce
 from warp_mca.watch.advice import mesh_warnings
 
 Array = NDArray[np.float64]

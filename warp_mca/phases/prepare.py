@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import Grouping, build_model
 from warp_mca.model.model import Model
+from warp_mca.model.paths import Found, Probes, locate
+from warp_mca.model.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.meshing import mesh
 from warp_mca.physics.elements.cells import nodal_masses
-from warp_mca.results.paths import Found, Probes, locate
-from warp_mca.results.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.scene import Scene
 from warp_mca.watch.advice import mesh_warnings

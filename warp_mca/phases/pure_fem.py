@@ -20,6 +20,7 @@ from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import METHOD, Checkpoint, damage_explained, go_on
 from warp_mca.phases.division import coarser
+from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.prepare import Clock
 from warp_mca.phases.pure_setup import Place, angles_of, check, is_of_link, prepare_release
@@ -29,7 +30,6 @@ from warp_mca.scene import Scene
 from warp_mca.step.records import SceneRecords
 from warp_mca.step.state_figures import joint_impulses
 from warp_mca.step.steps import Steps
-from warp_mca.studies.forecast import announce
 from warp_mca.watch.advice import warn
 
 SWING_INTERVAL = 1e-4  # between rows of the swing [s]

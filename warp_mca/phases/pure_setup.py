@@ -13,7 +13,9 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import is_list
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
+from warp_mca.model.paths import locate
 from warp_mca.model.precision import check_range
+from warp_mca.model.sensors import locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import METHOD
 from warp_mca.phases.meshing import mesh
@@ -21,8 +23,6 @@ from warp_mca.phases.prepare import Clock, Prepared
 from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.cells import nodal_masses
-from warp_mca.results.paths import locate
-from warp_mca.results.sensors import locate_sensors
 from warp_mca.rigid.handoff import HandOff, at_release
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.watch.advice import mesh_warnings

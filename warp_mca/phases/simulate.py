@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.paths import Found
 from warp_mca.model.precision import check_range
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.checkpoint import advance as advance_stored
+from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Clock, Prepared, prepare
 from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.settings import Settings
 from warp_mca.recorders.recorder import Recorder, RunInfo
-from warp_mca.results.paths import Found
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene
-from warp_mca.studies.forecast import announce
 from warp_mca.watch.advice import warn
 
 if TYPE_CHECKING:

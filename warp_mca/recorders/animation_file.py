@@ -18,8 +18,8 @@ from warp_mca.recorders.pictures import Subject, for_film
 from warp_mca.recorders.recorder import Cadence, check_file
 
 if TYPE_CHECKING:
+    from warp_mca.pictures.snapshot import Look, Skin
     from warp_mca.recorders.recorder import Frame, RunInfo
-    from warp_mca.report.snapshot import Look, Skin
 
 FRAMES = Cadence(frames=100)
 PLAYBACK = 20  # pictures shown in a second
@@ -86,7 +86,7 @@ class AnimationFile:
 
     def _look(self, frames: list[tuple[float, dict[str, Skin]]]) -> Look:
         """One for all: its box holds what strikes in every frame, its colours reach the greatest limit of any."""
-        from warp_mca.report.snapshot import field_limit
+        from warp_mca.pictures.snapshot import field_limit
 
         looks = [self.subject.look(self.info, skins) for _, skins in frames]
         boxes = np.stack([look.bounds for look in looks if look.bounds is not None])
@@ -99,7 +99,7 @@ def _pictures(frames: list[tuple[float, dict[str, Skin]]], look: Look) -> Iterat
     """Red, green and blue of each picture, of even width and height, shape (height, width, 3), uint8."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from warp_mca.report.snapshot import Picture
+    from warp_mca.pictures.snapshot import Picture
 
     picture = Picture(frames[0][1], frames[0][0], look)
     canvas = picture.figure.canvas

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import brief, is_number
+from warp_mca.pictures.magnify import magnified
+from warp_mca.pictures.setting import plane_meshes, up_of
+from warp_mca.pictures.snapshot import FIELDS, Look, Skin
 from warp_mca.recorders.recorder import SURFACE, VOLUME
-from warp_mca.report.magnify import magnified
-from warp_mca.report.setting import plane_meshes, up_of
-from warp_mca.report.snapshot import FIELDS, Look, Skin
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo

@@ -6,7 +6,6 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -16,8 +15,8 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import check_folder, given_path, nearest
 from warp_mca.base.validate import brief, is_list, is_number
-from warp_mca.geometry.cell_types import is_triangle, triangulated
 from warp_mca.scene import RigidPlane
+from warp_mca.step.shown import CONTACT, NEEDS, PATHS, SURFACE, VOLUME, SurfaceMesh  # noqa: F401, read from here
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -28,8 +27,6 @@ Index = NDArray[np.int32]
 
 DISK_RESERVE = 64 << 20  # disk space that recorders leave free for the results [byte]
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
-# What a frame can hold. Only what a recorder of the run asks for is computed and copied.
-SURFACE, CONTACT, PATHS, VOLUME = NEEDS = "surface", "contact", "paths", "volume"
 
 
 @dataclass(frozen=True)
@@ -72,30 +69,6 @@ class Cadence:
         chosen = np.zeros(intervals + 1, dtype=bool)
         chosen[np.minimum(np.round(at), intervals).astype(int)] = True
         return chosen
-
-
-@dataclass(frozen=True)
-class SurfaceMesh:
-    """The skin of a body.
-
-    Attributes:
-        nodes: model node of each vertex, shape (vertex_count,), int32.
-        quads: vertices of each face, counter-clockwise from outside, shape (face_count, 4), int32; triangles have
-            their last one twice.
-    """
-
-    nodes: Index
-    quads: Index
-
-    @cached_property
-    def triangles(self) -> Index:
-        """The faces, quadrilaterals cut in two, shape (triangle_count, 3), int32."""
-        return triangulated(self.quads)
-
-    @property
-    def corner_counts(self) -> Index:
-        """Corners of each face: 4, or 3 for triangles, shape (face_count,), int32."""
-        return np.where(is_triangle(self.quads), 3, 4).astype(np.int32)
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.pictures.setting import view_axes
 from warp_mca.recorders.colours import PALETTE, SLIP, STICK, ColourScale, stress_at
-from warp_mca.report.setting import view_axes
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.pictures.setting import plane_meshes, up_of
 from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, Sights
-from warp_mca.report.setting import plane_meshes, up_of
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import kinds, members
+from warp_mca.pictures.setting import up_of
 from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import (
     CONTACT,
@@ -30,7 +31,6 @@ from warp_mca.recorders.recorder import (
 from warp_mca.recorders.rerun_file import RerunFile
 from warp_mca.recorders.rerun_frames import FrameQueue
 from warp_mca.recorders.rerun_setting import PLANES, PathBars, Planes, sights, topology
-from warp_mca.report.setting import up_of
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -45,7 +45,7 @@ class SnapshotFile:
 
     def frame(self, frame: Frame) -> None:
         """Draw the picture."""
-        from warp_mca.report.snapshot import save_snapshot
+        from warp_mca.pictures.snapshot import save_snapshot
 
         skins = self.subject.skins(self.info, frame)
         make_way(self.path)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.pictures.setting import up_of
 from warp_mca.recorders.colours import ColourScale, check_limit
 from warp_mca.recorders.recorder import (
     CONTACT,
@@ -34,7 +35,6 @@ from warp_mca.recorders.recorder import (
 )
 from warp_mca.recorders.usd_prims import BodyPrim, ContactPrim
 from warp_mca.recorders.usd_setting import Setting, bind, make_material, set_up_axis
-from warp_mca.report.setting import up_of
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame, RunInfo

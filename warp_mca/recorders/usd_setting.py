@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.report.setting import EYE, plane_meshes, up_of, view_axes
+from warp_mca.pictures.setting import EYE, plane_meshes, up_of, view_axes
 
 if TYPE_CHECKING:
+    from warp_mca.pictures.setting import PlaneMesh
     from warp_mca.recorders.recorder import RunInfo
-    from warp_mca.report.setting import PlaneMesh
 
 WIDTH, HEIGHT, FOCAL = 36.0, 20.25, 50.0  # of the camera's film and lens [mm]; it shows 16:9
 ROOM = 1.15  # distance of the camera over the least that holds the bodies

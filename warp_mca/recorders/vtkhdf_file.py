@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.files import nearest
+from warp_mca.pictures.setting import rigid_planes, up_of
 from warp_mca.recorders.mesh_file import cells
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_disk, check_file
-from warp_mca.report.setting import rigid_planes, up_of
 
 if TYPE_CHECKING:
     from pathlib import Path

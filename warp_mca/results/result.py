@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.version import __version__
 from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.force_history import Array, contact_intervals, force_peaks, reverses, stick_intervals, unfinished
 from warp_mca.results.paths import PathHistory
@@ -93,7 +94,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the main figures, warnings and contact forces."""
-        from warp_mca.report.notebook import result_html
+        from warp_mca.results.notebook import result_html
 
         return result_html(self)
 
@@ -219,8 +220,6 @@ def summarise(history: Mapping[str, Array], facts: RunFacts, pairs: Sequence[Con
         facts: of the run.
         pairs: the scene's contacts, each by itself.
     """
-    from warp_mca import __version__
-
     time, F_n, F_t = history["time_s"], history["F_n_N"], history["F_t_N"]
     contacts = contact_intervals(time, F_n)
     peaks = force_peaks(time, F_n)

@@ -88,10 +88,10 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
 
 def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
     """As `save`, to a folder that is held already."""
-    from warp_mca.report.energies import save_energies
-    from warp_mca.report.forces import save_forces
-    from warp_mca.report.paths import save_path_figures
-    from warp_mca.report.probes import save_probes
+    from warp_mca.results.energy_figure import save_energies
+    from warp_mca.results.force_figure import save_forces
+    from warp_mca.results.path_figures import save_path_figures
+    from warp_mca.results.probe_figure import save_probes
 
     path = folder.path
     try:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene.drops import fall_velocity, resting_place
+from warp_mca.scene.elements import ELEMENTS
 from warp_mca.scene.materials import MATERIALS, Material
 
 if TYPE_CHECKING:

@@ -19,16 +19,12 @@ from difflib import get_close_matches
 from importlib import import_module, util
 from pathlib import Path
 from types import ModuleType, NoneType, SimpleNamespace
-from typing import TYPE_CHECKING, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from warp_mca.base import validate
 from warp_mca.base.errors import McaError, RequestError, bad_value
 from warp_mca.scene import Scene
 from warp_mca.scene.parameters import KIND_WORDS, Param, Parameter
-
-if TYPE_CHECKING:
-    from warp_mca.results.result import Result
-
 
 SUFFIX = ".py"  # of scene files
 
@@ -52,7 +48,7 @@ class SceneSource:
     parameters: Mapping[str, Parameter]
     presets: Mapping[str, Mapping[str, object]]
     builder: Callable[..., Scene]
-    check: Callable[[Result], list[str]] | None = None
+    check: Callable[[Any], list[str]] | None = None
     builtin: bool = field(default=False, kw_only=True)
 
     @property
@@ -89,7 +85,7 @@ class SceneSource:
             raise bad_value(f"{self.name}.build()", type(scene).__name__, "return a warp_mca.Scene")
         return dataclasses.replace(scene, parameters=dict(values))
 
-    def findings(self, result: Result) -> list[str]:
+    def findings(self, result: Any) -> list[str]:
         """Sentences of the scene file's `check` about a result; empty without `check`.
 
         Raises:
@@ -202,7 +198,7 @@ def _source(module: ModuleType, name: str, *, builtin: bool) -> SceneSource:
     builder: Callable[..., Scene] | None = getattr(module, "build", None)
     if not callable(builder):
         raise bad_value("scene", name, "the file must define build() that returns a warp_mca.Scene")
-    check: Callable[[Result], list[str]] | None = getattr(module, "check", None)
+    check: Callable[[Any], list[str]] | None = getattr(module, "check", None)
     if not (check is None or callable(check)):
         raise bad_value(f"{name}.check", validate.brief(check), "make it a function check(result), or leave it out")
     presets = getattr(module, "PRESETS", {})

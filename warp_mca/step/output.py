@@ -13,8 +13,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.records import output
-from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, SurfaceMesh
-from warp_mca.results.paths import Probes
+from warp_mca.model.paths import Probes
+from warp_mca.step.shown import CONTACT, PATHS, SURFACE, VOLUME, SurfaceMesh
 from warp_mca.step.workspace import ROWS
 
 if TYPE_CHECKING:

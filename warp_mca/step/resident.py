@@ -15,6 +15,7 @@ from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.laws import LINEAR
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.resident.bound_role import MOST_BOUND
@@ -27,7 +28,6 @@ from warp_mca.kernels.resident.pin_role import MOST_PINNED
 from warp_mca.kernels.resident.steps import Roles, resident_kernel
 from warp_mca.physics.contact.stage import ContactStage
 from warp_mca.physics.elements.patch_stage import PatchStage
-from warp_mca.physics.elements.patches import PATCH
 from warp_mca.physics.loads.weight import nodal_gravity
 
 if TYPE_CHECKING:

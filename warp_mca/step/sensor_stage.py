@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.records import sensors as kernels
 from warp_mca.model.assembly import Block
+from warp_mca.model.sensors import CHANNELS, Cut, Sensors, Spot
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.results.sensors import CHANNELS, Cut, Sensors, Spot
 from warp_mca.step.workspace import ROWS
 
 if TYPE_CHECKING:

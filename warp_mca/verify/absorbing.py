@@ -161,7 +161,6 @@ def _column_amplitude(setup: Setup, wave: str, cells: int) -> float:
     group="waves",
     title="An absorbing end sends back nothing of waves that meet it at right angles",
     reference="Lysmer and Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859; traction rho c v of a plane wave.",
-    catches=("dashpots_stiff_in_shear",),
 )
 def absorbing_end(setup: Setup) -> list[Row]:
     """Column between planes of symmetry; Gaussian pulse, k = 1 / width at its strongest: wavelength 1, length 2."""
@@ -186,7 +185,6 @@ def absorbing_end(setup: Setup) -> list[Row]:
     group="waves",
     title="An absorbing side sends back of oblique waves what theory says of its dashpots",
     reference="Lysmer and Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859, for the spectrum of each packet.",
-    catches=("dashpots_stiff_in_shear",),
 )
 def absorbing_angles(setup: Setup) -> list[Row]:
     """Plane strain, nu = 0.25; packets of P and SV waves, one wavelength the standard deviation of their envelope."""

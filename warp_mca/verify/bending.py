@@ -96,7 +96,6 @@ def _measured(setup: Setup, section: int, axial: int, guesses: dict[int, float])
     title="Bending waves of a beam travel at the speeds of elasticity, to which Timoshenko's theory is near",
     reference="Timoshenko, Phil. Mag. 43 (1922) 125, shear coefficient 5 (1 + nu) / (6 + 5 nu); Kaneko, J. Phys. D 8 "
     "(1975) 1927; three-dimensional elasticity by Ritz's method with polynomials of degree 10 over the section.",
-    catches=("shear_modulus_low",),
 )
 def timoshenko_wave(setup: Setup) -> list[Row]:
     """Beam of side h = 20 mm and length 5 h between planes of antisymmetry, one or three half waves in it."""

@@ -122,7 +122,6 @@ class Case:
         title: what is checked, in one line.
         reference: where the known answer comes from.
         measure: runs it.
-        catches: deliberate errors in the engine that it was seen to catch, names out of `mutations.MUTATIONS`.
         needs: a module that it compares with and that may be missing; the case is skipped then.
         uses_elements: whether finite elements take part; the case is run once, not for each of them, if not.
     """
@@ -132,7 +131,6 @@ class Case:
     title: str
     reference: str
     measure: Callable[[Setup], list[Row]]
-    catches: tuple[str, ...] = ()
     needs: str | None = None
     uses_elements: bool = True
 
@@ -153,7 +151,6 @@ def case(
     group: str,
     title: str,
     reference: str,
-    catches: tuple[str, ...] = (),
     needs: str | None = None,
     uses_elements: bool = True,
 ) -> Callable[[Callable[[Setup], list[Row]]], Callable[[Setup], list[Row]]]:
@@ -168,7 +165,6 @@ def case(
             title=title,
             reference=reference,
             measure=measure,
-            catches=catches,
             needs=needs,
             uses_elements=uses_elements,
         )

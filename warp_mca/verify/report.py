@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -79,8 +79,15 @@ def lines(outcome: Outcome) -> list[str]:
     return shown
 
 
-def write(folder: Path, outcomes: Sequence[Outcome], header: str) -> list[Path]:
-    """Write verification.md and images/verification.png into `folder`; returns the files."""
+def write(folder: Path, outcomes: Sequence[Outcome], header: str, notes: Mapping[str, str] | None = None) -> list[Path]:
+    """Write verification.md and images/verification.png into `folder`; returns the files.
+
+    Args:
+        folder: is made if need be.
+        outcomes: of cases, in the order of the page.
+        header: text below the title.
+        notes: a sentence to add to the section of a case, by its name.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     image = _figure(folder / "images" / "verification.png", outcomes)
     text = ["# Verification", "", header, ""]
@@ -91,14 +98,14 @@ def write(folder: Path, outcomes: Sequence[Outcome], header: str) -> list[Path]:
         mine = [outcome for outcome in outcomes if outcome.case.group == group]
         for name in dict.fromkeys(outcome.case.name for outcome in mine):
             text += _section([outcome for outcome in mine if outcome.case.name == name])
+            if notes and name in notes:
+                text += [notes[name], ""]
     page = folder / "verification.md"
     page.write_text("\n".join(text).rstrip() + "\n", encoding="utf-8")
     return [page, *([image] if image else [])]
 
 
 def _section(outcomes: Sequence[Outcome]) -> list[str]:
-    from warp_mca.verify.mutations import MUTATIONS
-
     case = outcomes[0].case
     text = [f"### {case.name}", "", f"{case.title}. {case.reference}", ""]
     if all(outcome.skipped for outcome in outcomes):
@@ -113,14 +120,12 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
         if outcome.failure:
             text.append(who + f"{outcome.failure} | | | | | | NOT MET |")
     text += ["", "Tolerances: " + "; ".join(f"{key}: {why}" for key, why in reasons.items()) + "."]
-    if case.catches:
-        text += ["", "Fails, as it must, when " + "; or ".join(MUTATIONS[name].what for name in case.catches) + "."]
     return [*text, ""]
 
 
 def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
     """Error over element size, for every row that demands or shows an order; None when there is none."""
-    from warp_mca.report.style import BLUE, GREEN, VERMILION, new_figure, save_png, tidy
+    from warp_mca.results.figure_style import BLUE, GREEN, VERMILION, new_figure, save_png, tidy
 
     looks = {"hex8": (BLUE, "o", "-"), "hex8r": (VERMILION, "s", "--"), "tet4": (GREEN, "^", ":")}
     curves = [(o, row) for o in outcomes for row in o.rows if row.order is not None and row.order > 0.3]

@@ -89,7 +89,6 @@ def mujoco_swing(chain: Chain, theta: Array, theta_dot: Array, samples: int, sub
     group="rigid",
     title="Chains of 2 and 5 links swing for 1 s as an independent multibody code has it",
     reference="MuJoCo (Todorov, Erez and Tassa, IROS 2012), Runge-Kutta method of order 4.",
-    catches=("rate_force_reversed", "far_links_weightless"),
     needs="mujoco",
     uses_elements=False,
 )
@@ -124,7 +123,6 @@ def chain_mujoco(setup: Setup) -> list[Row]:
     group="rigid",
     title="A swinging chain keeps its energy, and without gravity its angular momentum",
     reference="Conservation laws.",
-    catches=("rate_force_reversed", "far_links_weightless"),
     uses_elements=False,
 )
 def chain_energy(setup: Setup) -> list[Row]:
@@ -170,7 +168,6 @@ def chain_energy(setup: Setup) -> list[Row]:
     group="rigid",
     title="Hand-off to finite elements and back keeps momenta and energy",
     reference="Conservation laws: lumped nodal masses carry what the links carried.",
-    catches=("hand_off_spins_backwards", "vibration_energy_doubled"),
 )
 def handoff_conservation(setup: Setup) -> list[Row]:
     """The two-link manipulator at contact with inertia="mesh"; then back, with and without a vibration on top."""

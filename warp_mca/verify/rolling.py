@@ -14,7 +14,6 @@ from warp_mca.verify.friction import COULOMB, impulse
     group="friction",
     title="A sphere that slides at first ends up rolling, at 5 v / 7 from 2 v / (7 mu g) on",
     reference=COULOMB + " Its moment of inertia is 2 m R^2 / 5.",
-    catches=("friction_limit_doubled", "friction_limit_ignored"),
 )
 def rolling_sphere(setup: Setup) -> list[Row]:
     """v = 10 m/s, mu = 0.3, g = 12000 m/s^2, R = 10 mm; half of the sphere is run, on a contact radius of 0.055 R.

@@ -1,4 +1,4 @@
-"""Owns the element formulations. A new one is a file here, its kernels in `kernels/`, and a line in the table below."""
+"""Owns the element formulations. A new one is a file here, its kernels in `kernels/`, and an entry in the table."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from warp_mca.physics.elements.element import Element
 from warp_mca.physics.elements.hex8 import Hex8
 from warp_mca.physics.elements.hex8r import Hex8r
 from warp_mca.physics.elements.tet4 import Tet4
+from warp_mca.scene.elements import ELEMENTS
 
-# The first element of a cell type computes the cells of that type in bodies whose own element takes another type.
-ELEMENTS: dict[str, Element] = {element.name: element for element in (Hex8(), Hex8r(), Tet4())}
+ELEMENTS |= {element.name: element for element in (Hex8(), Hex8r(), Tet4())}
 
 __all__ = ["ELEMENTS", "Element", "default_element"]
 

@@ -9,7 +9,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.elements import patch
-from warp_mca.physics.elements.patches import PATCH, SLOTS, Array, grid_points, make_patches
+from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
+from warp_mca.physics.elements.patches import Array, grid_points, make_patches
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage, levels_of
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.threads import Split, whole

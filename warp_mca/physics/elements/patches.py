@@ -11,14 +11,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.chunks import chunks
 from warp_mca.geometry.boxes import cell_boxes
+from warp_mca.kernels.elements.patch_layout import MATERIAL_BITS, NOWHERE, PATCH, SECOND_SLOT, SLOT_BITS, SLOTS
 
-PATCH = 128  # elements of a patch, and threads of its block
-SLOTS = {"mixed": 384, "float64": 304}  # that a patch may have, as far as shared memory holds them
-NOWHERE = PATCH  # behind the forces of all elements on their corners of one number, where shared memory holds a zero
-# A word of an element's corners holds a slot from its first bit on, another up to its last, in the first two words half
-# of the material's number between them.
-SLOT_BITS, MATERIAL_BITS = 9, 14
-SECOND_SLOT = SLOT_BITS + MATERIAL_BITS
 GRID = 28  # bits of a position within its patch: with a sign, and so that sums of eight corners just fit 32
 LARGEST = 128.0  # extent of a patch over that of its smallest element, where the grid rounds 4 times as much as float32
 SORT_CHUNK = 1 << 13  # elements sorted in one batch, where parts are smaller than this

@@ -10,10 +10,10 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.kernels.materials.laws import HISTORY_SIZE
-from warp_mca.physics.elements.patches import PATCH
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.threads import ELEMENTS, Split, whole
 

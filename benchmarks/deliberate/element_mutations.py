@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from warp_mca.verify.mutation import Mutation
+from benchmarks.deliberate.mutation import Mutation
 
 ELEMENT_MUTATIONS: dict[str, Mutation] = {
     "finite_pressure_unscaled": Mutation(

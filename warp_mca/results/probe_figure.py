@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.report.style import BLUE, GREEN, VERMILION, engineering, legend_beside, new_figure, save_png, tidy
+from warp_mca.results.figure_style import BLUE, GREEN, VERMILION, engineering, legend_beside, new_figure, save_png, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

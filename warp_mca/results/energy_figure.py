@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.report.style import (
+from warp_mca.results.figure_style import (
     BLACK,
     BLUE,
     GREEN,

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.geometry.creases import Creases
-from warp_mca.report.raster import rasterise
-from warp_mca.report.setting import EYE, PlaneMesh, view_axes
-from warp_mca.report.style import engineering, new_figure, save_png
+from warp_mca.pictures.raster import rasterise
+from warp_mca.pictures.setting import EYE, PlaneMesh, view_axes
+from warp_mca.results.figure_style import engineering, new_figure, save_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.validate import brief, is_number
-from warp_mca.report.magnify import magnified
-from warp_mca.report.setting import EYE, plane_mesh, view_axes
-from warp_mca.report.snapshot import FIELDS
+from warp_mca.pictures.magnify import magnified
+from warp_mca.pictures.setting import EYE, plane_mesh, view_axes
+from warp_mca.pictures.snapshot import FIELDS
 from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:

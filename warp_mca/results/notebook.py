@@ -7,7 +7,7 @@ import io
 from html import escape
 from typing import TYPE_CHECKING
 
-from warp_mca.report.console import headlines
+from warp_mca.results.headlines import headlines
 
 if TYPE_CHECKING:
     from warp_mca.results.result import Result
@@ -29,7 +29,7 @@ def result_html(result: Result) -> str:
 
 def _forces(result: Result) -> bytes:
     """The figure of forces.png as a PNG; of many impacts the first."""
-    from warp_mca.report.forces import plot_forces
+    from warp_mca.results.force_figure import plot_forces
 
     stream = io.BytesIO()
     figure = plot_forces(result.impact() if result.summary.get("touched", True) else result)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from warp_mca.verify.mutation import Mutation
+from benchmarks.deliberate.mutation import Mutation
 
 RIGID_MUTATIONS: dict[str, Mutation] = {
     "spin_term_dropped": Mutation(

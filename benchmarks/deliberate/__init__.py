@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from warp_mca.verify.element_mutations import ELEMENT_MUTATIONS
-from warp_mca.verify.mutation import Mutation
-from warp_mca.verify.rigid_mutations import RIGID_MUTATIONS
+from benchmarks.deliberate.catches import CATCHES
+from benchmarks.deliberate.element_mutations import ELEMENT_MUTATIONS
+from benchmarks.deliberate.mutation import Mutation
+from benchmarks.deliberate.rigid_mutations import RIGID_MUTATIONS
 
 MUTATIONS: dict[str, Mutation] = {
     "shear_modulus_doubled": Mutation(
@@ -292,3 +293,9 @@ MUTATIONS: dict[str, Mutation] = {
 } | ELEMENT_MUTATIONS
 
 MUTATIONS |= RIGID_MUTATIONS
+
+
+def notes() -> dict[str, str]:
+    """A sentence for each verification case: with which deliberate errors it fails."""
+    wrong = {case: "; or ".join(MUTATIONS[name].what for name in names) for case, names in CATCHES.items()}
+    return {case: f"Fails, as it must, when {what}." for case, what in wrong.items()}

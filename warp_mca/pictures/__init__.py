@@ -1,0 +1,1 @@
+"""Pictures of the bodies of a run: drawn here or by pyvista."""

@@ -1,1 +1,0 @@
-"""Reports: plots and tables made from a finished run."""
