@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.base.garbage import few_collections
+from warp_mca.base.joining import offsets
 from warp_mca.model.batch_model import join_models
-from warp_mca.model.layout import offsets
 from warp_mca.phases.division import divide_alike
 from warp_mca.phases.initial_overlap import settle_initial_overlap
 from warp_mca.phases.scene_run import SceneRun

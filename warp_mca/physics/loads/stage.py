@@ -10,10 +10,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import point_velocity
 from warp_mca.kernels.nodes import base, joint_torque
 from warp_mca.kernels.records import loads
-from warp_mca.model.layout import offsets
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model

@@ -10,13 +10,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import mean_pose
 from warp_mca.kernels.nodes import rigid_body
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
 from warp_mca.model.assembly import GROUND
-from warp_mca.model.layout import offsets
 from warp_mca.step.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
