@@ -24,7 +24,7 @@ def bodies(held: Held) -> dict[str, Callable[[], None]]:
     return {
         "element forces": elements,
         "contact": contact,
-        "gather and integrate": lambda: s.nodes.advance(Step(state)),
+        "gather and integrate": lambda: s.nodes.advance_free(Step(state)),
         "hinge and driven face": lambda: s.nodes.advance_bound(Step(state)),
     }
 

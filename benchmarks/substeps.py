@@ -51,7 +51,7 @@ def repeated(launch: Body) -> Body:
 
 def recording(impact: Impact) -> Step:
     """A step that records a row and, on a GPU, searches for contact."""
-    search = "after" if impact.solver._replays_search else ""
+    search = "after" if impact.solver.contacts.is_replayable else ""
     return Step(impact.state, records=True, is_row=True, search=search)
 
 
@@ -72,7 +72,7 @@ def wholes(impact: Impact) -> Iterator[Part]:
 
     yield "substep", steps, count * (rates.substeps if rates else 1)
     yield "interval with its record", interval, 1
-    yield "search", lambda: solver._search(state), 1
+    yield "search", lambda: solver.contacts.search_all(state), 1
 
 
 def record_parts(impact: Impact) -> Iterator[Part]:

@@ -80,7 +80,7 @@ def test_steps_of_one_launch_give_what_launches_of_each_step_give(precision, pla
     u, again, single = (run.state.u.numpy() for run in runs)
     assert np.array_equal(u, again)
     assert u == pytest.approx(single, abs=(1e-4 if precision == "mixed" else 1e-9) * np.abs(single).max())
-    sums = [run.solver.normal_force.greatest(run.state.normal_force, 0) for run in runs]
+    sums = [run.solver.contacts.normal_force.greatest(run.state.normal_force, 0) for run in runs]
     assert sums[0] == sums[1] > 0.0
     assert sums[0] == pytest.approx(sums[2], rel=1e-4 if precision == "mixed" else 1e-9)
 
@@ -118,7 +118,7 @@ def test_steps_of_one_launch_take_pins_and_mass_scaling(precision, other, scaled
         assert run.stopped == [None]
     one, again, single = (run.state for run in runs)
     assert again.differences(one) == []
-    assert runs[0].solver.normal_force.greatest(one.normal_force, 0) > 0.0
+    assert runs[0].solver.contacts.normal_force.greatest(one.normal_force, 0) > 0.0
     near = 1e-4 if precision == "mixed" else 1e-9
     for name in ("u", "v", "couplings/place", "couplings/orientation", "constraints/impulse"):
         a, b = (state.arrays()[name].numpy() for state in (one, single))

@@ -10,8 +10,8 @@ import pytest
 from impacts import prepared
 from test_batch import hinged
 
+from warp_mca.base.joining import AS_IS, ITEMS, SCENE, join, joinable, of, offsets_of
 from warp_mca.model.batch_model import join_models
-from warp_mca.model.layout import complete
 from warp_mca.model.model import Model
 
 
@@ -55,12 +55,30 @@ def scaling(model: Model) -> Any:
     return MassScaling(added=0.1 * model.mass, elements=3, plain_dt=model.stable.dt)
 
 
-def test_a_part_is_made_of_all_of_its_fields():
-    @dataclasses.dataclass(frozen=True)
+def test_a_field_without_a_rule_is_refused_where_it_is_written():
     class Part:
-        a: int
+        a: int = dataclasses.field(metadata=AS_IS)
         b: int = 0
 
-    assert complete(Part, a=1, b=2) == Part(1, 2)
     with pytest.raises(TypeError, match=r"Part.b: a batch would lose it"):
-        complete(Part, a=1)
+        joinable(dataclasses.dataclass(frozen=True)(Part))
+
+
+def test_numbers_are_raised_by_the_first_one_of_their_scene_and_the_ground_is_kept():
+    @joinable
+    @dataclasses.dataclass(frozen=True)
+    class Item:
+        node: int = dataclasses.field(metadata=of("nodes"))
+        scene: int = dataclasses.field(default=0, metadata=SCENE)
+
+    @joinable
+    @dataclasses.dataclass(frozen=True)
+    class Part:
+        node: Any = dataclasses.field(metadata=of("nodes"))
+        start: Any = dataclasses.field(metadata=offsets_of("rows"))
+        items: tuple[Item, ...] = dataclasses.field(metadata=ITEMS)
+
+    one = Part(np.array([0, -1, 3]), np.array([0, 2, 5]), (Item(1), Item(-1)))
+    found = join([one, one], {"nodes": np.array([0, 4, 8]), "rows": np.array([0, 5, 10])})
+    assert found.node.tolist() == [0, -1, 3, 4, -1, 7] and found.start.tolist() == [0, 2, 5, 7, 10]
+    assert found.items == (Item(1), Item(-1), Item(5, 1), Item(-1, 1))

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from warp_mca.base.joining import offsets
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 Index = NDArray[np.int32]
-Part = TypeVar("Part")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,23 +45,6 @@ class Layout:
             "partial": records["partial"][:, scene],
             "point_velocity": records["point_velocity"][:, points * scene : points * (scene + 1)],
         }
-
-
-def complete(kind: type[Part], **values: Any) -> Part:
-    """An instance with a value for every field, those with defaults included.
-
-    Raises:
-        TypeError: a field has none, so that what the scenes of a batch have there would be lost.
-    """
-    lost = [item.name for item in fields(kind) if item.init and item.name not in values]  # pyright: ignore[reportArgumentType]
-    if lost:
-        raise TypeError(f"{kind.__name__}.{lost[0]}: a batch would lose it; join it in model/batch_model.py")
-    return kind(**values)
-
-
-def offsets(counts: list[int]) -> Index:
-    """First entry of each scene and the total, from the count of each scene."""
-    return np.cumsum([0, *counts]).astype(np.int32)
 
 
 def layout_of(model: Model) -> Layout:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
 from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class Model:
     """Everything the solver needs, as host arrays.
@@ -74,45 +76,45 @@ class Model:
         floating: frames that elements compute in, or None where they do in the world frame.
     """
 
-    X: Array
-    V: Array
-    mass: Array
-    blocks: tuple[Block, ...]
-    law: Array
-    fixed_axes: Index
-    prescribed_node: Index
-    prescribed_axis: Index
-    prescribed_table: Index
-    table_offset: Index
-    table_time: Array
-    table_value: Array
-    joint_first: Index
-    joint_second: Index
-    joint_tied: Array
-    joint_slides: Index
-    joints: tuple[JointPairs, ...]
-    couplings: tuple[Coupling, ...]
-    hinge_loads: tuple[HingeLoad, ...]
-    bases: tuple[MovableBase, ...]
-    absorbing: AbsorbingNodes
-    ties: TiedNodes
-    passes: tuple[ContactPass, ...]
-    contact_axes: Array
-    penalties: tuple[ChosenPenalty | None, ...]
-    gravity: Array
-    points: Index
-    node_start: Mapping[str, int]
-    element_start: Mapping[str, int]
-    element_of: Index
-    stable: StableStep
-    scaling: MassScaling | None = None
-    batch: Layout | None = None
-    rigid_bodies: tuple[RigidBody, ...] = ()
-    rigid_rows: tuple[RigidRow, ...] = ()
-    rigid_pins: tuple[RigidPin, ...] = ()
-    rigid_blocks: tuple[Block, ...] = ()
-    rates: Rates | None = None
-    floating: FloatingFrames | None = None
+    X: Array = field(metadata=AS_IS)
+    V: Array = field(metadata=AS_IS)
+    mass: Array = field(metadata=AS_IS)
+    blocks: tuple[Block, ...] = field(metadata=GIVEN)
+    law: Array = field(metadata=GIVEN)
+    fixed_axes: Index = field(metadata=AS_IS)
+    prescribed_node: Index = field(metadata=of("nodes"))
+    prescribed_axis: Index = field(metadata=AS_IS)
+    prescribed_table: Index = field(metadata=of("tables"))
+    table_offset: Index = field(metadata=offsets_of("table entries"))
+    table_time: Array = field(metadata=AS_IS)
+    table_value: Array = field(metadata=AS_IS)
+    joint_first: Index = field(metadata=of("nodes"))
+    joint_second: Index = field(metadata=of("nodes"))
+    joint_tied: Array = field(metadata=AS_IS)
+    joint_slides: Index = field(metadata=of("pairs"))
+    joints: tuple[JointPairs, ...] = field(metadata=ITEMS)
+    couplings: tuple[Coupling, ...] = field(metadata=ITEMS)
+    hinge_loads: tuple[HingeLoad, ...] = field(metadata=ITEMS)
+    bases: tuple[MovableBase, ...] = field(metadata=ITEMS)
+    absorbing: AbsorbingNodes = field(metadata=PART)
+    ties: TiedNodes = field(metadata=PART)
+    passes: tuple[ContactPass, ...] = field(metadata=ITEMS)
+    contact_axes: Array = field(metadata=AS_IS)
+    penalties: tuple[ChosenPenalty | None, ...] = field(metadata=AS_IS)
+    gravity: Array = field(metadata=AS_IS)
+    points: Index = field(metadata=of("nodes"))
+    node_start: Mapping[str, int] = field(metadata=GIVEN)
+    element_start: Mapping[str, int] = field(metadata=GIVEN)
+    element_of: Index = field(metadata=GIVEN)
+    stable: StableStep = field(metadata=GIVEN)
+    scaling: MassScaling | None = field(default=None, metadata=GIVEN)
+    batch: Layout | None = field(default=None, metadata=GIVEN)
+    rigid_bodies: tuple[RigidBody, ...] = field(default=(), metadata=ITEMS)
+    rigid_rows: tuple[RigidRow, ...] = field(default=(), metadata=ITEMS)
+    rigid_pins: tuple[RigidPin, ...] = field(default=(), metadata=ITEMS)
+    rigid_blocks: tuple[Block, ...] = field(default=(), metadata=GIVEN)
+    rates: Rates | None = field(default=None, metadata=ALONE)
+    floating: FloatingFrames | None = field(default=None, metadata=ALONE)
 
     def owner(self, element: int) -> tuple[str, int]:
         """Body that an element of the concatenated meshes belongs to, and the element's index in that body's mesh."""

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import offsets
 from warp_mca.geometry.boxes import Boxes, cell_boxes
 from warp_mca.geometry.cell_types import MAX_CORNERS
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
-from warp_mca.model.layout import offsets
 from warp_mca.scene import Line, Path, Scene
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.base.garbage import few_collections
+from warp_mca.base.joining import offsets
 from warp_mca.model.batch_model import join_models
-from warp_mca.model.layout import offsets
 from warp_mca.model.paths import join_probes
 from warp_mca.model.sensors import join_sensors
 from warp_mca.phases.division import divide_alike

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -9,24 +10,23 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import constraint, node, rated_node, slide
+from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.stage import per_scene
 from warp_mca.physics.elements.stage import BLOCK_DIM
 from warp_mca.physics.loads.weight import nodal_gravity
+from warp_mca.step.stage import Stage, Step
 from warp_mca.step.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.physics.joints.constraint_stage import ConstraintStage
-    from warp_mca.step.stage import Step
+    from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
 
 # Patches that a block of threads computes in turn, from which on blocks take their places while nodes are advanced:
 # they do not spread evenly then, and few rounds do not level that out.
 EARLY_ROUNDS = 8
 
 
-class NodeStage:
+class NodeStage(Actor):
     """Advances all nodes by a step of central differences.
 
     Attributes:
@@ -41,12 +41,13 @@ class NodeStage:
 
     rated = False
 
-    def __init__(
-        self, model: Model, work: Workspace, constraints: ConstraintStage, precision: str, dt: float, rounds: int
-    ) -> None:
+    block_dim = BLOCK_DIM
+
+    def __init__(self, solver: Solver, rounds: int) -> None:
         """Choose the kernels; `rounds` of elements that wait for nothing but the nodes."""
-        self.work, self.constraints, self.dt, self.node_count = work, constraints, dt, model.node_count
-        self.base = dt
+        model, work = solver.model, solver.work
+        self.work, self.constraints, self.node_count = work, solver.constraints, model.node_count
+        self.dt = self.base = solver.common_dt
         each = bool((model.gravity != model.gravity[0]).any())
         self.gravity = work.gravity if each else wp.vec3d(*model.gravity[0])
         layout_nodes = model.batch.nodes if model.batch else None
@@ -57,7 +58,7 @@ class NodeStage:
         self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
         self.turned = work.frame is not None
         self.each, early = each, rounds >= EARLY_ROUNDS
-        self._choose(precision, (self.touched, fixed, early))
+        self._choose(solver.precision, (self.touched, fixed, early))
 
     def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
         """The kernels of a `kind`: contact, fixed, early as `node.integrate_kernel` has them."""
@@ -74,7 +75,11 @@ class NodeStage:
         """Those of a step."""
         return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
 
-    def advance(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Free nodes, once bound ones have read their forces."""
+        yield Stage("free nodes", lambda s: self.advance_free(s, when.level, when.chain))
+
+    def advance_free(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
         """Free nodes, those up to a `level` of `Model.rates` or all; of one `chain` or all.
 
         Where the step records, `work.v_before` takes the velocities before it.
@@ -85,9 +90,6 @@ class NodeStage:
     def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
         """`first_slots` and `more_slots` of elements up to a level, or of all."""
         return self.work.first_slots, self.work.more_slots
-
-    def end_record(self, state: State) -> None:
-        """Called at a record, when nodes have moved."""
 
     def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
         """After the step that recorded: displacements [m], velocities before these [m/s], and the time [s] by which the

@@ -75,7 +75,7 @@ class Chains:
         self.groups: dict[tuple[int, int, bool], list[Group]] = {}
         for level in range(self.top + 1):
             for chain in range(level + 1):
-                forces, motion = chain_groups(solver, level, chain)
+                forces, motion = chain_groups(solver.actors, solver.model, level, chain)
                 self.groups[chain, level, False], self.groups[chain, level, True] = forces, motion
         cuda = wp.get_device().is_cuda
         self._launcher = Streams(cuda)

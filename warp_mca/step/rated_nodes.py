@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.nodes import node, rated_node
+from warp_mca.physics.actor import When
 from warp_mca.physics.elements.stage import BLOCK_DIM, list_slots
 from warp_mca.step.node_stage import NodeStage
+from warp_mca.step.stage import Stage
 from warp_mca.step.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.model.rates import Rates
     from warp_mca.physics.elements.stage import ElementStage
-    from warp_mca.physics.joints.constraint_stage import ConstraintStage
+    from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
 
 
 @dataclass(frozen=True)
@@ -43,26 +43,18 @@ class RatedNodeStage(NodeStage):
 
     rated = True
 
-    def __init__(
-        self,
-        model: Model,
-        work: Workspace,
-        constraints: ConstraintStage,
-        elements: Sequence[ElementStage],
-        precision: str,
-        dt: float,
-        rounds: int,
-    ) -> None:
-        """As `NodeStage`, with `dt` the step of contacts and joints [s].
+    def __init__(self, solver: Solver, rounds: int) -> None:
+        """As `NodeStage`; `dt` is the step of contacts and joints [s].
 
         Raises:
             RequestError: the model is too large for the numbers of its nodes and slots.
         """
-        super().__init__(model, work, constraints, precision, dt, rounds)
+        super().__init__(solver, rounds)
+        model = solver.model
         assert model.rates is not None
         self.rates: Rates = model.rates
-        self.base = dt / (1 << self.rates.common)
-        self.active = self._lists(elements)
+        self.base = self.dt / (1 << self.rates.common)
+        self.active = self._lists(solver.elements)
         self.chains = [self._items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
         self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
 
@@ -141,24 +133,14 @@ class RatedNodeStage(NodeStage):
         """As `NodeStage.at_record`: what was kept of the record itself."""
         return self.work.at_record(state), self.v_record, 0.0
 
-    def end_record(self, state: State) -> None:
-        """As `NodeStage.end_record`: keep the velocities, before the next substep changes them."""
-        wp.copy(self.v_record, state.v)
+    def correct(self, when: When) -> Iterable[Stage]:
+        """Keep the velocities of a record, before the next substep changes them."""
+        yield Stage("velocities kept", lambda s: wp.copy(self.v_record, s.state.v), only_records=True)
 
 
-def node_stage(
-    model: Model,
-    work: Workspace,
-    constraints: ConstraintStage,
-    elements: Sequence[ElementStage],
-    precision: str,
-    dt: float,
-    touched: bool,
-) -> NodeStage:
-    """The nodal stage of a model, of which bodies may be `touched`; other arguments as `RatedNodeStage` has them."""
+def node_stage(solver: Solver) -> NodeStage:
+    """The nodal stage of a solver's model."""
     rounds = 0  # of patches that the elements take, where nothing else waits for the nodes
-    if not (touched or constraints.bound):
-        rounds = min(0 if stage.block.plastic else stage.rounds for stage in elements)
-    if model.rates:
-        return RatedNodeStage(model, work, constraints, elements, precision, dt, rounds)
-    return NodeStage(model, work, constraints, precision, dt, rounds)
+    if not (solver.contacts or solver.constraints.bound):
+        rounds = min(0 if stage.block.plastic else stage.rounds for stage in solver.elements)
+    return (RatedNodeStage if solver.model.rates else NodeStage)(solver, rounds)

@@ -2,45 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
-from warp_mca.kernels.contact import spring
-from warp_mca.kernels.records import ledger
+from warp_mca.kernels.records import ledger, output
+from warp_mca.physics.actor import Actor, When
+from warp_mca.step.stage import BESIDE, LAST, MAIN, SHOWN, Stage, Step
 from warp_mca.step.workspace import ROWS
 
 if TYPE_CHECKING:
-    from warp_mca.model.layout import Layout
-    from warp_mca.model.model import Model
-    from warp_mca.physics.contact.stage import ContactStage
-    from warp_mca.physics.elements.stage import ElementStage
-    from warp_mca.physics.joints.constraint_stage import ConstraintStage
-    from warp_mca.step.node_stage import NodeStage
-    from warp_mca.step.stage import Step
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.step.output import Output
+    from warp_mca.step.solver import Solver
 
 
-class RecordStage:
-    """Sums of a record, of each scene apart."""
+class RecordStage(Actor):
+    """Sums of a record, of each scene apart, and what recorders show."""
 
-    def __init__(
-        self, model: Model, layout: Layout, work: Workspace, elements: Sequence[ElementStage], precision: str
-    ) -> None:
+    def __init__(self, solver: Solver) -> None:
         """Allocate on the current device."""
-        self.work, self.scenes = work, layout.count
+        layout = solver.layout
+        self.solver, self.work, self.scenes = solver, solver.work, layout.count
         self.lanes = ledger.RUN if wp.get_device().is_cuda else 1
         self.node_first = wp.array(layout.nodes, dtype=wp.int32)
         self.element_ranges = wp.array(layout.elements, dtype=wp.int32)
         self.most_nodes = int(np.diff(layout.nodes).max())  # of any scene
         self.most_elements = int(np.diff(layout.elements).sum(axis=(1, 2)).max())
-        self.sum_elements_kernel = ledger.sum_elements_kernel(precision)
+        self.sum_elements_kernel = ledger.sum_elements_kernel(solver.precision)
 
-    def kernels(self) -> list[Any]:
-        """Those of a record."""
-        return [ledger.record_motion, spring.sum_springs, self.sum_elements_kernel]
+    def record_kernels(self) -> list[Any]:
+        """Those of sums, and of probes, sections and stresses that recorders show."""
+        shown = self.solver.output and self.solver.output.arrays
+        own = [ledger.record_motion, self.sum_elements_kernel, *([output.nodal_stress] if shown else [])]
+        return own + self.solver.sensors.kernels()
+
+    def keep(self, when: When) -> Iterable[Stage]:
+        """The next row of the rings, and displacements that are read while nodes move."""
+        yield Stage("next record", self.next_row, BESIDE, only_records=True)
+        yield Stage("displacements kept", lambda s: self.work.keep(s.state), BESIDE, only_records=True)
+
+    def energies(self, when: When) -> Iterable[Stage]:
+        """Stresses, places and forces through sections at t(n)."""
+        yield self._shown("paths, frames: stress", lambda o, s: o.before_step(s.state, s.needs), SHOWN)
+        yield Stage("places, sections", lambda s: self.solver.sensors.before_step(s), BESIDE, only_records=True)
+
+    def look(self, when: When) -> Iterable[Stage]:
+        """What is shown of springs."""
+        yield self._shown("frames: contact", lambda o, s: o.contact_points(s.state, s.needs))
+
+    def picture(self, when: When) -> Iterable[Stage]:
+        """What is shown of stresses at the corners of elements."""
+        yield self._shown("paths, frames: nodal stress", lambda o, s: o.nodal_stress(s.needs), LAST, (SHOWN,))
+
+    def motion(self, when: When) -> Iterable[Stage]:
+        """Sums over nodes and velocities at t(n), from those half a step before and after it.
+
+        Where nodes have kept all that the sums read, these may go on beside later steps.
+        """
+        kept = self.solver.nodes.rated and not self.solver.constraints.driven
+        yield Stage("motion sums", self.sum_motion, LAST if kept else MAIN, only_records=True)
+        yield Stage("frames: velocity", self._velocities, only_records=True)
+
+    def _shown(
+        self, name: str, show: Callable[[Output, Step], None], stream: str = MAIN, after: tuple[str, ...] = ()
+    ) -> Stage:
+        """A stage of rows of the history, where there is output."""
+
+        def launch(step: Step) -> None:
+            if self.solver.output and step.is_row:
+                show(self.solver.output, step)
+
+        return Stage(name, launch, stream, only_records=True, after=after)
+
+    def _velocities(self, step: Step) -> None:
+        if self.solver.output and step.is_row:
+            self.solver.output.after_step(step.state, step.needs)
+        self.solver.sensors.after_step(step)
 
     def sum_runs(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
         """Sums of each run of entries, by a block of threads each; no scene has more entries than `largest`."""
@@ -52,19 +91,14 @@ class RecordStage:
         """Next row of the rings."""
         wp.launch(ledger.advance_row, 1, inputs=[ROWS], outputs=[self.work.row])
 
-    def sum_springs(self, step: Step, stage: ContactStage) -> None:
-        """Sums of a contact pass. In a check between rows, what is summed over an output interval goes on."""
-        inputs = [stage.column, stage.first, step.is_row, step.state.contacts[stage.index].spring]
-        self.sum_runs(spring.sum_springs, int(np.diff(stage.springs).max()), inputs)
-
     def sum_elements(self, step: Step) -> None:
         """Energies and extremes of the elements."""
         self.sum_runs(self.sum_elements_kernel, self.most_elements, [self.work.energy, self.element_ranges])
 
-    def sum_motion(self, step: Step, constraints: ConstraintStage, nodes: NodeStage) -> None:
+    def sum_motion(self, step: Step) -> None:
         """Kinetic energy, works, and velocities of recorded points."""
         work, state = self.work, step.state
-        u, v, dt = nodes.at_record(state)
+        u, v, dt = self.solver.nodes.at_record(state)
         inputs = [work.mass, work.heavy_mass, work.gravity, u, work.v_before, v, dt, self.node_first]
-        inputs += [state.constraints.work, constraints.driven_first, work.point_node]
+        inputs += [state.constraints.work, self.solver.constraints.driven_first, work.point_node]
         self.sum_runs(ledger.record_motion, self.most_nodes, inputs, work.point_velocity)

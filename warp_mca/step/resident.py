@@ -128,9 +128,9 @@ class Resident:
             self.bonds.node, self.bonds.begin, self.bonds.end = own.node, own.begin, own.end
             self.bonds.times, self.bonds.values = own.times, own.values
 
-    def kernels(self) -> tuple[list[Any], int]:
-        """The kernel, and the threads of its blocks."""
-        return [self.kernel], THREADS
+    def kernels(self) -> tuple[int, list[Any]]:
+        """The threads of its blocks, and the kernel."""
+        return THREADS, [self.kernel]
 
     def launch(self, state: State, steps: int) -> None:
         """Advance so many steps that record nothing."""

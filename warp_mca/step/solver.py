@@ -8,43 +8,46 @@ while the one before them ends.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.contact.search import FLAGS
+from warp_mca.kernels.hardware import subnormals
 from warp_mca.model.layout import layout_of
 from warp_mca.model.model import Model
-from warp_mca.physics.absorbing.stage import AbsorbingStage
-from warp_mca.physics.contact.extremes import NormalForce
-from warp_mca.physics.contact.stage import ContactStage, has_sides
-from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.actor import Actor, When
+from warp_mca.physics.contact.stage import has_sides
 from warp_mca.physics.elements.stage import gather_lists
-from warp_mca.physics.floating.stage import FloatingStage
-from warp_mca.physics.joints.constraint_stage import ConstraintStage
-from warp_mca.physics.joints.coupling_stage import CouplingStage
-from warp_mca.physics.loads.stage import LoadStage
-from warp_mca.physics.rigid.stage import RigidStage
-from warp_mca.physics.ties.stage import TieStage
+from warp_mca.step.actors import ACTORS
 from warp_mca.step.device import check_device
-from warp_mca.step.kernel_list import kernels_of
 from warp_mca.step.rate_chains import Chains
-from warp_mca.step.rated_nodes import node_stage
-from warp_mca.step.record_stage import RecordStage
 from warp_mca.step.records import SceneRecords
 from warp_mca.step.replay import MOST, Replay
 from warp_mca.step.resident import resident
 from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.stage import Search, Step, Streams
 from warp_mca.step.state import State
-from warp_mca.step.step_groups import step_groups
+from warp_mca.step.step_groups import step_groups, substep
 from warp_mca.step.threads import ELEMENTS as RANGE
 from warp_mca.step.threads import Split, whole
 from warp_mca.step.workspace import Workspace
 
 if TYPE_CHECKING:
+    from warp_mca.physics.absorbing.stage import AbsorbingStage
+    from warp_mca.physics.contact.actor import Contacts
+    from warp_mca.physics.elements.actor import Elements
+    from warp_mca.physics.floating.stage import FloatingStage
+    from warp_mca.physics.joints.constraint_stage import ConstraintStage
+    from warp_mca.physics.joints.coupling_stage import CouplingStage
+    from warp_mca.physics.loads.stage import LoadStage
+    from warp_mca.physics.rigid.stage import RigidStage
+    from warp_mca.physics.ties.stage import TieStage
+    from warp_mca.step.node_stage import NodeStage
     from warp_mca.step.output import Output
+    from warp_mca.step.record_stage import RecordStage
 
 BESIDE = 5  # steps that follow a record in its graph at least: a GPU goes on with them while it sums the record
 
@@ -57,18 +60,24 @@ class Solver:
         layout: of the model's scenes.
         dt: time step [s]; with `Model.rates` that of their substeps together.
         threads: that compute; one on a GPU, and for a model that is too small to gain from more.
-        work: the model on the device, and what a step computes and forgets.
-        elements, contacts: stages of the model's blocks and contact passes.
-        constraints: what binds nodes.
-        absorbing: absorbing boundaries.
-        couplings: joints between clusters of nodes.
-        loads: what acts in the joints of chains, and moves their bases.
-        rigid: rigid bodies.
-        floating: frames that elements compute in.
+        common_dt: time step of contacts and joints [s].
+        actors: all that acts, in the order of ACTORS; each is an attribute, too, by its name there.
         output: what is read off the state for paths and recorders, or None.
         sensors: probes and sections.
         replay: graphs of what is launched.
     """
+
+    elements: Elements
+    contacts: Contacts
+    constraints: ConstraintStage
+    couplings: CouplingStage
+    loads: LoadStage
+    absorbing: AbsorbingStage
+    rigid: RigidStage
+    ties: TieStage
+    floating: FloatingStage
+    nodes: NodeStage
+    records: RecordStage
 
     def __init__(self, model: Model, *, device: str, precision: str, dt: float, threads: int = 1) -> None:
         """Allocate.
@@ -79,7 +88,7 @@ class Solver:
         if precision not in ("mixed", "float64"):
             raise bad_value("precision", precision, "choose mixed or float64")
         self.model, self.device, self.precision, self.dt = model, check_device(device), precision, dt
-        self.layout = layout_of(model)
+        self.layout, self.common_dt = layout_of(model), dt / model.common_steps
         largest = max((block.conn.shape[1] for block in model.blocks), default=0)
         self.threads = 1 if wp.get_device(self.device).is_cuda else max(1, min(threads, largest // RANGE))
         self.output: Output | None = None
@@ -87,57 +96,48 @@ class Solver:
             self._allocate()
         self.replay = Replay(self.device, self.threads)
 
-    def _allocate(self) -> None:
-        model, passes = self.model, len(self.model.passes) // self.layout.count
-        self.elements = [ELEMENTS[block.element].stage(block, model.X, self.precision) for block in model.blocks]
-        for index, stage in enumerate(self.elements):
-            stage.index = index
-        first_slots, more_slots = gather_lists(self.elements, model.node_count)
+    def __getattr__(self, name: str) -> Any:
+        """An actor, made at its first use: whatever it reads of others is made before it."""
+        if name not in ACTORS:
+            raise AttributeError(name)
+        self.__dict__[name] = found = ACTORS[name](self)
+        return found
+
+    @cached_property
+    def work(self) -> Workspace:
+        """The model on the device, and what a step computes and forgets."""
+        first_slots, more_slots = gather_lists(self.elements, self.model.node_count)
         slots = sum(len(stage.slot_node) for stage in self.elements)
-        self.work = Workspace(model, self.layout, self.precision, first_slots, more_slots, slots)
-        scenes = [model.passes[k * passes : (k + 1) * passes] for k in range(self.layout.count)]
-        self.normal_force = NormalForce(scenes if passes else [], self.threads)
-        self.contacts = [ContactStage(model.passes[k::passes], model, k, self.normal_force) for k in range(passes)]
-        self.constraints = ConstraintStage(model, self.layout)
-        dt, touched = self.dt / model.common_steps, bool(self.contacts)
-        self.loads = LoadStage(model, self.layout.count, self.work, self.constraints, dt)
-        self.couplings = CouplingStage(model, self.work, self.constraints, self.loads, dt)
-        if blocks := max((stage.blocks for stage in self.contacts), default=0) + self.couplings.blocks:
+        return Workspace(self.model, self.layout, self.precision, first_slots, more_slots, slots)
+
+    def _allocate(self) -> None:
+        model = self.model
+        self.sensors = SensorStage(self, ())
+        self.actors: list[Actor] = [getattr(self, name) for name in ACTORS]
+        if blocks := self.contacts.blocks + self.couplings.blocks:
             for stage in self.elements:
                 stage.make_room(blocks)
-        self.nodes = node_stage(model, self.work, self.constraints, self.elements, self.precision, dt, touched)
-        self.rigid = RigidStage(model, self.nodes, self.precision)
-        self.absorbing = AbsorbingStage(model, self.layout, self.nodes, self.precision)
-        self.ties, self.floating = TieStage(model, self.nodes, self.precision), FloatingStage(model, self.work)
-        self.records = RecordStage(model, self.layout, self.work, self.elements, self.precision)
-        self.sensors = SensorStage(self, ())
-        self.groups = step_groups(self)
+        self.groups = step_groups(self.actors, When())
         cuda = wp.get_device().is_cuda
         self.chains = Chains(self) if model.rates and cuda else None
         levels = range(model.rates.top) if model.rates and not cuda else ()
-        self.subgroups = [step_groups(self, level) for level in levels]
+        self.subgroups = [step_groups(self.actors, substep(model, level)) for level in levels]
         self._streams, self.resident = Streams(cuda), resident(self)
 
     def new_state(self) -> State:
         """State at the start of the phase: the model's velocities, no displacement, no stress."""
         with wp.ScopedDevice(self.device):
             single = wp.get_device().is_cuda and self.layout.count == 1
+            parts = {name: getattr(self, name).new_state() for name in ACTORS}
             return State(
                 u=wp.zeros(self.model.node_count, dtype=wp.vec3d),
                 v=wp.array(self.model.V, dtype=wp.vec3d),
                 # threads of a GPU share an entry: few of them exceed it
                 speed_square=wp.zeros(1 if single else self.model.node_count, dtype=wp.float32),
-                normal_force=self.normal_force.new_state(),
+                normal_force=self.contacts.normal_force.new_state(),
                 recent_force=wp.zeros(self.model.node_count if has_sides(self.model) else 0, dtype=wp.vec3d),
                 flag=wp.zeros((self.layout.count, len(FLAGS)), dtype=wp.int32),
-                elements=[stage.new_state() for stage in self.elements],
-                contacts=[stage.new_state() for stage in self.contacts],
-                constraints=self.constraints.new_state(),
-                couplings=self.couplings.new_state(),
-                loads=self.loads.new_state(),
-                absorbing=self.absorbing.new_state(),
-                rigid=self.rigid.new_state(),
-                floating=self.floating.new_state(),
+                parts={name: part for name, part in parts.items() if part is not None},
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
@@ -149,25 +149,25 @@ class Solver:
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            for kernels, size in kernels_of(self):
-                if modules := list(dict.fromkeys(kernel.module for kernel in kernels)):
+            flush = [] if wp.get_device().is_cuda else [subnormals.begin_flush]
+            by_size: dict[int | None, list[Any]] = {
+                None: flush + [kernel for actor in self.actors for kernel in actor.record_kernels()]
+            }
+            kernels = [(actor.block_dim, actor.kernels()) for actor in self.actors]
+            kernels += [self.resident.kernels()] if self.resident else []
+            for size, some in kernels:
+                by_size[size] = by_size.get(size, []) + some
+            for size, some in by_size.items():  # a module is compiled for one number of threads
+                if modules := list(dict.fromkeys(kernel.module for kernel in some)):
                     wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
-
-    @property
-    def _replays_search(self) -> bool:
-        return any(stage.is_replayable for stage in self.contacts)
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
-        if self._replays_search:
-            self.replay.graph(state, "search", lambda: self._search(state))
+        if self.contacts.is_replayable:
+            self.replay.graph(state, "search", lambda: self.contacts.search_all(state))
         else:
             with wp.ScopedDevice(self.device):
-                self._search(state)
-
-    def _search(self, state: State) -> None:
-        for stage in self.contacts:
-            stage.search(self.work, state)
+                self.contacts.search_all(state)
 
     def begin(self, state: State) -> None:
         """First search of a new state, after `compile`."""
@@ -184,10 +184,8 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
             self.nodes.integrate(state, -0.5 * self.nodes.base, 0.0, self.constraints.at_rest)
-            if self.rigid.count:
-                self.rigid.start(state)
-            if self.model.hinge_loads:
-                self.loads.torques(state, -0.5 * self.nodes.dt, 0.0)
+            for actor in self.actors:
+                actor.start(state)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
             squares = state.speed_square
             squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
@@ -239,7 +237,7 @@ class Solver:
             self.record_and_step(state, beside, needs, is_row, search)
             self.step(state, count - beside, most)
             return
-        if search and not self._replays_search:
+        if search and not self.contacts.is_replayable:
             self.search(state)
             search = ""
         name = f"{'record' if is_row else 'check'} {sorted(needs)} {search}"

@@ -22,14 +22,6 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import write_atomically
 from warp_mca.base.validate import DAMAGE, MAX_COUNT
-from warp_mca.physics.absorbing.stage import AbsorbingState
-from warp_mca.physics.contact.stage import ContactState
-from warp_mca.physics.elements.state import ElementState
-from warp_mca.physics.floating.stage import FloatingState
-from warp_mca.physics.joints.constraint_stage import ConstraintState
-from warp_mca.physics.joints.coupling_stage import CouplingState
-from warp_mca.physics.loads.stage import LoadState
-from warp_mca.physics.rigid.stage import RigidState
 from warp_mca.step.records import SceneRecords
 
 if TYPE_CHECKING:
@@ -52,14 +44,7 @@ class State:
         recent_force: contact force on each node, of one pass, the greatest of late [N], shape (node_count,), vec3d;
             empty where no master has several sides.
         flag: guards that kernels raised, by scene, `kernels.contact.search.FLAGS` [-], shape (scene_count, 4), int32.
-        elements: of each block, `ElementState`.
-        contacts: of each contact pass, `ContactState`.
-        constraints: of joints and driven nodes, `ConstraintState`.
-        couplings: of joints between clusters of nodes, `CouplingState`.
-        loads: of torques in hinges and of movable bases, `LoadState`.
-        absorbing: of absorbing boundaries, `AbsorbingState`.
-        rigid: of rigid bodies, `RigidState`.
-        floating: of floating frames, `FloatingState`.
+        parts: what changes of each actor, by its name in `step.actors.ACTORS`; attributes of the State, too.
         steps: steps taken since the start of the phase [-].
         scenes: what each scene has recorded so far, `records.SceneRecords`.
     """
@@ -70,16 +55,15 @@ class State:
     normal_force: wp.array
     recent_force: wp.array
     flag: wp.array
-    elements: list[ElementState]
-    contacts: list[ContactState]
-    constraints: ConstraintState
-    couplings: CouplingState
-    loads: LoadState
-    absorbing: AbsorbingState
-    rigid: RigidState
-    floating: FloatingState
+    parts: dict[str, Any]
     steps: int = 0
     scenes: list[SceneRecords] = field(default_factory=list)
+
+    def __getattr__(self, name: str) -> Any:
+        """The part of an actor."""
+        if name in (parts := self.__dict__.get("parts", {})):
+            return parts[name]
+        raise AttributeError(name)
 
     @property
     def _scalar(self) -> str:
@@ -197,6 +181,8 @@ def _copied(part: Any) -> Any:
         return wp.clone(part) if part.is_contiguous else wp.clone(part.transpose()).transpose()
     if isinstance(part, list):
         return [_copied(item) for item in part]
+    if isinstance(part, dict):
+        return {name: _copied(item) for name, item in part.items()}
     if hasattr(part, "__dataclass_fields__"):
         return type(part)(**{name: _copied(getattr(part, name)) for name in _names(part)})
     if hasattr(part, "_cls"):
@@ -213,10 +199,12 @@ def _names(part: Any) -> list[str]:
 
 def _arrays(owner: Any, prefix: str) -> Iterator[tuple[str, wp.array]]:
     """Device arrays of a dataclass, of its parts and lists of parts, with their names."""
-    for name in _names(owner):
-        value = getattr(owner, name)
+    for name in owner if isinstance(owner, dict) else _names(owner):
+        value = owner[name] if isinstance(owner, dict) else getattr(owner, name)
         if isinstance(value, wp.array):
             yield prefix + name, value
+        elif isinstance(value, dict):
+            yield from _arrays(value, prefix)
         elif isinstance(value, list) and name != "scenes":
             for k, part in enumerate(value):
                 yield from _arrays(part, f"{prefix}{name}/{k}/")

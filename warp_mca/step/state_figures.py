@@ -24,7 +24,7 @@ def max_penetration(solver: Solver, state: State, scene: int = 0) -> float:
 
 def max_normal_force(solver: Solver, state: State, scene: int = 0) -> float:
     """Greatest sum of the normal forces on all slave nodes of a scene in any step [N]."""
-    return solver.normal_force.greatest(state.normal_force, scene)
+    return solver.contacts.normal_force.greatest(state.normal_force, scene)
 
 
 def max_speed(solver: Solver, state: State, scene: int = 0) -> float:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.scene.absorbing import Absorbing
@@ -22,6 +23,7 @@ NORMAL, TANGENTIAL = 4.0 / 3.0, 2.0 / 3.0
 _GAUSS = 1.0 / np.sqrt(3.0)
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class AbsorbingNodes:
     """Nodes of absorbing boundaries; none where a scene has none.
@@ -33,10 +35,10 @@ class AbsorbingNodes:
         velocity: of the body that each belongs to, relative to which they absorb [m/s], shape (count, 3), float64.
     """
 
-    node: Index
-    damping: Array
-    stiffness: Array
-    velocity: Array
+    node: Index = field(metadata=of("nodes"))
+    damping: Array = field(metadata=AS_IS)
+    stiffness: Array = field(metadata=AS_IS)
+    velocity: Array = field(metadata=AS_IS)
 
     @property
     def sprung(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +13,12 @@ from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
 from warp_mca.kernels.nodes.node import LEVEL_BIT
 from warp_mca.kernels.records.absorbing import sum_absorbed
 from warp_mca.kernels.records.columns import absorbing_column
-from warp_mca.model.layout import Layout
+from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.step.stage import Stage, Step
+from warp_mca.step.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.step.node_stage import NodeStage
-    from warp_mca.step.record_stage import RecordStage
+    from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
 
 
@@ -42,7 +41,7 @@ class AbsorbingState:
     stretch: wp.array
 
 
-class AbsorbingStage:
+class AbsorbingStage(Actor):
     """What `kernels.nodes.absorbing` reads and writes.
 
     Attributes:
@@ -50,9 +49,12 @@ class AbsorbingStage:
         items, chains: of the kernel: those up to each level, and those of each.
     """
 
-    def __init__(self, model: Model, layout: Layout, nodes: NodeStage, precision: str) -> None:
+    block_dim = BLOCK_DIM
+
+    def __init__(self, solver: Solver) -> None:
         """Allocate on the current device."""
-        own, self.nodes, self.layout = model.absorbing, nodes, layout
+        model, nodes, layout = solver.model, solver.nodes, solver.layout
+        own, self.nodes, self.layout, self.records = model.absorbing, nodes, layout, solver.records
         self.count, self.model = len(own.node), model
         if not self.count:
             return
@@ -70,7 +72,9 @@ class AbsorbingStage:
         self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
         self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
         self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
-        self.kernel = absorbing_kernel(precision, nodes.touched, own.sprung, nodes.each, nodes.rated, nodes.turned)
+        self.kernel = absorbing_kernel(
+            solver.precision, nodes.touched, own.sprung, nodes.each, nodes.rated, nodes.turned
+        )
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
         self.column = absorbing_column(len(model.passes) // layout.count)
@@ -93,30 +97,36 @@ class AbsorbingStage:
         """Those of a record."""
         return [sum_absorbed] if self.count else []
 
-    def record_stages(self, records: RecordStage) -> list[Stage]:
-        """Those of a record, after all nodes have moved."""
-        return [Stage("absorbed energy", lambda s: self._sum(s, records), only_records=True)] if self.count else []
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Its nodes, against their dashpots."""
+        if self.count and len(item := self._items(when)):
+            yield Stage("absorbing boundaries", lambda s: self._advance(s, item, when.level), BESIDE)
 
-    def active(self, level: int | None, chain: int | None) -> wp.array:
+    def works(self, when: When) -> Iterable[Stage]:
+        """Energy absorbed and work of what lies beyond."""
+        if self.count:
+            yield Stage("absorbed energy", self._sum, only_records=True)
+
+    def _items(self, when: When) -> wp.array:
         """Its nodes up to a level, or all; of one level where a chain is given. As the kernel takes them."""
-        if not self.count:
-            return wp.zeros(0, dtype=wp.int32)
-        return self.chains[chain] if chain is not None else self.items[-1 if level is None else level]
+        if when.chain is not None:
+            return self.chains[when.chain]
+        return self.items[-1 if when.level is None else when.level]
 
-    def advance(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
-        """The nodes that are `active`, with forces of elements up to a level, or of all."""
-        work, state, own, item = self.nodes.work, step.state, step.state.absorbing, self.active(level, chain)
+    def _advance(self, step: Step, item: wp.array, level: int | None) -> None:
+        """Some of its nodes, with forces of elements up to a level, or of all."""
+        work, state, own = self.nodes.work, step.state, step.state.absorbing
         inputs = [item, self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
         inputs += [work.force, work.frames(state), self.nodes.scene, self.nodes.gravity, self.nodes.base]
         outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
         outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
         wp.launch(self.kernel, len(item), inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
-    def _sum(self, step: Step, records: RecordStage) -> None:
+    def _sum(self, step: Step) -> None:
         """Energy absorbed and work of what lies beyond, in the record."""
         own = step.state.absorbing
         inputs = [self.column, self.first, self.dashpots.velocity, own.impulse, own.absorbed]
-        records.sum_runs(sum_absorbed, self.most, inputs)
+        self.records.sum_runs(sum_absorbed, self.most, inputs)
 
     def impulses(self, state: State, scene: int = 0) -> dict[str, list[float]]:
         """Impulse that each body of a scene gave to what lies beyond its absorbing boundaries [N s], by name."""

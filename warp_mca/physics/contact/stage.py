@@ -11,9 +11,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import offsets
 from warp_mca.kernels.contact import contact, nearest, search, sides
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
-from warp_mca.model.layout import offsets
 from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
 from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.step.threads import CONTACT, Split, whole

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
 from warp_mca.scene import Contact, RigidPlane
@@ -52,6 +53,7 @@ class Faces:
         return np.unique(self.node).astype(np.int32)
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class ContactPass:
     """Slave nodes against a plane or against faces.
@@ -81,31 +83,31 @@ class ContactPass:
         penalty_given: whether the scene gives a number for the penalty.
     """
 
-    slave: Index
-    stiffness: Array
-    mu: float
-    sign: float
-    contact: int
-    law: str
-    parameters: tuple[float, ...]
-    stiffening: float
-    plane: RigidPlane | None = None
-    face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    face_stiffness: Array = field(default_factory=lambda: np.zeros(0))
-    side: Index = field(default_factory=lambda: np.zeros(0, np.int32))
-    at_once: float = 1.0
-    slave_face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    slave_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
-    face_of_slave: Index = field(default_factory=lambda: np.zeros(0, np.int32))
-    master: Index = field(default_factory=lambda: np.zeros(0, np.int32))
-    face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32))
-    face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32))
-    margin: float = 0.0
-    longest: float = 0.0
-    room: int = LIST_LENGTH
-    deepest: float = 0.0
-    initial_overlap: str = "refuse"
-    penalty_given: bool = False
+    slave: Index = field(metadata=of("nodes"))
+    stiffness: Array = field(metadata=AS_IS)
+    mu: float = field(metadata=AS_IS)
+    sign: float = field(metadata=AS_IS)
+    contact: int = field(metadata=AS_IS)
+    law: str = field(metadata=AS_IS)
+    parameters: tuple[float, ...] = field(metadata=AS_IS)
+    stiffening: float = field(metadata=AS_IS)
+    plane: RigidPlane | None = field(default=None, metadata=AS_IS)
+    face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32), metadata=of("nodes"))
+    face_stiffness: Array = field(default_factory=lambda: np.zeros(0), metadata=AS_IS)
+    side: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
+    at_once: float = field(default=1.0, metadata=AS_IS)
+    slave_face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32), metadata=of("nodes"))
+    slave_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32), metadata=AS_IS)
+    face_of_slave: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
+    master: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=of("nodes"))
+    face_offset: Index = field(default_factory=lambda: np.zeros(1, np.int32), metadata=AS_IS)
+    face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
+    margin: float = field(default=0.0, metadata=AS_IS)
+    longest: float = field(default=0.0, metadata=AS_IS)
+    room: int = field(default=LIST_LENGTH, metadata=AS_IS)
+    deepest: float = field(default=0.0, metadata=AS_IS)
+    initial_overlap: str = field(default="refuse", metadata=AS_IS)
+    penalty_given: bool = field(default=False, metadata=AS_IS)
 
     @property
     def smallest_area(self) -> float:

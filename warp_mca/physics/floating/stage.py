@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,13 +10,13 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import floating
+from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
+from warp_mca.step.stage import Stage, Step
 from warp_mca.step.threads import NODES
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.step.stage import Step
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.step.solver import Solver
 
 
 @dataclass(eq=False)
@@ -29,15 +30,18 @@ class FloatingState:
     rotation: wp.array
 
 
-class FloatingStage:
+class FloatingStage(Actor):
     """What `kernels.nodes.floating` reads and writes.
 
     Attributes:
         count: frames.
     """
 
-    def __init__(self, model: Model, work: Workspace) -> None:
+    block_dim = BLOCK_DIM
+
+    def __init__(self, solver: Solver) -> None:
         """Allocate on the current device."""
+        model, work = solver.model, solver.work
         marker = model.floating.marker if model.floating else np.zeros((0, 4), np.int32)
         self.work, self.count, self.node_count = work, len(marker), model.node_count
         self.marker = wp.array(marker, dtype=wp.int32)
@@ -50,12 +54,18 @@ class FloatingStage:
         """Those of a step."""
         return [floating.follow_bodies, floating.see_nodes] if self.count else []
 
-    def follow(self, step: Step) -> None:
+    def frames(self, when: When) -> Iterable[Stage]:
+        """Frames that turn with their bodies, and nodes as seen in them."""
+        if self.count:
+            yield Stage("floating frames", self._turn, only_records=True)
+            yield Stage("nodes in floating frames", self._see)
+
+    def _turn(self, step: Step) -> None:
         """Turn the frames with their bodies."""
         outputs = [step.state.floating.rotation]
         wp.launch(floating.follow_bodies, self.count, inputs=[self.work.X, self.marker, step.state.u], outputs=outputs)
 
-    def see(self, step: Step) -> None:
+    def _see(self, step: Step) -> None:
         """Displacements of all nodes in their frames."""
         work, state = self.work, step.state
 

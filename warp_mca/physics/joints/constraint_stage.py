@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
+from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.nodes.node import BOUND, TOUCHABLE
-from warp_mca.model.layout import Layout
+from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.rigid.bodies import rigid_nodes
+from warp_mca.step.stage import BESIDE, Stage
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.step.solver import Solver
 
 
 @dataclass(eq=False)
@@ -34,7 +37,7 @@ class ConstraintState:
     clock: wp.array
 
 
-class ConstraintStage:
+class ConstraintStage(Actor):
     """What `kernels.nodes.node` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
 
     Attributes:
@@ -51,8 +54,9 @@ class ConstraintStage:
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
 
-    def __init__(self, model: Model, layout: Layout) -> None:
+    def __init__(self, solver: Solver) -> None:
         """Allocate on the current device."""
+        self.solver, model = solver, solver.model
         nodes, place = np.unique(model.prescribed_node, return_inverse=True)
         self.pairs, self.driven = len(model.joint_first), len(nodes)
         rigid = rigid_nodes(model)
@@ -84,7 +88,7 @@ class ConstraintStage:
         self.bonds.begin, self.bonds.end = wp.array(begin, dtype=wp.vec3i), wp.array(end, dtype=wp.vec3i)
         self.bonds.times = wp.array(model.table_time, dtype=wp.float64)
         self.bonds.values = wp.array(model.table_value, dtype=wp.float64)
-        self.driven_first = wp.array(np.searchsorted(nodes, layout.nodes), dtype=wp.int32)
+        self.driven_first = wp.array(np.searchsorted(nodes, solver.layout.nodes), dtype=wp.int32)
 
     def new_state(self) -> ConstraintState:
         """State before the first step, on the current device."""
@@ -94,3 +98,15 @@ class ConstraintStage:
             work_after=wp.zeros(self.driven, dtype=wp.vec3d),
             clock=wp.zeros(self.driven, dtype=wp.int32),
         )
+
+    def record_kernels(self) -> list[Any]:
+        """That of rails, which has blocks of Warp's own size; `NodeStage` has those of bound nodes."""
+        return [slide.slide] if len(self.rails) else []
+
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Nodes in joints and driven ones, then sliders, which have moved as free ones."""
+        nodes = self.solver.nodes
+        if when.common and self.count:
+            yield Stage("joints, driven nodes", lambda s: nodes.advance_bound(s, when.level), BESIDE)
+        if when.common and len(self.rails):
+            yield Stage("sliders on rails", nodes.slide, BESIDE)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Array, Assembly, Index
 from warp_mca.physics.joints.couplings import Coupling, coupling
@@ -17,13 +18,14 @@ from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Clusters, Rails, Side
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class JointPairs:
     """A joint's pairs: [start, end) of `Model.joint_first` and `joint_second`."""
 
-    name: str
-    start: int
-    end: int
+    name: str = field(metadata=AS_IS)
+    start: int = field(metadata=of("pairs"))
+    end: int = field(metadata=of("pairs"))
 
 
 def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,11 @@ from warp_mca.kernels.nodes import couple
 from warp_mca.kernels.nodes.cluster import Clusters, Sums
 from warp_mca.kernels.nodes.coupling import Inverse
 from warp_mca.kernels.nodes.hinge import Side
+from warp_mca.physics.actor import Actor, When
+from warp_mca.step.stage import ASIDE, BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.physics.joints.constraint_stage import ConstraintStage
-    from warp_mca.physics.loads.stage import LoadStage
-    from warp_mca.step.stage import Step
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.step.solver import Solver
 
 # Threads of a block on a GPU, and nodes of its part of a cluster; a CPU takes clusters whole. Small blocks fit in what
 # patches of elements leave free, see `PatchStage.make_room`.
@@ -39,7 +38,7 @@ class CouplingState:
     orientation: wp.array
 
 
-class CouplingStage:
+class CouplingStage(Actor):
     """What `kernels.nodes.couple` reads and writes.
 
     Attributes:
@@ -47,12 +46,13 @@ class CouplingStage:
         clusters: on the device.
     """
 
-    def __init__(
-        self, model: Model, work: Workspace, constraints: ConstraintStage, loads: LoadStage, dt: float
-    ) -> None:
+    block_dim = BLOCK
+
+    def __init__(self, solver: Solver) -> None:
         """Allocate on the current device."""
+        model = solver.model
         self.items, self.count = model.couplings, len(model.couplings)
-        self.work, self.loads, self.dt = work, loads, dt
+        self.work, self.loads, self.dt = solver.work, solver.loads, solver.common_dt
         if not self.count:
             return
         weight = np.zeros(len(model.joint_first))
@@ -60,7 +60,7 @@ class CouplingStage:
             weight[item.start : item.end] = item.weight
         self.clusters = Clusters()
         self.clusters.begin = wp.array([(item.start, item.middle, item.end) for item in self.items], dtype=wp.vec3i)
-        self.clusters.node = constraints.bonds.first
+        self.clusters.node = solver.constraints.bonds.first
         self.clusters.weight = wp.array(weight, dtype=wp.float64)
         base = np.full(self.count, -1)
         for k, item in enumerate(model.bases):
@@ -82,7 +82,7 @@ class CouplingStage:
         self.clusters.part = wp.array(part, dtype=wp.vec4i)
         self.clusters.first_part = wp.array(first, dtype=wp.vec3i)
         self.threads = (len(part), BLOCK if size else 1)
-        self.sums, self.momenta = wp.zeros(len(part), dtype=Sums), wp.zeros(len(part), dtype=couple.Momenta)
+        self.moments, self.momenta = wp.zeros(len(part), dtype=Sums), wp.zeros(len(part), dtype=couple.Momenta)
         self.sides, self.inverse = wp.zeros((self.count, 2), dtype=Side), wp.zeros(self.count, dtype=Inverse)
         self.point, self.place = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.vec3d)
 
@@ -104,12 +104,22 @@ class CouplingStage:
         """Blocks of threads that take part."""
         return self.threads[0] if self.count else 0
 
+    def forces(self, when: When) -> Iterable[Stage]:
+        """What impulses need of positions, beside the forces."""
+        if when.common and self.count:
+            yield Stage("couplings: responses", self.find_responses, ASIDE)
+
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Clusters, which have moved as free nodes."""
+        if when.common and self.count:
+            yield Stage("couplings", self.couple, BESIDE)
+
     def find_responses(self, step: Step) -> None:
         """What impulses need and positions give."""
         state, own, work = step.state, step.state.couplings, self.work
         inputs = [self.clusters, work.X, work.mass, own.place, state.u, state.v]
-        wp.launch(couple.sum_moments, self.threads, inputs=inputs, outputs=[self.sums], block_dim=BLOCK)
-        inputs = [self.clusters, self.loads.device_bases, self.sums, own.place, own.orientation]
+        wp.launch(couple.sum_moments, self.threads, inputs=inputs, outputs=[self.moments], block_dim=BLOCK)
+        inputs = [self.clusters, self.loads.device_bases, self.moments, own.place, own.orientation]
         inputs += [state.loads.carriage, state.loads.base_clock, self.dt]
         outputs = [self.sides, self.inverse, self.point, self.place]
         threads = (self.count, self.threads[1])

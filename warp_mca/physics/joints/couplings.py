@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import mean_pose
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.joints import Joint
@@ -24,6 +25,7 @@ FLAT = 1e-3  # of a cluster's radius of inertia: distance from a line below whic
 ALIGNED = math.cos(math.radians(1.0))  # between the axes of both bodies, at least
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class Coupling:
     """A hinge between two clusters, or a cluster and the ground.
@@ -37,13 +39,13 @@ class Coupling:
         arm: from the mean position of each cluster to `place` [m], shape (2, 3), float64; 0 for the ground.
     """
 
-    start: int
-    middle: int
-    end: int
-    weight: Array
-    place: Array
-    axis: Array
-    arm: Array
+    start: int = field(metadata=of("pairs"))
+    middle: int = field(metadata=of("pairs"))
+    end: int = field(metadata=of("pairs"))
+    weight: Array = field(metadata=AS_IS)
+    place: Array = field(metadata=AS_IS)
+    axis: Array = field(metadata=AS_IS)
+    arm: Array = field(metadata=AS_IS)
 
 
 class _Pose(NamedTuple):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import AS_IS, SCENE, joinable, of
 from warp_mca.model.assembly import Assembly
 from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
@@ -25,6 +26,7 @@ ON_AXIS = 1e-6  # of a body's extent: distance from a hinge's axis up to which n
 MARGIN = 1.0 + 1e-9  # so that rounding leaves no node out
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class HingeLoad:
     """Torque and friction in a hinge about z; the laws are those of `rigid.loads.Loads`.
@@ -40,16 +42,17 @@ class HingeLoad:
         scene: number of the scene in a batch.
     """
 
-    inner: Index
-    outer: Index
-    friction: float
-    damping: float
-    friction_rate: float
-    times: Array
-    torques: Array
-    scene: int = 0
+    inner: Index = field(metadata=of("nodes"))
+    outer: Index = field(metadata=of("nodes"))
+    friction: float = field(metadata=AS_IS)
+    damping: float = field(metadata=AS_IS)
+    friction_rate: float = field(metadata=AS_IS)
+    times: Array = field(metadata=AS_IS)
+    torques: Array = field(metadata=AS_IS)
+    scene: int = field(default=0, metadata=SCENE)
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class MovableBase:
     """A ground hinge that moves by a table, slides along a direction, or both.
@@ -64,14 +67,14 @@ class MovableBase:
         scene: number of the scene in a batch.
     """
 
-    start: int
-    end: int
-    direction: Array
-    carriage_mass: float
-    times: Array
-    velocities: Array
-    coupling: int = -1
-    scene: int = 0
+    start: int = field(metadata=of("pairs"))
+    end: int = field(metadata=of("pairs"))
+    direction: Array = field(metadata=AS_IS)
+    carriage_mass: float = field(metadata=AS_IS)
+    times: Array = field(metadata=AS_IS)
+    velocities: Array = field(metadata=AS_IS)
+    coupling: int = field(default=-1, metadata=of("couplings"))
+    scene: int = field(default=0, metadata=SCENE)
 
 
 def _shifted(table: Table | None, start: float, rest: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,18 +10,18 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import point_velocity
 from warp_mca.kernels.nodes import base, joint_torque
 from warp_mca.kernels.records import loads
-from warp_mca.model.layout import offsets
+from warp_mca.physics.actor import Actor, When
+from warp_mca.step.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
-    from warp_mca.physics.joints.constraint_stage import ConstraintStage
     from warp_mca.physics.loads.joint_loads import MovableBase
-    from warp_mca.step.stage import Step
+    from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
 
 BLOCK = 256  # threads of a GPU for the hinges of a scene
 
@@ -70,7 +70,7 @@ def _joined(parts: Sequence[NDArray], dtype: Any) -> wp.array:
     return wp.array(np.concatenate([np.zeros(0), *parts]), dtype=dtype)
 
 
-class LoadStage:
+class LoadStage(Actor):
     """What `kernels.nodes.joint_torque` and `kernels.nodes.base` read and write.
 
     Attributes:
@@ -78,15 +78,16 @@ class LoadStage:
         latest: impulse of each coupling in this step [N s], shape (coupling_count,), vec3d; empty without pinned bases.
     """
 
-    def __init__(self, model: Model, scenes: int, work: Workspace, constraints: ConstraintStage, dt: float) -> None:
+    def __init__(self, solver: Solver) -> None:
         """Allocate on the current device."""
-        self.hinges, self.bases, self.scenes = model.hinge_loads, model.bases, scenes
-        self.work, self.constraints, self.dt = work, constraints, dt
+        model, self.scenes = solver.model, solver.layout.count
+        self.hinges, self.bases = model.hinge_loads, model.bases
+        self.work, self.constraints, self.dt = solver.work, solver.constraints, solver.common_dt
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         self.device_bases, self.latest = base.Bases(), wp.zeros(0, dtype=wp.vec3d)
         if not (self.hinges or self.bases):
             return
-        self.first_hinge, self.first_base = _firsts(self.hinges, scenes), _firsts(self.bases, scenes)
+        self.first_hinge, self.first_base = _firsts(self.hinges, self.scenes), _firsts(self.bases, self.scenes)
         self.kinetic = wp.zeros(len(self.bases), dtype=wp.float64)
         self._make_hinges()
         self._make_bases(model)
@@ -135,11 +136,31 @@ class LoadStage:
             base_clock=wp.zeros(bases, dtype=wp.int32),
         )
 
-    def kernels(self) -> list[Any]:
+    def record_kernels(self) -> list[Any]:
         """Those of a step and of a record."""
         found = [joint_torque.joint_torques] if self.hinges else []
         found += [base.move_bases] if self.bases else []
         return [*found, loads.sum_loads] if found else []
+
+    def start(self, state: State) -> None:
+        """Let torques act for half a step back."""
+        if self.hinges:
+            self.torques(state, -0.5 * self.dt, 0.0)
+
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Bases that move or slide, with their hinge nodes."""
+        if when.common and self.bases:
+            yield Stage("bases", self.move_bases, BESIDE)
+
+    def correct(self, when: When) -> Iterable[Stage]:
+        """Torques, on the velocities that all else gave."""
+        if when.common and self.hinges:
+            yield Stage("joint torques", lambda s: self.torques(s.state, self.dt, self.dt))
+
+    def works(self, when: When) -> Iterable[Stage]:
+        """Work, heat and kinetic energy of carriages."""
+        if self.hinges or self.bases:
+            yield Stage("joint and base sums", self._sum, only_records=True)
 
     def torques(self, state: State, kick: float, drift: float) -> None:
         """Let torques act for `kick` [s] on nodes that all else has moved for `drift` [s]; 0 before the first step."""
@@ -157,7 +178,7 @@ class LoadStage:
         outputs += [own.carriage, own.base_work, own.base_work_after, own.base_clock, self.kinetic]
         wp.launch(base.move_bases, len(self.bases), inputs=inputs, outputs=outputs)
 
-    def sums(self, step: Step) -> None:
+    def _sum(self, step: Step) -> None:
         """Work, heat and kinetic energy of carriages, in the record."""
         own = step.state.loads
         inputs = [self.work.row, self.first_hinge, own.work, self.first_base, own.base_work, self.kinetic]

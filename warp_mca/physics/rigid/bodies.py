@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import AS_IS, SCENE, joinable, of
 from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.joints.constraints import JointPairs
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class RigidBody:
     """A rigid body with its riders: nodes of flexible bodies that joints tie to its own nodes.
@@ -43,16 +45,16 @@ class RigidBody:
         scene: number of the scene in a batch.
     """
 
-    name: str
-    own: Index
-    loaded: Index
-    riders: Index
-    pairs: Index
-    signs: Array
-    mass: float
-    centre: Array
-    inertia: Array
-    scene: int = 0
+    name: str = field(metadata=AS_IS)
+    own: Index = field(metadata=of("nodes"))
+    loaded: Index = field(metadata=of("nodes"))
+    riders: Index = field(metadata=of("nodes"))
+    pairs: Index = field(metadata=of("pairs"))
+    signs: Array = field(metadata=AS_IS)
+    mass: float = field(metadata=AS_IS)
+    centre: Array = field(metadata=AS_IS)
+    inertia: Array = field(metadata=AS_IS)
+    scene: int = field(default=0, metadata=SCENE)
 
     @property
     def radius(self) -> float:

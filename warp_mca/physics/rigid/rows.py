@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
@@ -21,6 +22,7 @@ HELD = 1e-4  # least share of a rigid motion that shows at fixed axes
 APART = 1e-6  # of the extent of a joint's nodes: distance at which two of them differ
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class RigidRow:
     """A scalar condition of `kernels.nodes.rigid_rows`.
@@ -35,16 +37,17 @@ class RigidRow:
         twist: axis of a row that holds a direction of a pin [-], shape (3,), float64; n is 0 there.
     """
 
-    first: int
-    second: int
-    point: Array
-    direction: Array
-    pair: int = -1
-    sign: float = 1.0
-    pin: int = -1
-    twist: Array = field(default_factory=lambda: np.zeros(3))
+    first: int = field(metadata=of("rigid bodies"))
+    second: int = field(metadata=of("rigid bodies"))
+    point: Array = field(metadata=AS_IS)
+    direction: Array = field(metadata=AS_IS)
+    pair: int = field(default=-1, metadata=of("pairs"))
+    sign: float = field(default=1.0, metadata=AS_IS)
+    pin: int = field(default=-1, metadata=of("rigid pins"))
+    twist: Array = field(default_factory=lambda: np.zeros(3), metadata=AS_IS)
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class RigidPin:
     """A pin between a rigid body and a cluster of nodes of a flexible one.
@@ -58,13 +61,13 @@ class RigidPin:
         arm: from the mean position of the cluster [m], shape (3,), float64.
     """
 
-    body: int
-    start: int
-    end: int
-    weight: Array
-    place: Array
-    axis: Array
-    arm: Array
+    body: int = field(metadata=of("rigid bodies"))
+    start: int = field(metadata=of("pairs"))
+    end: int = field(metadata=of("pairs"))
+    weight: Array = field(metadata=AS_IS)
+    place: Array = field(metadata=AS_IS)
+    axis: Array = field(metadata=AS_IS)
+    arm: Array = field(metadata=AS_IS)
 
 
 def check_joint(joint: Joint, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupled: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,13 +10,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import mean_pose
 from warp_mca.kernels.nodes import rigid_body
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
 from warp_mca.model.assembly import GROUND
-from warp_mca.model.layout import offsets
+from warp_mca.physics.actor import Actor, When
+from warp_mca.step.stage import BESIDE, Stage, Step
 from warp_mca.step.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
@@ -24,8 +26,7 @@ if TYPE_CHECKING:
     from warp_mca.physics.joints.constraint_stage import ConstraintStage
     from warp_mca.physics.rigid.bodies import RigidBody
     from warp_mca.physics.rigid.rows import RigidPin, RigidRow
-    from warp_mca.step.node_stage import NodeStage
-    from warp_mca.step.stage import Step
+    from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
 
 Array = NDArray[np.float64]
@@ -63,17 +64,18 @@ def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[lis
     return [[k for k, g in enumerate(group) if g == own] for own in sorted(set(group))]
 
 
-class RigidStage:
+class RigidStage(Actor):
     """What `kernels.nodes.rigid_body` reads and writes; of no use for a model without rigid bodies."""
 
-    def __init__(self, model: Model, nodes: NodeStage, precision: str) -> None:
-        """Allocate on the current device; `nodes` advances all other nodes."""
+    def __init__(self, solver: Solver) -> None:
+        """Allocate on the current device."""
+        model, nodes = solver.model, solver.nodes
         self.model, self.nodes, self.work, self.dt = model, nodes, nodes.work, nodes.dt
         self.count = len(model.rigid_bodies)
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
-        self.kernel = rigid_body.advance_kernel(precision, nodes.touched, nodes.rated, nodes.turned)
+        self.kernel = rigid_body.advance_kernel(solver.precision, nodes.touched, nodes.rated, nodes.turned)
         self.own = own = model.rigid_bodies
         self._make_bodies(model, own)
         self._make_rows(own, model.rigid_rows)
@@ -164,12 +166,14 @@ class RigidStage:
         turns = {"rotation": wp.array(at_rest, dtype=wp.quatd), "orientation": wp.array(pins, dtype=wp.quatd)}
         return RigidState(**turns, **vectors)
 
-    def kernels(self) -> list[Any]:
-        """Those of a step."""
+    def record_kernels(self) -> list[Any]:
+        """Those of a step, which have blocks of Warp's own size."""
         return [self.kernel, rigid_body.follow] if self.count else []
 
     def start(self, state: State) -> None:
         """Take pose and momentum from the nodes, and the velocities half a step back, from t = 0 to t = -dt / 2."""
+        if not self.count:
+            return
         u = np.asarray(state.u.numpy(), dtype=np.float64)
         poses = [_pose(self.model, body, u) for body in self.own]
         state.rigid.centre.assign(np.array([centre for centre, _, _, _ in poses]))
@@ -179,7 +183,12 @@ class RigidStage:
         self._advance(state, -0.5 * self.dt, -self.dt, False)
         self._follow(state, whole, None)
 
-    def advance(self, step: Step, level: int | None = None) -> None:
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Rigid bodies and their nodes."""
+        if when.common and self.count:
+            yield Stage("rigid bodies", lambda s: self._step(s, when.level), BESIDE)
+
+    def _step(self, step: Step, level: int | None) -> None:
         """All rigid bodies and their nodes, with forces of elements up to a level, or of all.
 
         Where the step records, `work.v_before` takes the velocities before it.

@@ -11,16 +11,16 @@ energy are those of the cells as they then are, which differ by the share of the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.joining import AS_IS, join, joinable, of
 from warp_mca.base.rotation import mean_spin
 from warp_mca.geometry.face_projection import project
-from warp_mca.model.layout import complete
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -34,6 +34,7 @@ MOVING = 1e-6  # of a body's greatest speed: difference of velocities that is ro
 TURNING = 1.01  # times what the rate of turn explains: links whose shape an impact left do not turn quite as rigid ones
 
 
+@joinable
 @dataclass(frozen=True, kw_only=True)
 class TiedNodes:
     """Slave nodes and the corners of the faces that carry them.
@@ -45,10 +46,10 @@ class TiedNodes:
         facts: of each tie, for the summary.
     """
 
-    slave: Index
-    master: Index
-    weight: Array
-    facts: tuple[Mapping[str, object], ...] = ()
+    slave: Index = field(metadata=of("nodes"))
+    master: Index = field(metadata=of("nodes"))
+    weight: Array = field(metadata=AS_IS)
+    facts: tuple[Mapping[str, object], ...] = field(default=(), metadata=AS_IS)
 
     def __len__(self) -> int:
         return len(self.slave)
@@ -122,21 +123,11 @@ class TiedNodes:
         fact = self.facts[int(np.searchsorted(ends, int(which.argmax()), side="right"))]
         return f"Tie {fact['slave']}–{fact['master']}"
 
-    def moved(self, start: int) -> TiedNodes:
-        """The same with nodes that are counted from `start` on."""
-        slave, master = (self.slave + start).astype(np.int32), (self.master + start).astype(np.int32)
-        return replace(self, slave=slave, master=master)
-
 
 def join_ties(items: Sequence[TiedNodes]) -> TiedNodes:
-    """All of them."""
-    return complete(
-        TiedNodes,
-        slave=np.concatenate([np.zeros(0, np.int32), *(item.slave for item in items)]),
-        master=np.concatenate([np.zeros((0, 4), np.int32), *(item.master for item in items)]),
-        weight=np.concatenate([np.zeros((0, 4)), *(item.weight for item in items)]),
-        facts=tuple(fact for item in items for fact in item.facts),
-    )
+    """The ties of one scene."""
+    none = TiedNodes(slave=np.zeros(0, np.int32), master=np.zeros((0, 4), np.int32), weight=np.zeros((0, 4)))
+    return join([none, *items], {"nodes": np.zeros(1 + len(items), np.int32)})
 
 
 def tied_nodes(scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> TiedNodes:

@@ -2,35 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import tied
+from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
+from warp_mca.step.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.step.node_stage import NodeStage
-    from warp_mca.step.stage import Step
+    from warp_mca.step.solver import Solver
 
 
-class TieStage:
+class TieStage(Actor):
     """Advances the nodes of ties, which free and bound nodes leave out.
 
     Attributes:
         count: slaves.
     """
 
-    def __init__(self, model: Model, nodes: NodeStage, precision: str) -> None:
-        """Allocate on the current device; `nodes` advances all others."""
+    block_dim = BLOCK_DIM
+
+    def __init__(self, solver: Solver) -> None:
+        """Allocate on the current device."""
+        model, nodes = solver.model, solver.nodes
         self.nodes, self.count = nodes, len(model.ties)
         if not self.count:
             return
         ties, self.lanes = model.ties, tied.LANES if wp.get_device().is_cuda else 1
         kind = (nodes.touched, nodes.each, nodes.rated, self.lanes, nodes.turned)
-        self.masters_kernel = tied.masters_kernel(precision, *kind)
+        self.masters_kernel = tied.masters_kernel(solver.precision, *kind)
         self.follow_kernel = tied.follow_kernel(nodes.touched)
         entry, corner = np.nonzero(ties.weight)
         master = ties.master[entry, corner]
@@ -50,7 +54,17 @@ class TieStage:
         """Those of a step."""
         return [self.masters_kernel, self.follow_kernel] if self.count else []
 
-    def advance(self, step: Step, level: int | None = None) -> None:
+    def advance(self, when: When) -> Iterable[Stage]:
+        """Masters, which carry the slaves."""
+        if when.common and self.count:
+            yield Stage("masters of ties", lambda s: self._advance(s, when.level), BESIDE)
+
+    def follow(self, when: When) -> Iterable[Stage]:
+        """Slaves, once their masters have moved."""
+        if when.common and self.count:
+            yield Stage("slaves of ties", self._follow)
+
+    def _advance(self, step: Step, level: int | None) -> None:
         """Masters, with the forces on their slaves of elements up to a level, or of all."""
         nodes, work, state = self.nodes, self.nodes.work, step.state
         inputs = [work.inverse_mass, *nodes.slots(level), nodes.constraints.role, work.force]
@@ -60,7 +74,7 @@ class TieStage:
         threads = self.lanes * len(self.tied.master)
         wp.launch(self.masters_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
-    def follow(self, step: Step) -> None:
+    def _follow(self, step: Step) -> None:
         """Slaves, once their masters have moved."""
         work, state = self.nodes.work, step.state
         before = work.v_before if step.records else None

@@ -1,0 +1,99 @@
+"""Owns the contacts of a model as an actor: a stage for each contact pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warp_mca.kernels.contact import contact, spring
+from warp_mca.physics.actor import Actor, When
+from warp_mca.physics.contact.extremes import NormalForce
+from warp_mca.physics.contact.stage import ContactStage, ContactState
+from warp_mca.step.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
+
+if TYPE_CHECKING:
+    from warp_mca.step.solver import Solver
+    from warp_mca.step.state import State
+
+
+class Contacts(list[ContactStage], Actor):
+    """The stages of all contact passes: the k-th passes of all scenes are one.
+
+    Attributes:
+        normal_force: how normal forces are summed.
+    """
+
+    block_dim = contact.BLOCK_DIM
+
+    def __init__(self, solver: Solver) -> None:
+        """Allocate on the current device."""
+        model, count = solver.model, len(solver.model.passes) // solver.layout.count
+        scenes = [model.passes[k * count : (k + 1) * count] for k in range(solver.layout.count)]
+        self.solver, self.normal_force = solver, NormalForce(scenes if count else [], solver.threads)
+        super().__init__(ContactStage(model.passes[k::count], model, k, self.normal_force) for k in range(count))
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of threads of the largest pass."""
+        return max((stage.blocks for stage in self), default=0)
+
+    @property
+    def is_replayable(self) -> bool:
+        """Whether a graph can hold the search."""
+        return any(stage.is_replayable for stage in self)
+
+    def new_state(self) -> list[ContactState]:
+        """Springs that nothing presses, by pass."""
+        return [stage.new_state() for stage in self]
+
+    def kernels(self) -> list[Any]:
+        """Those of a step."""
+        return [kernel for stage in self for kernel in stage.kernels()]
+
+    def record_kernels(self) -> list[Any]:
+        """Those of a search and of a record."""
+        return [kernel for stage in self for kernel in (spring.sum_springs, *stage.search_kernels())]
+
+    def search_all(self, state: State) -> None:
+        """Broad phase of every pass."""
+        for stage in self:
+            stage.search(self.solver.work, state)
+
+    def forces(self, when: When) -> Iterable[Stage]:
+        """Forces of each pass, after the search or ahead of it."""
+        work, dt = self.solver.work, self.solver.nodes.dt
+        if when.common and self:
+            search = self._in_search("before", lambda own, s: own.search(work, s.state))
+            yield Stage("search before contact", search, BEYOND, only_records=True)
+            for own in self:
+                yield Stage("contact", lambda s, own=own: own.launch(work, s.state, dt, s.split), BEYOND)
+
+    def search(self, when: When) -> Iterable[Stage]:
+        """Search while nodes move, for the steps that follow."""
+        work = self.solver.work
+        if when.common and self:
+            boxes = self._in_search("after", lambda own, s: own.find_boxes(work, work.at_record(s.state)))
+            lists = self._in_search("after", lambda own, s: own.list_faces(work, s.state, work.at_record(s.state)))
+            yield Stage("boxes of faces", boxes, LISTS, only_records=True, after=(BESIDE,))
+            yield Stage("search after contact", lists, LISTS, only_records=True, after=(BEYOND,))
+
+    def sums(self, when: When) -> Iterable[Stage]:
+        """Force, impulse, energy and friction of each pass."""
+        for own in self:
+            yield Stage("spring sums", lambda s, own=own: self._sum(s, own), SPRINGS, only_records=True)
+
+    def _in_search(self, which: Search, act: Callable[[ContactStage, Step], None]) -> Callable[[Step], None]:
+        """Let each pass act in steps that search before or after contact."""
+
+        def launch(step: Step) -> None:
+            for own in self if step.search == which else ():
+                act(own, step)
+
+        return launch
+
+    def _sum(self, step: Step, own: ContactStage) -> None:
+        """Sums of a pass. In a check between rows, what is summed over an output interval goes on."""
+        inputs = [own.column, own.first, step.is_row, step.state.contacts[own.index].spring]
+        self.solver.records.sum_runs(spring.sum_springs, int(np.diff(own.springs).max()), inputs)

@@ -1,0 +1,36 @@
+"""Owns the table of all that acts in a step, in the order in which the stages of each group are launched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from warp_mca.physics.absorbing.stage import AbsorbingStage
+from warp_mca.physics.actor import Actor
+from warp_mca.physics.contact.actor import Contacts
+from warp_mca.physics.elements.actor import Elements
+from warp_mca.physics.floating.stage import FloatingStage
+from warp_mca.physics.joints.constraint_stage import ConstraintStage
+from warp_mca.physics.joints.coupling_stage import CouplingStage
+from warp_mca.physics.loads.stage import LoadStage
+from warp_mca.physics.rigid.stage import RigidStage
+from warp_mca.physics.ties.stage import TieStage
+from warp_mca.step.rated_nodes import node_stage
+from warp_mca.step.record_stage import RecordStage
+
+if TYPE_CHECKING:
+    from warp_mca.step.solver import Solver
+
+ACTORS: dict[str, Callable[[Solver], Actor]] = {
+    "elements": Elements,
+    "contacts": Contacts,
+    "constraints": ConstraintStage,
+    "couplings": CouplingStage,
+    "loads": LoadStage,
+    "absorbing": AbsorbingStage,
+    "rigid": RigidStage,
+    "ties": TieStage,
+    "floating": FloatingStage,
+    "nodes": node_stage,
+    "records": RecordStage,
+}
