@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import RequestError
+from warp_mca.base.log import warn
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.precision import check_range
 from warp_mca.phases.arguments import Progress
@@ -20,7 +21,6 @@ from warp_mca.results.paths import Found
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene
 from warp_mca.studies.forecast import announce
-from warp_mca.watch.advice import warn
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
