@@ -8,6 +8,7 @@ import pytest
 from warning_pairs import PAIRS
 from watched import pattern
 
+from benchmarks.warnings import PAGE, page
 from warp_mca.watch.row import Row
 from warp_mca.watch.table import TABLE
 
@@ -23,3 +24,7 @@ def test_each_row_is_told_beyond_its_limit_and_not_just_within(row: Row):
 def test_names_of_rows_are_their_own():
     assert len({row.name for row in TABLE}) == len(TABLE)
     assert set(PAIRS) == {row.name for row in TABLE}
+
+
+def test_the_page_of_warnings_is_written_from_the_table():
+    assert PAGE.read_text(encoding="utf-8") == page()

@@ -18,7 +18,7 @@ _SMALL = "the co-rotational element takes strains as small, expect stresses off 
     f"strain reached {{strain:.2f}}; {_SMALL} where it exceeds {STRAIN},",
     "or choose kinematics='finite'{where}",
     STRAIN,
-    "at most",
+    "[-] at most",
 )
 def large_strain(c: Finished, most: float) -> Iterator[Values]:
     """Greatest deviatoric strain, where bodies have kinematics='corotational'."""
@@ -30,7 +30,7 @@ def large_strain(c: Finished, most: float) -> Iterator[Values]:
     f"elements lost up to {{lost:.0%}} of their volume; {_SMALL} there,",
     "or choose kinematics='finite'{where}",
     0.15,
-    "at most",
+    "[-] at most",
 )
 def lost_volume(c: Finished, most: float) -> Iterator[Values]:
     """Greatest loss of volume of such bodies, which may come without that strain if sides are held."""

@@ -106,9 +106,9 @@ def no_number(c: Reading, _: float) -> Iterator[Values]:
         yield dict(time=c.time)
 
 
-@guard("an element turned inside out before t = {time:.4g} s;", "refine the mesh or lower the load", 0.0, "at least")
+@guard("an element turned inside out before t = {time:.4g} s;", "refine the mesh or lower the load")
 def inverted_element(c: Reading, _: float) -> Iterator[Values]:
-    """Least ratio of an element's volume to that at the start, which is 0 or less."""
+    """Least ratio of an element's volume to that at the start, which must stay above 0."""
     if c.sums is not None and not c.balance:
         yield dict(time=c.time)
 

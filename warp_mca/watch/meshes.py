@@ -49,7 +49,7 @@ def sliver(c: Context, most: float) -> Iterator[Values]:
     "unless cracks are meant, merge the parts of its mesh, which hang together at shared nodes only",
 )
 def doubled_node(c: Context, _: float) -> Iterator[Values]:
-    """Nodes of meshes that no recipe of warp_mca made."""
+    """Nodes at one place, in meshes that no recipe of warp_mca made."""
     return (dict(count=n, body=name) for name, mesh in _foreign(c) if (n := doubled_nodes(mesh)))
 
 

@@ -90,7 +90,7 @@ class Watch:
 
 
 looked = partial(
-    row, limit=0.0, unit="m beyond what springs, flat faces and an overlap at the start explain", when=When.LOOKS
+    row, unit="as deep at most as springs, flat faces and an overlap at the start explain", when=When.LOOKS
 )
 
 
