@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from impacts import begun, finished, momentum, prepared, result_of
+from watched import of_contacts
 
 import warp_mca as mca
 from warp_mca.accuracy.figures import why_unsure
 from warp_mca.model.build import build_model
-from warp_mca.results.contact_history import ContactHistory, contact_names, contact_warnings
+from warp_mca.results.contact_history import ContactHistory, contact_names
 from warp_mca.results.force_history import faint_share, grazing_share
-from warp_mca.watch.contact_warnings import symmetry_of
+from warp_mca.watch.contacts import symmetry_of
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 SOFT = mca.Elastic(E=1e7, nu=0.3, rho=1000.0)
@@ -205,7 +206,7 @@ def along(*degrees: float, axis: tuple = (0.0, 1.0, 0.0), tangent: tuple = (1.0,
         )
         for k, n in enumerate(normal)
     ]
-    return contact_warnings(contacts, np.tile(np.array([axis, tangent]), (len(contacts), 1, 1)))
+    return of_contacts(contacts, np.tile(np.array([axis, tangent]), (len(contacts), 1, 1)))
 
 
 def test_normals_further_than_ten_degrees_off_warn():
@@ -228,8 +229,8 @@ def test_friction_that_the_other_half_cancels_is_none_across_the_tangent():
     scene = falling(block("a", v=(0.0, -1.0, 3.0)), mu=0.2)
     result = result_of(finished(scene))
     axes = np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]])
-    assert any("across the axis" in text for text in contact_warnings(result.contacts, axes))
-    assert not any("across" in text for text in contact_warnings(result.contacts, axes, {0: np.eye(3)[[2]]}))
+    assert any("across the axis" in text for text in of_contacts(result.contacts, axes))
+    assert not any("across" in text for text in of_contacts(result.contacts, axes, held=(0b100, 0)))
     for nodes, count in (("zmin", 1), ("boundary", 0)):
         held = replace(falling(block("a")), fixed=(mca.Fixed(body="a", nodes=nodes, axes="z"),))
         (planes,) = symmetry_of(begun(held).scene_runs[0].ready.model).values()
@@ -253,7 +254,7 @@ def test_a_contact_that_nearly_opens_between_compressions_says_so(pressure: tupl
     contact = ContactHistory(
         name="c", force=none, pressure=np.array(pressure), normal_force=none, closing_speed=np.array(pressure)
     )
-    found = [text for text in contact_warnings([contact], np.zeros((1, 2, 3))) if "nearly opened" in text]
+    found = [text for text in of_contacts([contact]) if "nearly opened" in text]
     assert len(found) == bool(says)
     assert says in "".join(found)
 
@@ -277,7 +278,7 @@ def test_touches_in_which_bodies_only_graze_say_so(pressure: tuple[float, ...], 
     contact = ContactHistory(
         name="c", force=none, pressure=np.array(pressure), normal_force=none, closing_speed=np.array(pressure)
     )
-    found = [text for text in contact_warnings([contact], np.zeros((1, 2, 3))) if "touches of their own" in text]
+    found = [text for text in of_contacts([contact]) if "touches of their own" in text]
     says = [f"for {share:.0%} of its time, contact c has less than 5% of its greatest force"] if share else []
     assert [text.partition(" in ")[0] for text in found] == says
 

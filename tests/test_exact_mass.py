@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import watched
 from parts import write_parts
 
 import warp_mca as mca
@@ -22,7 +23,8 @@ from warp_mca.model.assembly import Assembly
 from warp_mca.model.build import build_model
 from warp_mca.scene.catalogue import make_scene, scene_names
 from warp_mca.scene.model_file import load, save
-from warp_mca.watch.mass_report import body_report, mass_warnings
+from warp_mca.watch.mass_report import body_report
+from warp_mca.watch.meshes import coarse_mass, coarse_shape
 
 RHO = 2700.0
 METAL = mca.Elastic(E=70e9, nu=0.3, rho=RHO)
@@ -327,7 +329,8 @@ def test_model_files_keep_it_and_older_ones_keep_their_mass(tmp_path: Path):
 def test_a_word_is_said_from_two_percent_on():
     def told(recipe: Any, **changes: Any) -> list[str]:
         asked = scene(recipe, **changes)
-        return mass_warnings(asked.bodies, mca.mesh(asked))
+        row = coarse_shape if asked.bodies[0].exact_mass else coarse_mass
+        return watched.told(row, scene=asked, meshes=mca.mesh(asked))
 
     (text,) = told(Sphere(radius=0.01))
     assert "2.9% less mass" in text and "scaled" in text and "refine" in text

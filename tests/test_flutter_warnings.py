@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
+from watched import told
 
 import warp_mca as mca
-from warp_mca.model.model import Model
 from warp_mca.scenes import two_link
-from warp_mca.watch.flutter_warnings import MEAN, SPAN, flutter_warnings, vibration
+from warp_mca.watch.vibration import MEAN, SPAN, flutter, vibration, vibration_aside
 
 ROWS = 400
 
@@ -61,7 +60,7 @@ def test_a_run_tells_of_vibration_across_normal_and_tangent(amplitude: float, mu
     history["plate_vz"] = sampled(amplitude, 0.233)[:, 0]
     axes = np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]])
     model = SimpleNamespace(passes=[SimpleNamespace(contact=0, mu=mu)], contact_axes=axes)
-    found = flutter_warnings(history, cast(Model, model))
+    found = [text for row in (flutter, vibration_aside) for text in told(row, history=history, model=model)]
     assert [text.partition(" with up to")[0] for text in found] == says * [
         "the surface under the tip vibrates across normal and tangent"
     ]

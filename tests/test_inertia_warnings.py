@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.watch.inertia_warnings import inertias
+from warp_mca.watch.inertia import inertias
 
 STIFF, LIGHT = mca.Elastic(E=1e9, nu=0.3, rho=2700.0), mca.Elastic(E=1e9, nu=0.3, rho=300.0)
 ENOUGH = math.ceil(math.sqrt(2.0 / 0.02)) + 1  # cells along each edge of a cube

@@ -122,9 +122,9 @@ def test_energy_tolerance_stops_the_run():
         mca.run(bar(energy_tolerance=1e-9))
 
 
-def test_inverted_element_stops_the_run():
-    """One end is pushed through the other."""
-    scene = mca.Scene(
+def crushed(duration: float) -> mca.Scene:
+    """One end of a box is pushed through the other, which takes 10 ms."""
+    return mca.Scene(
         name="crush",
         bodies=(
             mca.Body(
@@ -135,10 +135,8 @@ def test_inverted_element_stops_the_run():
         ),
         fixed=(mca.Fixed(body="box", nodes="xmin"),),
         prescribed=(mca.Prescribed(body="box", nodes="xmax", axis="x", times=(0.0,), velocities=(-1.0,)),),
-        impact=mca.ImpactPhase(duration=2e-2, output_interval=1e-4, energy_tolerance=1e9),
+        impact=mca.ImpactPhase(duration=duration, output_interval=1e-4, energy_tolerance=1e9),
     )
-    with pytest.raises(mca.GuardError, match="inside out"):
-        mca.run(scene)
 
 
 def test_bar_that_sinks_into_its_wall_stops_the_run():

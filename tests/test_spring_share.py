@@ -13,7 +13,7 @@ from impacts import prepared
 import warp_mca as mca
 from warp_mca.physics.contact.auto_penalty import SHARE
 from warp_mca.scene import catalogue
-from warp_mca.watch.spring_share import PEAK_LOSS
+from warp_mca.watch.energy import PEAK_LOSS
 
 STEEL = mca.Elastic(E=200e9, nu=0.0, rho=7800.0)
 

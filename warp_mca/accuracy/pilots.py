@@ -23,7 +23,7 @@ from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.scene import Scene
-from warp_mca.watch.spring_share import PEAK_LOSS
+from warp_mca.watch.energy import PEAK_LOSS
 
 if TYPE_CHECKING:
     from warp_mca.results.result import Result

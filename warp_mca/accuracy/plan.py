@@ -19,10 +19,10 @@ from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.store import Family, family_of, no_limit_of
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.log import LOGGER
 from warp_mca.phases.rate_groups import cost_of
 from warp_mca.scene import Scene
 from warp_mca.scene.materials import Elastic, J2Bilinear
-from warp_mca.watch.advice import LOGGER
 
 if TYPE_CHECKING:
     from warp_mca.results.result import Result

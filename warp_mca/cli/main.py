@@ -19,10 +19,10 @@ from typing import NoReturn
 
 from warp_mca.base.errors import McaError
 from warp_mca.base.garbage import few_collections
+from warp_mca.base.log import LOGGER
 from warp_mca.base.stdio import drop_output, open_streams, what_failed
 from warp_mca.cli import completion
 from warp_mca.cli.parser import make_parser
-from warp_mca.watch.advice import LOGGER
 
 
 class _Warnings(logging.Handler):

@@ -56,7 +56,7 @@ def part_script(name: str) -> str:
     """
     from warp_mca.geometry.cad import UNITS, Cad, extent
     from warp_mca.geometry.mesh_file import MeshFile
-    from warp_mca.watch.unit_warnings import LONGEST
+    from warp_mca.watch.units import LONGEST
 
     path = Path(name).resolve()
     is_cad = path.suffix.lower() in UNITS

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import warp_mca as mca
 from warp_mca.base.errors import McaError, bad_value
+from warp_mca.base.log import LOGGER
 from warp_mca.cli import part_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.request import read_request
 from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
 from warp_mca.phases.checkpoint import DEFAULT, Every
-from warp_mca.watch.advice import LOGGER
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
+from warp_mca.base.log import warn
 from warp_mca.base.validate import DAMAGE
-from warp_mca.watch.advice import warn
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact

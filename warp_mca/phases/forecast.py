@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import warp as wp
 
+from warp_mca.base.log import LOGGER
 from warp_mca.base.progress import duration_words
 from warp_mca.phases.rate_groups import cost_of
-from warp_mca.watch.advice import LOGGER
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model

@@ -28,7 +28,7 @@ from warp_mca.physics.elements.cells import body_materials
 from warp_mca.rigid.placement import link_placements
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
-from warp_mca.watch.advice import mesh_warnings
+from warp_mca.watch.table import told_before
 
 Array = NDArray[np.float64]
 ByBody = dict[str, Array]
@@ -115,7 +115,7 @@ class ImpactDriver:
         )
         check_range(model, settings.precision)
         probes = locate(setup.scene, model, setup.meshes, self._places)
-        warnings = tuple(mesh_warnings(setup.scene, setup.meshes, model)) if self.count == 1 else ()
+        warnings = told_before(setup.scene, setup.meshes, model) if self.count == 1 else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
         start = setup.first if self.count == 1 else replace(setup.first, **mismatch)  # those are of the first hand-off
         return Prepared(setup.scene, setup.meshes, start, model, probes, setup.sensors, warnings), u, V

@@ -16,7 +16,7 @@ from warp_mca.phases.meshing import mesh
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.scene import Scene
-from warp_mca.watch.advice import mesh_warnings
+from warp_mca.watch.table import told_before
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Prepared:
         model: assembled.
         probes: of its paths.
         sensors: its probes and sections.
-        warnings: about its meshes, see `mesh_warnings`.
+        warnings: what is told before the run.
     """
 
     scene: Scene
@@ -85,4 +85,4 @@ def prepare(
     probes = locate(scene, model, meshes, found)
     clock.lap("mesh")
     sensors = locate_sensors(scene, meshes)
-    return Prepared(scene, meshes, start, model, probes, sensors, tuple(mesh_warnings(scene, meshes, model)))
+    return Prepared(scene, meshes, start, model, probes, sensors, told_before(scene, meshes, model))

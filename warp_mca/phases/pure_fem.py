@@ -15,6 +15,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from warp_mca.base.errors import GuardError, bad_value
+from warp_mca.base.log import warn
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.phases.arguments import Progress
@@ -30,7 +31,6 @@ from warp_mca.scene import Scene
 from warp_mca.step.records import SceneRecords
 from warp_mca.step.state_figures import joint_impulses
 from warp_mca.step.steps import Steps
-from warp_mca.watch.advice import warn
 
 SWING_INTERVAL = 1e-4  # between rows of the swing [s]
 BLOCK = 10  # rows of the swing, or 1 ms: what is done again when something has touched in it

@@ -25,7 +25,7 @@ from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.handoff import HandOff, at_release
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.watch.advice import mesh_warnings
+from warp_mca.watch.table import told_before
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def prepare_release(
     check_range(model, settings.precision)
     probes = locate(scene, model, meshes)
     clock.lap("mesh")
-    sensors, warnings = locate_sensors(scene, meshes), tuple(mesh_warnings(scene, meshes, model))
+    sensors, warnings = locate_sensors(scene, meshes), told_before(scene, meshes, model)
     return Prepared(scene, meshes, start, model, probes, sensors, warnings), touch
 
 

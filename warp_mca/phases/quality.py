@@ -64,7 +64,7 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
     from warp_mca.phases.meshing import mesh
     from warp_mca.physics.elements.cells import nodal_masses
     from warp_mca.rigid.handoff import hand_off
-    from warp_mca.watch.advice import mesh_warnings
+    from warp_mca.watch.table import told_before
 
     meshes = mesh(scene, given=meshes)
     bodies = tuple(
@@ -88,5 +88,5 @@ def quality_table(scene: Scene, meshes: Mapping[str, Mesh]) -> Quality:
         element=element,
         at=(x, y, z),
         contact_share=model.stable.contact_share,
-        warnings=tuple(mesh_warnings(scene, meshes, model)),
+        warnings=told_before(scene, meshes, model),
     )

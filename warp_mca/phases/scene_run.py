@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.phases.history_rows import contact_histories, history_columns
 from warp_mca.phases.rate_groups import rate_figures
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.results.contact_history import contact_names, contact_warnings
+from warp_mca.results.contact_history import ContactHistory, contact_names
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.results.sensor_history import sensor_figures, sensor_histories
@@ -26,19 +26,14 @@ from warp_mca.step.state_figures import (
     max_speed,
     rigid_bodies,
 )
-from warp_mca.watch.bending import bending_warnings, samples_of, seen
+from warp_mca.watch.bending import samples_of, seen
 from warp_mca.watch.bent_cells import Cells
-from warp_mca.watch.contact_warnings import resolution_warnings, symmetry_of
-from warp_mca.watch.creep_warnings import creep_warnings
-from warp_mca.watch.element_warnings import element_warnings
-from warp_mca.watch.flutter_warnings import flutter_warnings
-from warp_mca.watch.inertia_warnings import inertia_warnings
+from warp_mca.watch.energy import peak_losses, spring_shares
 from warp_mca.watch.ledger import Ledger
-from warp_mca.watch.mass_report import body_report, mass_report, mass_warnings
+from warp_mca.watch.mass_report import body_report, mass_report
 from warp_mca.watch.passing import Watch
-from warp_mca.watch.ring_warnings import ring_warnings
-from warp_mca.watch.spring_share import peak_losses, soft_springs, spring_shares
-from warp_mca.watch.start_warnings import start_warnings
+from warp_mca.watch.row import Finished
+from warp_mca.watch.table import told_at_the_end
 
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
@@ -130,11 +125,6 @@ class SceneRun:
         x = self.ready.model.X[self.watch.nodes] + u
         kept.passed, kept.apart = self.watch.look(x, speed, pressed, steps * self.solver.dt, kept.passed)
 
-    def _displacements(self) -> Array:
-        """Of the scene's nodes [m], shape (node_count, 3), float64."""
-        first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        return np.asarray(self.state.u.numpy(), dtype=np.float64)[first:end]
-
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
@@ -155,12 +145,7 @@ class SceneRun:
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
-        model = self.ready.model
-        told = [*contact_warnings(contacts, model.contact_axes, symmetry_of(model)), *flutter_warnings(history, model)]
-        told += ring_warnings(self.ready, contacts, self.steps.interval)
-        told += creep_warnings(self.ledger, model, names, self._displacements())
-        passed = self.watch.said(self.ledger.kept.passed, origin)
-        warnings = (*self._warnings(shares, stopped), *passed, *told, *said)
+        warnings = (*self._told(history, contacts, shares, stopped is not None, origin), *said)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
         return Result(summary, history, None, warnings, paths, stopped, **own)
 
@@ -248,45 +233,34 @@ class SceneRun:
             "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _warnings(self, shares: Mapping[str, float | None], stopped: str | None) -> list[str]:
-        scene, start, ledger = self.ready.scene, self.ready.start, self.ledger
-        found = element_warnings(scene, self.ready.model, ledger, self.state.steps)
-        if stopped is None:
-            u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
-            nodes = slice(*self.solver.layout.nodes[self.index : self.index + 2])
-            found += inertia_warnings(self.ready, u[nodes], v[nodes])
-            kept, bent = ledger.kept, self.bent(u)
-            found += bending_warnings(self.ready.model, bent, kept.exchanged, kept.energy_scale, kept.touched)
-        tolerance = scene.impact.energy_tolerance
-        if ledger.exchanges and ledger.exchange_error > tolerance >= ledger.kept.energy_error:
-            found.append(
-                f"energy imbalance is {ledger.kept.imbalance:.3g} J: {ledger.exchange_error:.3g} of the "
-                f"{ledger.kept.exchanged:.3g} J that the bodies exchanged, {ledger.kept.energy_error:.2g} of all that "
-                f"they have, where energy_tolerance is {tolerance:g}: {ledger.remedy}, or take what they exchange as "
-                "no more exact than that"
-            )
-        if ledger.kept.made > tolerance:
-            found.append(
-                f"contact springs made or took up to {ledger.kept.made:.2%} of all energy as they closed and opened "
-                f"within steps, more than energy_tolerance = {tolerance:g}, and the bodies have as much more or less: "
-                f"{ledger.remedy}"
-            )
-        if ledger.kept.turned:
-            found.append(
-                "nodes that a master pressed went over to a face of it around a sharp edge, where single nodes do not "
-                "tell which side is meant: make a contact of each of its sides, or finer meshes, and compare"
-            )
-        depths = [stage.depths(self.state, self.index) for stage in self.solver.contacts]
-        found += soft_springs(shares, scene.contacts)
-        found += resolution_warnings(scene.contacts, self.ready.model, ledger, depths, scene.rigid_names)
-        kinetic, time = ledger.kept.initial_kinetic, self.steps.dt * self.state.steps
-        found += start_warnings(scene, self.ready.meshes, self.ready.model, kinetic, time)
-        found += self.ready.warnings
-        # the mass of the cells was asked for: said with the results, not before each run
-        found += mass_warnings([body for body in scene.bodies if not body.exact_mass], self.ready.meshes)
-        if scene.rigid and scene.rigid.inertia == "slender" and start.energy_mismatch > 0.0:
-            found.append(
-                f"the rigid phase took slender rods: momentum changes by {start.momentum_mismatch:.1%} and kinetic "
-                f"energy by {start.energy_mismatch:.1%} at hand-off; rigid_inertia=mesh keeps both"
-            )
-        return found
+    def _told(
+        self,
+        history: Mapping[str, Array],
+        contacts: Sequence[ContactHistory],
+        shares: Mapping[str, float | None],
+        stopped: bool,
+        origin: float,
+    ) -> tuple[str, ...]:
+        """What the run says of itself; arguments as in `Finished`."""
+        u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
+        nodes = slice(*self.solver.layout.nodes[self.index : self.index + 2])
+        finished = Finished(
+            scene=self.ready.scene,
+            meshes=self.ready.meshes,
+            model=self.ready.model,
+            start=self.ready.start,
+            ledger=self.ledger,
+            steps=self.steps,
+            steps_taken=self.state.steps,
+            u=u[nodes],
+            v=v[nodes],
+            depths=[stage.depths(self.state, self.index) for stage in self.solver.contacts],
+            bent=self.ledger.kept.stiffened if stopped else self.bent(u),
+            history=history,
+            contacts=contacts,
+            shares=shares,
+            watch=self.watch,
+            stopped=stopped,
+            origin=origin,
+        )
+        return told_at_the_end(finished, self.ready.warnings)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import RequestError
+from warp_mca.base.log import warn
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.paths import Found
 from warp_mca.model.precision import check_range
@@ -20,7 +21,6 @@ from warp_mca.phases.settings import Settings
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene
-from warp_mca.watch.advice import warn
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.results.force_history import FIRM, GRAZING, contact_intervals, grazing_share, unfinished
+from warp_mca.results.force_history import contact_intervals, unfinished
 from warp_mca.results.npz import load_histories, save_histories
 from warp_mca.scene import Contact, RigidPlane
 
@@ -25,10 +24,6 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
     "normal_force_N": "normal_force",
     "closing_speed": "closing_speed",
 }
-LIGHT = 0.05  # of its greatest force: a contact nearly opens below it, between forces above FIRM
-OFF_AXIS = 10.0  # degrees between the normal of a contact and the axis of F_n, above which a run warns
-ACROSS = 0.02  # of the normal impulse, above which friction across the axis of F_t is worth a word
-ALONG = 0.99  # cosine from which on an axis is taken as that of a plane of symmetry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,96 +109,6 @@ def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
             taken.add(name)
         names.append(name)
     return tuple(names)
-
-
-def contact_warnings(
-    contacts: Sequence[ContactHistory], axes: Array, symmetry: Mapping[int, Array] | None = None
-) -> list[str]:
-    """Warnings about contacts: none touched, some did not end, nearly opened or grazed, normals are off the axes.
-
-    Args:
-        contacts: of the scene.
-        axes: as `Model.contact_axes`.
-        symmetry: normals of planes that contacts lie in [-], by contact, shape (plane_count, 3): forces along these are
-            cancelled by what lies beyond.
-    """
-    found: list[str] = []
-    if contacts and not any(contact.touched for contact in contacts):
-        found.append("no contact closed in the simulated time: give a longer duration, or check positions and speeds")
-    if names := [contact.name for contact in contacts if contact.unfinished]:
-        which = f"contact {names[0]} was" if len(names) == 1 else f"contacts {', '.join(names)} were"
-        found.append(
-            f"{which} still in progress when the run ended: impulse, duration and peaks are those so far; give a "
-            "longer duration if it should end"
-        )
-    for k, (contact, (normal, tangent)) in enumerate(zip(contacts, axes, strict=True)):
-        cancelled = (symmetry or {}).get(k, np.zeros((0, 3)))
-        found += _nearly_opens(contact)
-        found += _grazes(contact)
-        if contact.normal is not None:
-            off = _off_axis(contact.name, contact.normal, normal, tangent)
-            found += off or _across(contact, contact.normal, tangent, cancelled)
-    return found
-
-
-def _nearly_opens(contact: ContactHistory) -> list[str]:
-    """A warning where a contact hardly presses between two compressions: another mesh may open it there."""
-    share = contact.pressure / max(float(contact.pressure.max(initial=0.0)), 1e-300)
-    firm, light = np.flatnonzero(share > FIRM), np.flatnonzero(share <= LIGHT)
-    before = np.searchsorted(firm, light)  # firm rows before each light one: 0 and all are no dips
-    dips = [float(share[light[before == k]].min()) for k in np.unique(before) if 0 < k < len(firm)]
-    if not any(least := [dip for dip in dips if dip > 0.0]):
-        return []
-    return [
-        f"contact {contact.name} nearly opened between two compressions, with {min(least):.1%} of its greatest force: "
-        "whether it opens there may depend on the mesh, and with it duration and impulse; compare with a finer one"
-    ]
-
-
-def _grazes(contact: ContactHistory) -> list[str]:
-    """A warning where surfaces touch again and hardly press: whether they do, and how long, is the mesh's."""
-    if not (share := grazing_share(contact.pressure)):
-        return []
-    return [
-        f"for {share:.0%} of its time, contact {contact.name} has less than {GRAZING:.0%} of its greatest force in "
-        "touches of their own: whether these occur, and how long they last, depends on the mesh, and contact_duration "
-        "counts them; contacts in summary.json has each"
-    ]
-
-
-def _off_axis(name: str, true: Array, normal: Array, tangent: Array) -> list[str]:
-    """A warning where the `true` normal of a contact is off its axes [-], each shape (3,); `normal` may be 0."""
-    if normal.any():
-        column, axis, angle = "F_n_N", normal, math.degrees(math.acos(np.clip(true @ normal, -1.0, 1.0)))
-    else:  # normal forces add up as they are; tangential force must not hold some of them
-        column, axis, angle = "F_t_N", tangent, math.degrees(math.asin(min(abs(true @ tangent), 1.0)))
-    if angle <= OFF_AXIS:
-        return []
-    seen, along = (", ".join(f"{x:.3g}" for x in vector) for vector in (true, axis))
-    off = f"{angle:.0f} degrees off the axis ({along}) of" if normal.any() else f"not across the axis ({along}) of"
-    return [
-        f"contact {name}: its normal force is along ({seen}), {off} {column}; set Contact.normal and tangent, or read "
-        "the force vectors in forces.npz"
-    ]
-
-
-def _across(contact: ContactHistory, normal: Array, tangent: Array, cancelled: Array) -> list[str]:
-    """A warning where friction acts across the tangent rather than along it; axes [-], each shape (3,).
-
-    Not where it is `cancelled`, see `contact_warnings`.
-    """
-    side = np.cross(normal, tangent)
-    if (np.abs(cancelled @ side) > ALONG).any():
-        return []
-    along, across = np.abs(contact.force @ tangent).sum(), np.abs(contact.force @ side).sum()
-    across -= np.abs(contact.normal_force @ side).sum()  # what pressure on a curved surface has there
-    if across <= max(along, ACROSS * contact.pressure.sum()):
-        return []
-    seen, axis = (", ".join(f"{x:.3g}" for x in vector + 0.0) for vector in (side, tangent))
-    return [
-        f"contact {contact.name}: its friction is along ({seen}), across the axis ({axis}) of F_t_N; set "
-        "Contact.tangent, or read the force vectors in forces.npz"
-    ]
 
 
 def save_contacts(file: Path, time: Array, contacts: Sequence[ContactHistory]) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from warp_mca.base.errors import GuardError, McaError
+from warp_mca.base.log import LOGGER
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.simulation import run
 from warp_mca.results.result import Result
@@ -24,7 +25,6 @@ from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.step.device import answers
 from warp_mca.studies.batch import run_batch
 from warp_mca.studies.sweep_plan import RunOptions, one_line, plain
-from warp_mca.watch.advice import LOGGER
 
 Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
 

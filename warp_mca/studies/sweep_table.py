@@ -13,13 +13,13 @@ from typing import IO, Any
 
 from warp_mca.base.errors import LONGEST, McaError, bad_value
 from warp_mca.base.files import write_atomically
+from warp_mca.base.log import warn
 from warp_mca.base.validate import MAX_COUNT
 from warp_mca.results.storage import ALL_FILES
 from warp_mca.studies.sweep_columns import stored_row
 from warp_mca.studies.sweep_job import FAILED, Row
 from warp_mca.studies.sweep_lines import header_of, line_of, read_lines
 from warp_mca.studies.sweep_plan import run_name
-from warp_mca.watch.advice import warn
 
 CSV, PARQUET, IDENTITY = "sweep.csv", "sweep.parquet", "sweep.json"
 PARQUET_INTERVAL = 5.0  # at least so long between two versions of the Parquet table while runs go on [s]

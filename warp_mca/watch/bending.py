@@ -7,7 +7,7 @@ its shape and that of a cell that bends right. Under given loads, deflections ar
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +16,18 @@ from warp_mca.geometry.cell_types import HEXAHEDRON, WEDGE
 from warp_mca.geometry.degenerate import cell_names
 from warp_mca.watch import bent_hexahedra, strain_jumps
 from warp_mca.watch.bent_cells import BENT, COLUMNS, FLOW, FLOWING, MISSED, RIGHT, SPENT, Cells
+from warp_mca.watch.row import Array, Finished, Values, When, row
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Block
     from warp_mca.model.model import Model
 
-Array = NDArray[np.float64]
-
-# Error of deflections, and of the plastic moment, from which on a word is said. Of two bodies that strike, forces and
-# times go with the root of the stiffness at most; strains of wedges and tet4 jump where they are not bent, too.
-ERROR, STRUCK, JUMPING, PLASTIC = 0.03, 0.2, 0.08, 0.1
+# Error of deflections from which on a word is said. Of two bodies that strike, forces and times go with the root of the
+# stiffness at most; strains of wedges and tet4 jump where they are not bent, too.
+ERROR, STRUCK, JUMPING = 0.03, 0.2, 0.08
 SINGLE = (
     0.08  # of strain energy in bending of single cells: three layers; less comes of squeezed rubber, which is right
 )
-MISSING = 0.02  # share of strain energy in bending stresses beyond yield that do not yield, likewise
 # Cells of a body up to which all are looked at, and how many, evenly spread, of more: where strain jumps those around
 # them count, too, and all of 80,000 take 0.2 s.
 WHOLE, SAMPLE = {False: 1024, True: 16_384}, {False: 1024, True: 256}
@@ -124,69 +122,95 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
     return np.where(more, found, before)
 
 
-def bending_warnings(model: Model, bent: Array, exchanged: float, energy: float, struck: bool = False) -> Iterator[str]:
-    """A sentence for each body whose cells do not bend right.
-
-    Args:
-        model: of the scene alone.
-        bent: energies of its bodies, as `SceneRecords.stiffened` has them; empty without cells that can be so.
-        exchanged: energy that bodies exchanged [J].
-        energy: greatest of all energy that there was [J].
-        struck: whether bodies touched.
-    """
-    for name, sums in zip(model.element_start, bent, strict=False):
-        if sums[SPENT] > max(LEAST * exchanged, FREE * energy) and (found := _said(model, name, sums, struck)):
-            yield found
-
-
-def _said(model: Model, name: str, sums: Array, struck: bool) -> str:
-    """What cells do to the bending of the body with these `sums`; empty where that is right."""
-    elements, wedge, yields = _kinds(model, name)
-    error = sums[RIGHT] / sums[SPENT] - 1.0
-    limit = STRUCK if struck else JUMPING if wedge or "tet4" in elements else ERROR
-    found = []
-    if -error > limit or (error > limit and sums[BENT] > SINGLE * sums[SPENT]):
-        flexible = "flexible in bending, its deflections" if error > 0.0 else "stiff in bending, its deflections"
-        jumps = "in jumps of strain between cells" if wedge or "tet4" in elements else ""
-        single = "in bending of single cells" if elements != {"tet4"} else ""
-        found.append(
-            f"{' and '.join(sorted(elements))} makes {name} too {flexible} about {abs(error):.0%} too "
-            f"{'large' if error > 0.0 else 'small'}: {sums[BENT] / sums[SPENT]:.0%} of the strain energy of {name} lay "
-            f"{' and '.join(filter(None, (single, jumps)))} when it was greatest"
-        )
-    flow = sums[FLOWING] / sums[FLOW] if sums[FLOW] > 0.0 else 1.0
-    if abs(flow - 1.0) > (STRUCK if struck else PLASTIC):
-        found.append(
-            f"cells of {name} yield too {'early' if flow < 1.0 else 'late'} in bending, at about {flow:.2f} times the "
-            "plastic moment"
-        )
-    if sums[MISSED] > MISSING * sums[SPENT]:
-        found.append(
-            f"hex8r does not let {name} yield where bending of single cells alone exceeds the yield stress: "
-            "deflections and plastic work are too small"
-        )
-    return f"{'; '.join(found)}; {_remedy(elements, wedge, yields)}" if found else ""
+@row(
+    "{elements} makes {body} too {which} in bending, its deflections about {error:.0%} too {small}: {bent:.0%} of the "
+    "strain energy of {body} lay {where} when it was greatest;",
+    "{remedy}",
+    ERROR,
+    f"of deflections at most; {JUMPING:g} where strain jumps between cells, {STRUCK:g} where bodies struck",
+    when=When.LOOKS,
+)
+def bending(c: Finished, most: float) -> Iterator[Values]:
+    """Strain energy of cells that bend right over that of the body's cells, when this was greatest."""
+    for body, sums, kinds in _bodies(c):
+        error = sums[RIGHT] / sums[SPENT] - 1.0
+        limit = STRUCK if c.ledger.kept.touched else JUMPING if kinds.jump else most
+        if -error > limit or (error > limit and sums[BENT] > SINGLE * sums[SPENT]):
+            single = "in bending of single cells" if kinds.elements != {"tet4"} else ""
+            where = " and ".join(filter(None, (single, "in jumps of strain between cells" if kinds.jump else "")))
+            yield dict(
+                elements=" and ".join(sorted(kinds.elements)), body=body, error=abs(error), where=where,
+                which="flexible" if error > 0.0 else "stiff", small="large" if error > 0.0 else "small",
+                bent=sums[BENT] / sums[SPENT], remedy=kinds.remedy,
+            )  # fmt: skip
 
 
-def _remedy(elements: set[str], wedge: bool, yields: bool) -> str:
-    """What makes a body of such cells bend right: hex8r only where nothing yields."""
-    layers = "four or more cells over the thickness, no longer than deep"
-    if wedge or "tet4" in elements:
-        return f"choose smaller cells, or hexahedra, {layers if yields else 'with hex8r'}"
-    return f"take {layers}" if yields else f"choose hex8r, or {layers}"
+@row(
+    "cells of {body} yield too {early} in bending, at about {flow:.2f} times the plastic moment;",
+    "{remedy}",
+    0.1,
+    f"of the plastic moment at most, above or below; {STRUCK:g} where bodies struck",
+    when=When.LOOKS,
+)
+def bending_flow(c: Finished, most: float) -> Iterator[Values]:
+    """Equivalent strain of cells that yield in bending over that of cells that bend right."""
+    for body, sums, kinds in _bodies(c):
+        flow = sums[FLOWING] / sums[FLOW] if sums[FLOW] > 0.0 else 1.0
+        if abs(flow - 1.0) > (STRUCK if c.ledger.kept.touched else most):
+            yield dict(body=body, early="early" if flow < 1.0 else "late", flow=flow, remedy=kinds.remedy)
 
 
-def _kinds(model: Model, name: str) -> tuple[set[str], bool, bool]:
-    """Elements of a body, whether some are wedges, and whether its material can yield."""
-    elements, wedge, yields = set(), False, False
+@row(
+    "hex8r does not let {body} yield where bending of single cells alone exceeds the yield stress: deflections and "
+    "plastic work are too small;",
+    "{remedy}",
+    0.02,
+    "of the strain energy at most",
+    when=When.LOOKS,
+)
+def bending_without_flow(c: Finished, most: float) -> Iterator[Values]:
+    """Energy of bending stresses beyond yield that do not yield."""
+    for body, sums, kinds in _bodies(c):
+        if sums[MISSED] > most * sums[SPENT]:
+            yield dict(body=body, remedy=kinds.remedy)
+
+
+class Kinds(NamedTuple):
+    """Elements of a body, whether strain jumps between some of its cells, and whether its material can yield."""
+
+    elements: set[str]
+    jump: bool
+    yields: bool
+
+    @property
+    def remedy(self) -> str:
+        """What makes a body of such cells bend right: hex8r only where nothing yields."""
+        layers = "four or more cells over the thickness, no longer than deep"
+        if self.jump:
+            return f"choose smaller cells, or hexahedra, {layers if self.yields else 'with hex8r'}"
+        return f"take {layers}" if self.yields else f"choose hex8r, or {layers}"
+
+
+def _bodies(c: Finished) -> Iterator[tuple[str, Array, Kinds]]:
+    """Bodies with strain energy that tells something: names, energies, and what they are made of."""
+    if c.stopped:
+        return
+    kept = c.ledger.kept
+    for name, sums in zip(c.model.element_start, c.bent, strict=False):  # empty without cells that are looked at
+        if sums[SPENT] > max(LEAST * kept.exchanged, FREE * kept.energy_scale):
+            yield name, sums, _kinds(c.model, name)
+
+
+def _kinds(model: Model, name: str) -> Kinds:
+    elements, jump, yields = set(), False, False
     number = list(model.element_start).index(name)
     for block in model.blocks:
         own = _body_of(model, block) == number
         if own.any():
             elements.add(block.element)
-            wedge = wedge or bool(_wedges(block)[own].any())
+            jump = jump or block.element == "tet4" or bool(_wedges(block)[own].any())
             yields = yields or block.plastic
-    return elements, wedge, yields
+    return Kinds(elements, jump, yields)
 
 
 def _body_of(model: Model, block: Block) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""Owns the energy balance of a run and the guards that stop it, from the records that the device summed."""
+"""Owns the energy balance of a run, from the records that the device summed, and has its guards look at these."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import (
     ABSORBED,
     BEYOND_WORK,
@@ -37,7 +36,8 @@ from warp_mca.kernels.records.columns import (
     column_count,
 )
 from warp_mca.step.records import SceneRecords
-from warp_mca.watch.ledger_scales import rounding, spin
+from warp_mca.watch.guards import Reading, stop
+from warp_mca.watch.row import When
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -52,15 +52,6 @@ MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not c
 MIN_FREE_EXCHANGE = 1e-4  # the same without contact: what turns on joints in `mixed` gains 5e-6 by rounding in 6 ms
 SLIDING = 0.1  # share of the external work that friction takes, from which on a stop says that nodes slide
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
-
-_FLAGS = (
-    "contact lists overflowed: more than 32 faces near a node, or more nodes near a face than its list holds; mesh "
-    "both sides more alike, or choose a smaller output_interval if they are fast",
-    "a node outran the contact search; choose a smaller output_interval, or, where no body is so fast, other cells "
-    "under the contact, since these have given way",
-    "a node sank deeper than half a face into what it touches; raise penalty, refine the mesh, or, if penalty is high, "
-    "lower time_step_scale",
-)
 
 
 class Ledger:
@@ -82,10 +73,10 @@ class Ledger:
         self.kept, self.framed = kept, framed
         if not len(kept.peaks):
             kept.peaks = np.zeros((len(model.passes), 2))
-        self.spin = spin(model)
+        self.spin = _spin(model)
         given = any(item.penalty_given for item in model.passes)
         self.most_made = 0.0 if given or tolerance < USUAL else MOST_MADE * tolerance
-        self.rounding = rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
+        self.rounding = _rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
 
     @property
     def contact_dt(self) -> float:
@@ -111,10 +102,7 @@ class Ledger:
         sums, velocity = self._sums(records["partial"][:written]), records["point_velocity"][:written]
         *flags, turned = records["flag"]
         self.kept.turned = bool(turned)
-        for raised, message in zip(flags, _FLAGS, strict=True):  # these explain what the sums would show
-            if raised:
-                end = self.steps.time(self.kept.records + written)
-                raise GuardError(f"stopped before t = {end:.4g} s: {message}")
+        stop(When.FLAGS, Reading(ledger=self, flags=flags, time=self.time(written)))  # explain what sums would show
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
         share, unexplained, made, scale = self._balance(sums[:good])
@@ -130,23 +118,13 @@ class Ledger:
         self.kept.min_jacobian = min(self.kept.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
         self.kept.energy_error = max(self.kept.energy_error, float(share[:end].max(initial=0.0)))
         self.kept.made = max(self.kept.made, float(made[:end].max(initial=0.0)))
-        last, t = (self.steps.time(self.kept.records + k) for k in (-1, 0))
-        if over.any():
-            raise GuardError(
-                f"energy imbalance {100.0 * share[end - 1]:.3g}% at t = {last:.4g} s exceeds energy_tolerance = "
-                f"{self.tolerance:g} of {scale[end - 1]:.3g} J, initial energy and external work so far"
-                f"{self._cause(sums[end - 1], unexplained[end - 1])}: {self.remedy}, or raise the tolerance if that "
-                f"much is acceptable"
-            )
-        if good < written and not np.isfinite(sums[good]).all():
-            if not self.kept.records:
-                raise GuardError(
-                    "energy is not a number at t = 0, before the first step: speeds, sizes or moduli exceed the range "
-                    f"of numbers; check their units{', or choose float64' if self.precision == 'mixed' else ''}"
-                )
-            raise GuardError(f"energy is not a number at t = {t:.4g} s: the step was unstable; lower time_step_scale")
-        if good < written:
-            raise GuardError(f"an element turned inside out before t = {t:.4g} s; refine the mesh or lower the load")
+        balance = (float(share[end - 1]), float(unexplained[end - 1]), float(scale[end - 1])) if over.any() else None
+        latest = sums[end - 1] if balance else sums[good] if good < written else None
+        stop(When.RECORDS, Reading(ledger=self, flags=(), time=self.time(), sums=latest, balance=balance))
+
+    def time(self, later: int = 0) -> float:
+        """Of the next record, or so many `later` [s]."""
+        return self.steps.time(self.kept.records + later)
 
     def rows(self, written: int) -> NDArray[np.int_]:
         """Which of the next `written` records are rows of the history."""
@@ -195,7 +173,7 @@ class Ledger:
         """Energy that contact springs made as they closed and opened within steps [J], of each row of sums."""
         return self.springs(sums)[..., MADE].sum(axis=-1) - self.kept.initial_made
 
-    def _cause(self, sums: Array, unexplained: float) -> str:
+    def cause(self, sums: Array, unexplained: float) -> str:
         """What a record's imbalance comes from, where contact explains it."""
         if unexplained > self.tolerance:
             return ""
@@ -247,7 +225,7 @@ class Ledger:
             found += " or a contact's penalty"
         if self.model.rates:
             found += ", take fewer groups in multi_rate"
-        turned = self.spin * self.steps.time(self.kept.records)
+        turned = self.spin * self.time()
         if self.precision == "mixed" and turned > TURNED and not self.framed:
             found += ", choose --precision float64 for bodies that turn so far"
         return found
@@ -298,3 +276,22 @@ class Ledger:
     def table(self, first: int = 0) -> Array:
         """Columns of each row of the history from row `first` on, shape (row_count, column_count), float64."""
         return np.array(self.kept.sums[first:]).reshape(-1, self._width)
+
+
+def _spin(model: Model) -> float:
+    """Greatest angular speed of a body at the start, from the velocities of its nodes about their mean [rad/s]."""
+    greatest = 0.0
+    first = sorted(model.node_start.values())
+    for begin, end in zip(first, [*first[1:], model.node_count], strict=True):
+        share = model.mass[begin:end, None] / model.mass[begin:end].sum()
+        with np.errstate(over="ignore", invalid="ignore"):
+            arm, velocity = (x - (share * x).sum(axis=0) for x in (model.X[begin:end], model.V[begin:end]))
+            rate = np.sqrt((share * velocity**2).sum() / (share * arm**2).sum())
+        greatest = max(greatest, float(rate)) if np.isfinite(rate) else greatest
+    return greatest
+
+
+def _rounding(model: Model, dt: float) -> float:
+    """Energy of all bodies that move by four times the rounding of positions in a step [J]: no balance is finer."""
+    speed = 4.0 * float(np.spacing(np.abs(model.X).max())) / dt
+    return 0.5 * float(model.mass.sum()) * speed * speed

@@ -1,4 +1,4 @@
-"""Owns what a run says of masses: those of bodies, how far meshes miss them, and what mass scaling added."""
+"""Owns the masses in the summary of a run: those of bodies, how far meshes miss them, and what mass scaling added."""
 
 from __future__ import annotations
 
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from warp_mca.scene import Body, Scene
 
 
-COARSE = 0.02  # error of a mesh's mass from which on a word is said: forces and stiffness are off by as much
-
-
 def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str, dict[str, float | None]]:
     """Mass [kg] of each body, without what mass scaling adds, and error [-] of the mass of its cells, by its name.
 
@@ -35,24 +32,6 @@ def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str,
         cells, shape = (mass / ratio, mass) if body.exact_mass else (mass, mass * ratio)
         error = float(cells.sum() / shape.sum()) - 1.0 if len(mesh.volume_ratio) else None
         found[body.name] = {"mass": float(mass.sum()), "mass_error": error}
-    return found
-
-
-def mass_warnings(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> list[str]:
-    """One sentence for each body whose cells have 2 % less or more mass than its shape."""
-    found = []
-    coarse = [body for body in bodies if (np.abs(1.0 / meshes[body.name].volume_ratio - 1.0) > COARSE).any()]
-    for body in coarse:
-        error = body_report([body], meshes)[body.name]["mass_error"]
-        if error is not None and abs(error) > COARSE:
-            what = "the body has that mass"
-            if body.exact_mass:
-                what = "its mass is scaled to that of the shape, but its sections and stiffness are not"
-            share = f"{abs(error):.1%} {'less' if error < 0.0 else 'more'}"
-            found.append(
-                f"the cells of body {body.name} have {share} mass than its shape, because they are flat where it is "
-                f"round; {what}: refine its mesh, as with --refine 2"
-            )
     return found
 
 

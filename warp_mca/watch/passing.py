@@ -8,18 +8,17 @@ look decides when the next one is due, so that nothing passes the thinnest part 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
 from warp_mca.scene import Scene
-from warp_mca.watch.passing_cases import Look, WithinBody, cases_of
+from warp_mca.watch.passing_cases import BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
+from warp_mca.watch.row import Array, Finished, Values, When, row
 from warp_mca.watch.skins import Skin
-
-Array = NDArray[np.float64]
 
 PRESSED = 2.0  # times the depth of a contact's springs, up to which skins cross by the contact's own doing
 MEANT = 1.25  # times the overlap at the start, up to which it is meant
@@ -64,22 +63,22 @@ class Watch:
             skin.move(own)
         look = Look(self._skins)
         passed = passed.copy() if len(passed) else self._start(look)
-        for case, row in zip(self.cases, passed, strict=True):
+        for case, kept in zip(self.cases, passed, strict=True):
             allowed = case.slack + PRESSED * max((pressed[k] for k in case.passes), default=0.0)
             depth, at = case.found(look, allowed)
-            if depth > allowed + MEANT * row[START]:
-                row[TIME] = row[TIME] if row[DEPTH] else time
-                if depth > row[DEPTH]:
-                    row[DEPTH], row[PLACE] = depth, at
+            if depth > allowed + MEANT * kept[START]:
+                kept[TIME] = kept[TIME] if kept[DEPTH] else time
+                if depth > kept[DEPTH]:
+                    kept[DEPTH], kept[PLACE] = depth, at
         return passed, self._steps(min(case.room(look) for case in self.cases), speed)
 
     def _start(self, look: Look) -> Array:
         """Rows with the overlap at the start."""
         rows = np.zeros((len(self.cases), START + 1))
-        for case, row in zip(self.cases, rows, strict=True):
-            row[START] = case.found(look, 0.0)[0]
-            if isinstance(case, WithinBody) and not row[START] and case.holds(look):
-                row[START] = np.inf
+        for case, kept in zip(self.cases, rows, strict=True):
+            kept[START] = case.found(look, 0.0)[0]
+            if isinstance(case, WithinBody) and not kept[START] and case.holds(look):
+                kept[START] = np.inf
         return rows
 
     def _steps(self, room: float, speed: float) -> int:
@@ -89,13 +88,36 @@ class Watch:
         steps = room / fastest / self._dt if 0.0 < fastest < math.inf else math.inf
         return int(max(CLOSEST, min(self._most, steps)))
 
-    def said(self, passed: Array, origin: float = 0.0) -> list[str]:
-        """A sentence for each case that was seen; times count from `origin` [s]."""
-        found = []
-        for case, row in zip(self.cases, passed, strict=False):
-            if row[DEPTH]:
-                digits = 1 - math.floor(math.log10(row[DEPTH]))  # place to a tenth of the depth or finer
-                at = ", ".join(f"{round(x, digits) + 0.0:g}" for x in row[PLACE].tolist())
-                seen = f"from t = {row[TIME] - origin:.3g} s on, up to {row[DEPTH]:.2g} m deep at ({at}) m"
-                found.append(f"{case.sentence} {seen}: {case.remedy}")
-        return found
+
+looked = partial(
+    row, unit="as deep at most as springs, flat faces and an overlap at the start explain", when=When.LOOKS
+)
+
+
+@looked("nodes of {one} that are not in its contact's surface went below the rigid plane {seen}:", "{remedy}")
+def below_a_plane(c: Finished, _: float) -> Iterator[Values]:
+    """Depth of nodes below a rigid plane that others of their body are in contact with."""
+    return _seen(c, BelowPlane)
+
+
+@looked("{one} and {other} went into each other {seen}:", "{remedy}")
+def bodies_in_each_other(c: Finished, _: float) -> Iterator[Values]:
+    """How deep skins of two bodies cross."""
+    return _seen(c, WithinBody)
+
+
+@looked("parts of {one} went through each other {seen}:", "{remedy}")
+def body_in_itself(c: Finished, _: float) -> Iterator[Values]:
+    """How deep the skin of a body crosses itself."""
+    return _seen(c, WithinItself)
+
+
+def _seen(c: Finished, kind: type[Case]) -> Iterator[Values]:
+    """Cases of a kind that were seen, by their bodies, with time, depth and place."""
+    for case, told in zip(c.watch.cases, c.ledger.kept.passed, strict=False):
+        if isinstance(case, kind) and told[DEPTH]:
+            digits = 1 - math.floor(math.log10(told[DEPTH]))  # place to a tenth of the depth or finer
+            at = ", ".join(f"{round(x, digits) + 0.0:g}" for x in told[PLACE].tolist())
+            seen = f"from t = {told[TIME] - c.origin:.3g} s on, up to {told[DEPTH]:.2g} m deep at ({at}) m"
+            one, *other = case.names
+            yield dict(one=one, other="".join(other), seen=seen, remedy=case.remedy)

@@ -26,6 +26,7 @@ SLENDER = 8.0  # lengths over thickness from which on a body without gaps may me
 ROOM = 1.5  # times the reach of the place where bound bodies meet at the start: there they may overlap
 
 APART = "no contact keeps them out there; take all of the surface, such as nodes='boundary', in a Contact"
+PARTS = "no contact keeps them apart; make bodies of them, welded where they hang together"
 BETWEEN = (
     "contact keeps only nodes of a slave out of its master, and edges pass between them; let nodes lie closer where "
     "the bodies meet, and set two_way"
@@ -94,9 +95,9 @@ class BelowPlane:
         return np.where(self.kept_out, np.inf, height)
 
     @property
-    def sentence(self) -> str:
-        """What a warning says of them, before time, depth and place."""
-        return f"nodes of {self.skin.name} that are not in its contact's surface went below the rigid plane"
+    def names(self) -> tuple[str, ...]:
+        """The body."""
+        return (self.skin.name,)
 
     remedy = APART
 
@@ -137,9 +138,9 @@ class WithinBody:
         return False
 
     @property
-    def sentence(self) -> str:
-        """What a warning says of them, before time, depth and place."""
-        return f"{self.pair.one.name} and {self.pair.other.name} went into each other"
+    def names(self) -> tuple[str, ...]:
+        """The bodies."""
+        return self.pair.one.name, self.pair.other.name
 
     @property
     def remedy(self) -> str:
@@ -173,18 +174,14 @@ class WithinItself:
         return max(SHARE * self.pair.one.thickness, 0.5 * (self.play - look.bent(self.number)))
 
     @property
-    def sentence(self) -> str:
-        """What a warning says of it, before time, depth and place."""
-        return f"parts of {self.pair.one.name} went through each other"
+    def names(self) -> tuple[str, ...]:
+        """The body."""
+        return (self.pair.one.name,)
 
     @property
     def remedy(self) -> str:
         """What helps."""
-        return (
-            BETWEEN
-            if self.passes
-            else "no contact keeps them apart; make bodies of them, welded where they hang together"
-        )
+        return BETWEEN if self.passes else PARTS
 
 
 Case = BelowPlane | WithinBody | WithinItself

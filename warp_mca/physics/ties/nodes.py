@@ -278,13 +278,3 @@ def check_ties(ties: TiedNodes, held: Mapping[str, NDArray], moved: Sequence[Ind
     bad = (fixed[ties.slave] & ~shared) != 0
     if bad.any():
         raise RequestError(f"{ties.title(bad)}: a slave node is fixed where its masters are free; fix the masters, too")
-
-
-def tie_warnings(ties: TiedNodes) -> list[str]:
-    """Ties whose slave is coarser than its master, one sentence each."""
-    return [
-        f"faces of the tied slave {fact['slave']} are {1.0 / fact['size_ratio']:.2g} times as wide as those of its "  # type: ignore[operator]
-        f"master {fact['master']}, whose nodes between them are tied to nothing: swap slave and master"
-        for fact in ties.facts
-        if fact["size_ratio"] < 1.0 - 1e-6  # type: ignore[operator]
-    ]

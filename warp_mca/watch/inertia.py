@@ -1,4 +1,4 @@
-"""Owns the warning about bodies that turn with more inertia than their shape has, as coarse meshes give.
+"""Owns the row about bodies that turn with more inertia than their shape has, as coarse meshes give.
 
 A cell's mass lies in its corners: n cells along each edge of a brick have a moment of inertia 2 / n^2 above that of
 its volume. What matters is the axis about which a body turns, and what else moves with it: in a link that turns about
@@ -7,10 +7,10 @@ a hinge at its end, three quarters of the inertia are those of its mass centre, 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.geometry.cell_types import HEXAHEDRON
@@ -20,16 +20,13 @@ from warp_mca.geometry.shape_volume import of_cells
 from warp_mca.geometry.tetrahedron import volumes as tetrahedron_volumes
 from warp_mca.model.assembly import GROUND
 from warp_mca.physics.elements.cells import densities
+from warp_mca.watch.row import Array, Finished, Values, row
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model.model import Model
-    from warp_mca.phases.prepare import Prepared
     from warp_mca.scene import Body
 
-Array = NDArray[np.float64]
-
-EXCESS = 0.02  # of a moment of inertia, from which on a word is said: periods and times are off by half of it
 TURNING = 1e-2  # energy of the rotation over that of the translation, below which inertia does not matter
 ROCKING = 1e-3  # the same over weight times size: bodies at rest rock on their contact springs
 HELD = 1e-6  # eigenvalue of what holds a body over the greatest, up to which a motion is free
@@ -58,37 +55,34 @@ class Motion(NamedTuple):
         return float(self.rate @ self.inertia @ self.rate)
 
 
-def inertia_warnings(ready: Prepared, u: Array, v: Array) -> list[str]:
-    """One sentence for each body that turns, at the start or the end, with 2 % more inertia than its shape has.
-
-    Args:
-        ready: scene, meshes and model.
-        u: displacements of its nodes [m], shape (node_count, 3). v: velocities at the end [m/s], same shape.
-    """
-    model, found = ready.model, []
-    absorbing = {item.body for item in ready.scene.absorbing}
-    for body in ready.scene.bodies:
-        if body.name in absorbing:  # stands for a part of something larger
+@row(
+    "{body} turns, and the moment of inertia of its nodes is {excess:.1%} above that of its shape, since the mass of "
+    "each cell lies in its corners:",
+    "give it more cells",
+    0.02,
+    "of it at most: periods and times are off by half of it",
+)
+def raised_inertia(c: Finished, most: float) -> Iterator[Values]:
+    """Moment of inertia of each body that turns at the start or the end; absorbing ones are parts of others."""
+    if c.stopped:
+        return
+    model, absorbing = c.model, {item.body for item in c.scene.absorbing}
+    for body in c.scene.bodies:
+        if body.name in absorbing:
             continue
-        mesh = ready.meshes[body.name]
-        own = _own(ready, body.name)
+        mesh, own = c.meshes[body.name], c.nodes(body.name)
         mass = model.mass[own]
-        begin, end = (_motion(x[own], w[own], mass) for x, w in ((model.X, model.V), (model.X + u, v)))
+        begin, end = (_motion(x[own], w[own], mass) for x, w in ((model.X, model.V), (model.X + c.u, c.v)))
         weight = float(np.linalg.norm(model.gravity[0])) * begin.mass * float(np.ptp(mesh.points, axis=0).max())
         still = max(TURNING * begin.mass * begin.velocity @ begin.velocity, ROCKING * weight)
         turns = []
-        for motion, x in ((begin, model.X), (end, model.X + u)):
-            moved = _allowed(ready, body.name, x, motion)
+        for motion, x in ((begin, model.X), (end, model.X + c.u)):
+            moved = _allowed(c, body.name, x, motion)
             if moved.rotation_energy > max(still, TURNING * motion.mass * motion.velocity @ motion.velocity):
                 turns.append((moved, x))
-        turns = [(motion, x) for motion, x in turns if _most(motion, mesh) > EXCESS]
-        if turns and (excess := max(_excess(body, mesh, model, own, *turn) for turn in turns)) > EXCESS:
-            found.append(
-                f"{'rigid ' if body.rigid else ''}body {body.name} turns, and the moment of inertia of its nodes is "
-                f"{excess:.1%} above that of its shape, since the mass of each cell lies in its corners: give it more "
-                "cells"
-            )
-    return found
+        turns = [(motion, x) for motion, x in turns if _most(motion, mesh) > most]
+        if turns and (excess := max(_excess(body, mesh, model, own, *turn) for turn in turns)) > most:
+            yield dict(body=f"{'rigid ' if body.rigid else ''}body {body.name}", excess=excess)
 
 
 def inertias(body: Body, mesh: Mesh) -> tuple[Array, Array]:
@@ -169,12 +163,6 @@ def _excess(body: Body, mesh: Mesh, model: Model, own: slice, motion: Motion, x:
     return float(axis @ (nodes - volume) @ axis / (axis @ volume @ axis + motion.mass * arm**2))
 
 
-def _own(ready: Prepared, body: str) -> slice:
-    """Nodes of a body in its model."""
-    first = ready.model.node_start[body]
-    return slice(first, first + len(ready.meshes[body].points))
-
-
 def _motion(x: Array, v: Array, mass: Array) -> Motion:
     total = float(mass.sum())
     centre, velocity = mass @ x / total, mass @ v / total
@@ -185,17 +173,17 @@ def _motion(x: Array, v: Array, mass: Array) -> Motion:
     return Motion(centre, velocity, rate, total, inertia)
 
 
-def _allowed(ready: Prepared, body: str, x: Array, motion: Motion) -> Motion:
+def _allowed(c: Finished, body: str, x: Array, motion: Motion) -> Motion:
     """The part of a motion that fixed and driven nodes, and those tied to the ground, leave free, at nodes x [m].
 
     Its velocity is the least with which the body can turn at that rate: that of a fixed axis away from the centre.
     """
-    scene, model, own = ready.scene, ready.model, _own(ready, body)
+    scene, model, own = c.scene, c.model, c.nodes(body)
     held = np.zeros((own.stop - own.start, 3, 3))
     drives = [(item.body, item.nodes, item.axes) for item in scene.fixed]
     for name, nodes, axes in (*drives, *((item.body, item.nodes, item.axis) for item in scene.prescribed)):
         for k in ("xyz".index(axis) for axis in axes if name == body):
-            held[ready.meshes[name].nodes(nodes), k, k] = 1.0
+            held[c.meshes[name].nodes(nodes), k, k] = 1.0
     tied = (model.joint_second == GROUND) & (model.joint_first >= own.start) & (model.joint_first < own.stop)
     np.add.at(held, model.joint_first[tied] - own.start, model.joint_tied[tied])
     some = np.flatnonzero(held.any(axis=(1, 2)))

@@ -1,0 +1,67 @@
+"""Owns the rows about elements of a run: large strains taken as small, and pressure that rounding shakes up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from warp_mca.watch.row import Finished, Values, row
+
+ROUNDING = 1.4 * 2.0**-24  # of dilatation in float32 in each step, over the strain; measured, see docs/decisions.md
+STRAIN = 0.1  # taken as small, from which on stresses are off by a tenth of themselves
+_SMALL = "the co-rotational element takes strains as small, expect stresses off by as much"
+
+
+@row(
+    f"strain reached {{strain:.2f}}; {_SMALL} where it exceeds {STRAIN},",
+    "or choose kinematics='finite'{where}",
+    STRAIN,
+    "[-] at most",
+)
+def large_strain(c: Finished, most: float) -> Iterator[Values]:
+    """Greatest deviatoric strain, where bodies have kinematics='corotational'."""
+    if c.ledger.kept.max_strain > most:
+        yield from (dict(strain=c.ledger.kept.max_strain, where=where) for where in _where_small(c))
+
+
+@row(
+    f"elements lost up to {{lost:.0%}} of their volume; {_SMALL} there,",
+    "or choose kinematics='finite'{where}",
+    0.15,
+    "[-] at most",
+)
+def lost_volume(c: Finished, most: float) -> Iterator[Values]:
+    """Greatest loss of volume of such bodies, which may come without that strain if sides are held."""
+    lost = 1.0 - c.ledger.kept.min_jacobian
+    if lost > most and c.ledger.kept.max_strain <= STRAIN:
+        yield from (dict(lost=lost, where=where) for where in _where_small(c))
+
+
+def _where_small(c: Finished) -> Iterator[str]:
+    """Which bodies take strain as small, if any do; empty where all do."""
+    small = [body.name for body in c.scene.bodies if body.kinematics == "corotational"]
+    if small:
+        yield "" if len(small) == len(c.scene.bodies) else f", if that was in {' or '.join(small)}"
+
+
+@row(
+    "in {steps:,} steps, rounding in mixed precision shakes up pressures of some {noise:.2g} Pa, {share:.0%} of "
+    "{stress}, where Poisson's ratio is {nu:.4g}:",
+    "choose --precision float64",
+    0.02,
+    "of the greatest stress at most",
+)
+def shaken_pressure(c: Finished, most: float) -> Iterator[Values]:
+    """Pressure K r e sqrt(n) of n steps: rounding r pushes volumes to and fro in each, a random walk, at strain e."""
+    if c.ledger.precision != "mixed":
+        return
+    strain, steps = c.ledger.kept.max_strain, c.steps_taken
+    for K, G, yield_stress in np.pad(c.model.law, ((0, 0), (0, 1)))[:, :3]:
+        stress = min(3.0 * G * strain, yield_stress) if yield_stress > 0.0 else 3.0 * G * strain
+        noise = K * ROUNDING * strain * math.sqrt(steps)
+        if noise > most * stress > 0.0:
+            nu = (3.0 * K - 2.0 * G) / (6.0 * K + 2.0 * G)
+            limit = "the yield stress" if stress == yield_stress else "the greatest stress"
+            yield dict(steps=steps, noise=noise, share=noise / stress, stress=limit, nu=nu)

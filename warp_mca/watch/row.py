@@ -1,0 +1,154 @@
+"""Owns a row of the table of guards, warnings and advice, and what its conditions look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.scene import RigidPlane
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+    from warp_mca.model.model import Model
+    from warp_mca.results.contact_history import ContactHistory
+    from warp_mca.rigid.handoff import HandOff
+    from warp_mca.scene import Contact, Scene
+    from warp_mca.step.steps import Steps
+    from warp_mca.watch.ledger import Ledger
+    from warp_mca.watch.passing import Watch
+
+Array = NDArray[np.float64]
+Values = Mapping[str, object]  # that fill the places of a sentence
+Condition = Callable[[Any, float], Iterable[Values]]
+
+
+class Kind(StrEnum):
+    """What a row does."""
+
+    GUARD = "guard"  # stops the run: what comes later would be wrong
+    WARNING = "warning"  # some figures are less sure than they look
+    ADVICE = "advice"  # the scene may not be what was meant, or can be had cheaper
+
+
+class When(StrEnum):
+    """When a row is looked at."""
+
+    BEFORE = "before the run"
+    FLAGS = "at flags of kernels, before the records count"
+    RECORDS = "at records"
+    LOOKS = "at looks, told at the end"
+    END = "at the end"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A guard, a warning or a piece of advice.
+
+    Attributes:
+        found: the condition: of a `Context` (of `Finished` at the end, of `Reading` at records) and the limit, the
+            values for the places of the sentence, once for each time that it is to be told.
+        sentence: what was found, with places as of `str.format`.
+        remedy: what to change, likewise; it follows the sentence.
+        limit: threshold of the condition, in `unit`; not used where the unit is empty.
+        unit: of the limit, and further numbers of the condition.
+        kind, when: as these say.
+    """
+
+    found: Condition
+    sentence: str
+    remedy: str
+    limit: float
+    unit: str
+    kind: Kind
+    when: When
+
+    @property
+    def name(self) -> str:
+        """That of the condition, in words."""
+        return self.found.__name__.replace("_", " ")
+
+    def told(self, context: object) -> list[str]:
+        """The sentences that the context gives reason for."""
+        text = f"{self.sentence} {self.remedy}".rstrip()
+        return [text.format(**values) for values in self.found(context, self.limit)]
+
+
+def row(
+    sentence: str,
+    remedy: str = "",
+    limit: float = 0.0,
+    unit: str = "",
+    kind: Kind = Kind.WARNING,
+    when: When = When.END,
+) -> Callable[[Condition], Row]:
+    """Makes a row of the condition that follows, whose docstring says what it looks at."""
+    return lambda found: Row(
+        found=found, sentence=sentence, remedy=remedy, limit=limit, unit=unit, kind=kind, when=when
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Context:
+    """What is known before the run.
+
+    Attributes:
+        scene: that is run.
+        meshes: of its bodies, by name.
+        model: assembled of them, of this scene alone.
+    """
+
+    scene: Scene
+    meshes: Mapping[str, Mesh]
+    model: Model
+
+    def nodes(self, body: str) -> slice:
+        """Nodes of a body in the model."""
+        first = self.model.node_start[body]
+        return slice(first, first + len(self.meshes[body].points))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished(Context):
+    """What is known at the end of the impact phase, or where a guard stopped it.
+
+    Attributes:
+        start: of the impact phase.
+        ledger: rows and energy balance.
+        steps: how the run is divided.
+        steps_taken: since the start of the phase [-].
+        u: displacements of the nodes [m], shape (node_count, 3), float64.
+        v: their velocities [m/s], shape (node_count, 3), float64.
+        depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,), float64.
+        bent: energies of bodies [J], as `SceneRecords.stiffened` has them, shape (body_count, COLUMNS), float64.
+        history: columns of history.csv, each shape (row_count,), float64.
+        contacts: histories of the scene's contacts.
+        shares: energy in the springs of each contact, see `spring_shares`.
+        watch: what may go into each other.
+        stopped: whether a guard stopped the run.
+        origin: when the times that are told begin [s].
+    """
+
+    start: HandOff
+    ledger: Ledger
+    steps: Steps
+    steps_taken: int
+    u: Array
+    v: Array
+    depths: Sequence[Array]
+    bent: Array
+    history: Mapping[str, Array]
+    contacts: Sequence[ContactHistory]
+    shares: Mapping[str, float | None]
+    watch: Watch
+    stopped: bool
+    origin: float
+
+
+def sides_of(contact: Contact) -> list[str]:
+    """Bodies of a contact, the slave first."""
+    return [contact.slave.body, *([] if isinstance(contact.master, RigidPlane) else [contact.master.body])]

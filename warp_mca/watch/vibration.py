@@ -1,0 +1,172 @@
+"""Owns the rows about vibration in contact: flat ends that ring, flutter that friction on springs excites."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
+from warp_mca.physics.elements.cells import body_materials
+from warp_mca.watch.row import Array, Finished, Values, row, sides_of
+
+if TYPE_CHECKING:
+    from warp_mca.physics.contact.surfaces import ContactPass
+    from warp_mca.scene import Contact
+
+MEAN = 5  # rows whose mean is what the surface does besides
+SPAN = 20  # rows, all in contact, that vibrate
+SHARE = 0.07
+LINEAR = 0.01  # strain v / c up to which bodies count as linear; beyond, twice of what is more may stiffen them
+ACROSS = 0.1  # component of the normal along an axis, from which on a node that is fixed there is held along the normal
+HELD = 9.0 / 8.0  # times rho c A v: the most from a master that is held, whose wave comes back; docs/decisions.md
+
+
+@row(
+    "the surface under the tip vibrates with up to {speed:.2g} m/s, {share:.0%} of the speed at which they met, faster "
+    "than rows show: friction and stiff contact springs excite its cells (flutter), which depends on mesh and penalty; "
+    "take plate_vx, plate_vy, plate_vz, stick_fraction and sticks with care;",
+    "a lower penalty lessens it",
+    SHARE,
+    "of the speed at which tip and target met, at most (docs/decisions.md)",
+)
+def flutter(c: Finished, most: float) -> Iterator[Values]:
+    """Vibration of the target point in contact along normal and tangent, where there is friction."""
+    speed, along, _ = _vibrations(c)
+    if along > most * speed > 0.0:
+        yield dict(speed=along, share=along / speed)
+
+
+@row(
+    "the surface under the tip vibrates across normal and tangent with up to {speed:.2g} m/s, {share:.0%} of the speed "
+    "at which they met: contact presses nodes from one face of it to the next and back; take plate_vx, plate_vy and "
+    "plate_vz in that direction with care;",
+    "a lower penalty lessens it",
+    0.2,
+    "of the speed at which tip and target met, at most",
+)
+def vibration_aside(c: Finished, most: float) -> Iterator[Values]:
+    """Vibration of the target point in contact across normal and tangent, where no column of forces looks."""
+    speed, along, across = _vibrations(c)
+    if across > most * speed > 0.0 and along <= SHARE * speed:
+        yield dict(speed=across, share=across / speed)
+
+
+@row(
+    "the greatest force of {name}, {greatest:.3g} N, is {times:.2f} times the {most:.3g} N of waves in flat ends "
+    "(rho c A v): contact springs and cells ring there; the impulse and means over several rows are right, F_n_max and "
+    "single rows depend on mesh, penalty and output_interval:",
+    "take means, or choose a longer output_interval",
+    1.05,
+    "times the greatest force of waves at most",
+)
+def ringing(c: Finished, times: float) -> Iterator[Values]:
+    """Greatest force of flat ends over that of waves.
+
+    Bodies that meet with speed v press on each other with Z v at most, Z = Z_1 Z_2 / (Z_1 + Z_2), where rho c A of
+    either body is at least Z_k: c is the speed of dilatational waves and A the area of its shadow along the normal.
+    Waves that come back from free ends only take from it. So nothing is said of bodies that have more behind them or
+    meet twice: with joints, ties, driven nodes, or other contacts.
+    """
+    for item in c.model.passes:
+        contact, history = c.scene.contacts[item.contact], c.contacts[item.contact]
+        greatest = float(history.pressure.max(initial=0.0))
+        if item.sign < 0.0 or greatest == 0.0 or not _is_first_impact(c, contact, item):
+            continue
+        most = _greatest_force(c, contact, item, c.steps.interval * int(history.pressure.argmax()))
+        if greatest > times * most > 0.0:
+            yield dict(name=history.name, greatest=greatest, times=greatest / most, most=most)
+
+
+def _vibrations(c: Finished) -> tuple[float, float, float]:
+    """Speed at which tip and target met, vibration of the target along the axes of rough contacts, and across [m/s]."""
+    history, passes = c.history, c.model.passes
+    if not passes or len(history["time_s"]) < MEAN + SPAN:
+        return 0.0, 0.0, 0.0
+    tip, target = (np.column_stack([history[f"{point}_v{axis}"] for axis in "xyz"]) for point in ("tip", "plate"))
+    axes = [c.model.contact_axes[item.contact] for item in passes]
+    rough = [own for own, item in zip(axes, passes, strict=True) if item.mu > 0.0]
+    aside = [np.cross(own[:1], own[1:]) for own in axes]
+    along, across = (_amplitude(history, target, directions) for directions in (rough, aside))
+    return float(np.linalg.norm(tip[0] - target[0])), along, across
+
+
+def _amplitude(history: Mapping[str, Array], velocity: Array, axes: Sequence[Array]) -> float:
+    """Greatest vibration in contact of a velocity [m/s] along axes, each shape (axis_count, 3)."""
+    if not axes:
+        return 0.0
+    return vibration(velocity @ np.concatenate(axes).T, history["F_n_N"] > 0.0)
+
+
+def vibration(velocity: Array, touching: NDArray[np.bool_]) -> float:
+    """Greatest amplitude of what changes faster than the mean of MEAN rows, over SPAN rows in contact [m/s].
+
+    That of a sine with the same mean square: sqrt(2) times the root mean square.
+
+    Args:
+        velocity: components at each row [m/s], shape (row_count, component_count).
+        touching: rows in contact, shape (row_count,).
+    """
+    inner = slice(MEAN // 2, len(velocity) - MEAN // 2)
+    square = (velocity[inner] - _mean(velocity)) ** 2
+    windows = np.lib.stride_tricks.sliding_window_view(square, SPAN, axis=0).mean(axis=-1)
+    whole = np.lib.stride_tricks.sliding_window_view(touching[inner], SPAN).all(axis=-1)
+    return float(np.sqrt(2.0 * windows[whole].max(initial=0.0)))
+
+
+def _mean(values: Array) -> Array:
+    """Of each MEAN rows one after the other, shape (row_count - MEAN + 1, component_count)."""
+    return np.lib.stride_tricks.sliding_window_view(values, MEAN, axis=0).mean(axis=-1)
+
+
+def _is_first_impact(c: Finished, contact: Contact, item: ContactPass) -> bool:
+    """Whether flat ends meet of bodies that only this contact moves, or that are held at rest."""
+    scene = c.scene
+    bound = {name for joint in scene.joints for name in (joint.body, joint.other)}
+    bound |= {name for tie in scene.ties for name in (tie.slave.body, tie.master.body)}
+    bound |= {prescribed.body for prescribed in scene.prescribed}
+    bound |= {name for other in scene.contacts if other is not contact for name in sides_of(other)}
+    normal = c.model.contact_axes[item.contact, 0]
+    return (
+        normal.any()
+        and not bound.intersection(sides_of(contact))
+        and not scene.body(contact.slave.body).rigid
+        and not _is_held(c, contact.slave.body, normal)
+        and item.initial_overlap == "refuse"
+        and not is_curved_contact(c.model.X, item)
+    )
+
+
+def _greatest_force(c: Finished, contact: Contact, item: ContactPass, time: float) -> float:
+    """Force of waves [N] up to a time [s]; gravity adds the speed of a fall so long, and twice the weight."""
+    model, normal = c.model, c.model.contact_axes[item.contact, 0]
+    slave, *master = sides_of(contact)
+    gravity = float(np.linalg.norm(model.gravity[0]))
+    speed = float((-model.V[c.nodes(slave)] @ normal).max()) + gravity * time
+    Z, wave = _impedance(c, slave, normal)
+    for name in master:
+        speed += float((model.V[c.nodes(name)] @ normal).max())
+        if _is_held(c, name, normal):
+            Z *= HELD
+        elif not c.scene.body(name).rigid:
+            Z *= 1.0 / (1.0 + Z / _impedance(c, name, normal)[0])
+    speed = max(speed, 0.0)
+    stiffening = 1.0 + 2.0 * max(speed / wave - LINEAR, 0.0)
+    return stiffening * Z * speed + 2.0 * gravity * float(model.mass[c.nodes(slave)].sum())
+
+
+def _impedance(c: Finished, body: str, normal: Array) -> tuple[float, float]:
+    """Greatest rho c [kg/(m^2 s)] of its materials times the area of its shadow [kg/s], and the greatest c [m/s]."""
+    materials = [material for material, _ in body_materials(c.scene.body(body), c.meshes[body])]
+    speeds = [material.wave_speeds["dilatational"] for material in materials]
+    faces = c.meshes[body].boundary[0]
+    shadow = 0.5 * float(np.abs(face_geometry(c.model.X[c.nodes(body)], faces)[1] @ normal).sum())
+    return max(m.rho * speed for m, speed in zip(materials, speeds, strict=True)) * shadow, max(speeds)
+
+
+def _is_held(c: Finished, body: str, normal: Array) -> bool:
+    """Whether some of its nodes are fixed along the normal."""
+    fixed = int(np.bitwise_or.reduce(c.model.fixed_axes[c.nodes(body)]))
+    return any(fixed >> axis & 1 for axis in range(3) if abs(normal[axis]) > ACROSS)
