@@ -15,7 +15,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
 from warp_mca.model.precision import check_range
 from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import METHOD
+from warp_mca.phases.every import METHOD
 from warp_mca.phases.meshing import mesh
 from warp_mca.phases.prepare import Clock, Prepared
 from warp_mca.phases.rate_groups import grouping
