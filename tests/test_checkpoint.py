@@ -15,7 +15,8 @@ from test_full_disk import files_up_to
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.phases.checkpoint import FILE, Checkpoint, Every
+from warp_mca.phases.checkpoint import FILE, Checkpoint
+from warp_mca.phases.every import Every
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.pure_setup import Place
 
@@ -126,12 +127,9 @@ def test_what_is_no_frequency_is_refused(text: str):
         Every.parse(text)
 
 
-def test_a_run_in_turn_and_a_run_without_a_folder_store_nothing(tmp_path: Path):
+def test_a_sweep_and_a_run_without_a_folder_store_nothing(tmp_path: Path):
     with pytest.raises(mca.RequestError, match="name one by out"):
         mca.run(LANDING, checkpoint="7")
-    cycle = mca.make_scene("single_link", t_end=0.1)
-    with pytest.raises(mca.RequestError, match="leave t_end out"):
-        mca.run(cycle, checkpoint="7", out=tmp_path / "out")
     assert main(["run", "single_link", "--sweep", "mu=0.1,0.2", "--checkpoint", "7", "--out", str(tmp_path / "a")]) == 2
 
 

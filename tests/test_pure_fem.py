@@ -18,7 +18,8 @@ import pytest
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.phases import pure_fem
-from warp_mca.phases.checkpoint import FILE, Checkpoint, Every
+from warp_mca.phases.checkpoint import FILE, Checkpoint
+from warp_mca.phases.every import Every
 from warp_mca.recorders import SnapshotFile
 
 SCENE = '''"""A short, coarse rod that turns fast strikes a plate 1.1 ms after its release."""

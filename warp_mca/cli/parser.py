@@ -12,7 +12,7 @@ import warp_mca as mca
 from warp_mca.cli import commands, paper, resume, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.cli.folder import folder
-from warp_mca.phases.checkpoint import METHODS
+from warp_mca.phases.every import METHODS
 from warp_mca.physics.elements import ELEMENTS
 
 WELCOME = """\

@@ -17,7 +17,7 @@ from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.request import read_request
 from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
-from warp_mca.phases.checkpoint import DEFAULT, Every
+from warp_mca.phases.every import DEFAULT, Every
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder

@@ -23,7 +23,7 @@ from warp_mca.paper.pictures import PICTURES, drawn
 from warp_mca.paper.studies import LEVELS, Level, pure_case
 from warp_mca.paper.table_2 import compare, stored
 from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import METHOD
+from warp_mca.phases.every import METHOD
 from warp_mca.results.storage import folder_path, load
 from warp_mca.studies.sweep_job import DONE, Row
 from warp_mca.studies.sweep_workers import Prepare, devices_named

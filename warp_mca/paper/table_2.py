@@ -16,7 +16,7 @@ import warp_mca as mca
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import check_folder, write_atomically
 from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import METHOD
+from warp_mca.phases.every import METHOD
 from warp_mca.scene import Scene
 
 OPEN_TIMES = (2.5e-4, 5e-4, 1e-3)  # after which an impact has ended [s]

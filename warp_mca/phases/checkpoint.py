@@ -1,107 +1,32 @@
-"""Owns checkpoints: how often a run stores its state, and the file from which the same request goes on."""
+"""Owns checkpoints: the file that a run stores its state in, and from which the same request goes on."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.log import warn
 from warp_mca.base.validate import DAMAGE
+from warp_mca.phases.every import Every
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
     from warp_mca.phases.settings import Settings
-    from warp_mca.recorders.recorder import Recorder
-    from warp_mca.scene import Scene
     from warp_mca.step.steps import Steps
 
 FILE = "checkpoint.npz"
-METHOD = "pure-fem"  # whose runs store their state by default
-METHODS = ("mca", METHOD)
-DEFAULT = "30w"
+ENDED = "checkpoint-{}.npz"  # state at the end of an impact, in a run of several
 HEADER, MORE = "run/header", "run/more/"  # in that file, beside the arrays of the state
-REMEDY = "write it as 100 (steps), 2e-5s (simulated seconds) or 30w (seconds of wall time)"
-LEAST, MOST = 1e-12, 1e12  # what can be asked for, of any unit
-_LETTER = {"steps": "", "simulated": "s", "wall": "w"}
 SHORTEST = 4.0  # parts into which the time between two checkpoints is cut at least, to hit it
-
-
-@dataclass(frozen=True)
-class Every:
-    """How often the state is stored: each `count` [steps, or s] of a `unit`, at the end of an output interval.
-
-    `command` is what `warp-mca resume` needs to give the request again, as JSON can hold it; None for a Python program.
-    """
-
-    count: float
-    unit: Literal["steps", "simulated", "wall"]
-    command: Mapping[str, Any] | None = None
-
-    @property
-    def text(self) -> str:
-        """As the user writes it."""
-        return f"{self.count:g}{_LETTER[self.unit]}"
-
-    @staticmethod
-    def parse(value: object, command: Mapping[str, Any] | None = None) -> Every:
-        """What `--checkpoint` means.
-
-        Raises:
-            RequestError: it is not of one of the three forms, or out of range.
-        """
-        text = str(value).strip()
-        unit: Literal["steps", "simulated", "wall"]
-        unit = "simulated" if text.endswith("s") else "wall" if text.endswith("w") else "steps"
-        try:
-            count = float(text if unit == "steps" else text[:-1])
-        except ValueError:
-            count = math.nan
-        if not LEAST <= count <= MOST or (unit == "steps" and count != int(count)):
-            raise bad_value("checkpoint", validate.brief(value), REMEDY)
-        return Every(count, unit, command)
-
-
-def every_of(
-    method: object,
-    checkpoint: str | Every | None,
-    out: str | os.PathLike[str] | None,
-    scene: Scene,
-    recorders: Sequence[Recorder],
-) -> Every | None:
-    """How often a run stores its state, by what the user gave; None: never.
-
-    Raises:
-        RequestError: the method is unknown, or the run cannot store its state.
-    """
-    if method not in METHODS:
-        raise bad_value("method", validate.brief(method), f"choose {' or '.join(METHODS)}")
-    if checkpoint is None and (method != METHOD or out is None):
-        every = None
-    else:
-        every = checkpoint if isinstance(checkpoint, Every) else Every.parse(checkpoint or DEFAULT)
-    if every is None and method != METHOD:
-        return None
-    asked = "method" if method == METHOD else "checkpoint"
-    value = method if method == METHOD else checkpoint.text if isinstance(checkpoint, Every) else checkpoint
-    if recorders:
-        raise bad_value(asked, value, "recordings cannot be continued from a stored state; leave recorders out")
-    if scene.t_end is not None:
-        raise bad_value(asked, value, "a run of swings and impacts in turn stores no state; leave t_end out")
-    if every and out is None:
-        raise bad_value(asked, value, "the state needs a folder; name one by out")
-    return every
 
 
 class Checkpoint:
@@ -110,15 +35,16 @@ class Checkpoint:
     Attributes:
         path: of the file.
         every: how often it is written.
+        rows: the state can be stored at each so many rows of the history.
     """
 
     def __init__(self, folder: Path, every: Every, force: bool = False) -> None:
         """Of the folder of a run; with `force` the run begins anew."""
-        self.path, self.every, self.request = folder / FILE, every, {}
+        self.path, self.every, self.request, self.rows = folder / FILE, every, {}, 1
         self._steps, self._time, self._rate, self._begun = 0, time.perf_counter(), 0.0, 0
         self._failed = False  # the last time: a warning says so once
         if force:
-            self.path.unlink(missing_ok=True)
+            self.remove()
 
     def is_for(self, impact: Impact, span: float, settings: Settings, method: str) -> None:
         """Say what the run is, `span` [s] of impact: another one does not go on from its file."""
@@ -131,6 +57,7 @@ class Checkpoint:
             "paths": digest(ready.probes),
             "sensors": digest(ready.sensors),
             "impact": repr(ready.scene.impact),
+            "t_end": repr(ready.scene.t_end),
             "span": repr(span),
             "dt": repr(solver.dt),
             "precision": settings.precision,
@@ -145,7 +72,8 @@ class Checkpoint:
             ahead = wait / SHORTEST * self._rate
         else:
             ahead = self._wanted(impact.steps) - (now - self._steps)
-        return (now // steps.per_interval + max(1, math.ceil(ahead / steps.per_interval))) * steps.per_interval
+        row = now // steps.per_interval + max(1, math.ceil(ahead / steps.per_interval))
+        return -(-row // self.rows) * self.rows * steps.per_interval
 
     def is_due(self, impact: Impact) -> bool:
         """Whether enough has been done since the state was last stored."""
@@ -176,50 +104,97 @@ class Checkpoint:
             self._failed = False
         self.begin(impact)
 
-    def stored(self) -> tuple[dict[str, Any], dict[str, NDArray]] | None:
-        """Place and arrays that an earlier run of the same request stored, or None.
+    def store_end(self, impact: Impact, number: int) -> None:
+        """Write the state of an impact that has ended, but for its last record, to a file of its own."""
+        place = {"impact": number}
+        self.store(impact, place)
+        if not self._failed:
+            self.path.replace(self._ended(number))
+
+    def stored(self, impact: int | None = None) -> tuple[dict[str, Any], dict[str, NDArray], Path] | None:
+        """Place and arrays that an earlier run of the same request stored, and the file that has them, or None.
+
+        `impact`: number of one of several; what is stored of another one is left alone.
 
         Raises:
             RequestError: the file is damaged or of another request.
         """
-        if not self.path.exists():
+        ended = None if impact is None else self._ended(impact)
+        path = ended if ended and ended.exists() else self.path
+        if not path.exists():
             return None
-        head, more = _read(self.path)
+        head, more = _read(path)
+        if head["place"].get("impact", impact) != impact:
+            return None
         if head["request"] != self.request:
             other = next(key for key in self.request if head["request"].get(key) != self.request[key])
             remedy = f"{FILE} there is of another request ({other}); name another folder, or use --force (force=True)"
             raise bad_value("out", str(self.path.parent), remedy)
-        return head["place"], more
+        return head["place"], more, path
 
     def remove(self) -> None:
-        """Remove the file of a run that is over."""
-        self.path.unlink(missing_ok=True)
+        """Remove the files of a run that is over."""
+        for path in (self.path, *self.path.parent.glob(ENDED.format("*"))):
+            path.unlink(missing_ok=True)
+
+    def _ended(self, number: int) -> Path:
+        return self.path.with_name(ENDED.format(number))
 
     def _wanted(self, steps: Steps) -> int:
         """Steps from one checkpoint to the next."""
         return max(1, round(self.every.count if self.every.unit == "steps" else self.every.count / steps.dt))
 
 
-def advance(impact: Impact, checkpoint: Checkpoint, told: Callable[[], None]) -> None:
+def advance(
+    impact: Impact,
+    checkpoint: Checkpoint,
+    told: Callable[[], None],
+    ended: Callable[[], bool] | None = None,
+    number: int | None = None,
+) -> None:
     """Advance an impact phase to its end, from where an earlier run of the same request was, and store it on the way.
+
+    Args:
+        impact: the phase.
+        checkpoint: that stores it.
+        told: as in `Impact.advance`.
+        ended: likewise.
+        number: of the impact, in a run of several: the state at its end is kept until the run is over.
 
     Raises:
         RequestError: the folder holds the state of another request.
     """
-    if checkpoint.stored() is not None:
-        impact.load(checkpoint.path)
-    go_on(impact, checkpoint, told, lambda: checkpoint.store(impact, {}))
+    place = {} if number is None else {"impact": number}
+    found = checkpoint.stored(number)
+    if found is not None:
+        impact.load(found[2])
+    if found is None or found[2] == checkpoint.path:
+        last = None if number is None else impact.steps.count - 1
+        go_on(impact, checkpoint, told, lambda: checkpoint.store(impact, place), ended, last)
+        if number is not None and impact.stopped[0] is None:
+            checkpoint.store_end(impact, number)
+    impact.advance(told=told, ended=ended)
 
 
-def go_on(impact: Impact, checkpoint: Checkpoint | None, told: Callable[[], None], store: Callable[[], None]) -> None:
-    """Advance to the end, and `store` as often as the checkpoint says."""
+def go_on(
+    impact: Impact,
+    checkpoint: Checkpoint | None,
+    told: Callable[[], None],
+    store: Callable[[], None],
+    ended: Callable[[], bool] | None = None,
+    last: int | None = None,
+) -> None:
+    """Advance to the end, or so many steps as `last`, and `store` as often as the checkpoint says."""
     if checkpoint:
         checkpoint.begin(impact)
-    while checkpoint and impact.stopped[0] is None and (stop := checkpoint.next_stop(impact)) < impact.steps.count:
-        impact.advance(until=stop, told=told)
+    most = impact.steps.count if last is None else last
+    while checkpoint and impact.stopped[0] is None and (stop := checkpoint.next_stop(impact)) < most:
+        impact.advance(until=stop, told=told, ended=ended)
+        if impact.state.steps < stop:
+            return  # it has ended
         if impact.stopped[0] is None and checkpoint.is_due(impact):
             store()
-    impact.advance(told=told)
+    impact.advance(until=last, told=told, ended=ended)
 
 
 def stored_command(folder: Path) -> dict[str, Any]:

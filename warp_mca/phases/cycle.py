@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.sensors import locate_sensors
 from warp_mca.phases.arguments import Progress
+from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.impact_driver import ImpactDriver
 from warp_mca.phases.meshing import mesh
@@ -58,14 +59,14 @@ def begin_cycle(
     )
 
 
-def run_cycle(setup: Setup) -> list[Part]:
-    """Go through swings and impacts in turn until the time is up.
+def run_cycle(setup: Setup, store: Checkpoint | None = None) -> list[Part]:
+    """Go through swings and impacts in turn until the time is up, from what `store` has of them.
 
     Raises:
         RequestError: the scene cannot be built as written.
         GuardError: an impact lost its footing.
     """
-    swings, impacts = SwingDriver(setup), ImpactDriver(setup)
+    swings, impacts = SwingDriver(setup), ImpactDriver(setup, store)
     motion, swing = swings.first()
     parts: list[Part] = [swing]
     while swing.swing.ended_by == "touch" and swing.stopped is None:

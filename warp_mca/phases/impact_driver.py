@@ -14,6 +14,7 @@ from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.model.build import build_model
 from warp_mca.model.paths import Found, locate
 from warp_mca.model.precision import check_range
+from warp_mca.phases.checkpoint import Checkpoint, advance
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
@@ -28,6 +29,7 @@ from warp_mca.physics.elements.cells import body_materials
 from warp_mca.rigid.placement import link_placements
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
+from warp_mca.step.workspace import ROWS
 from warp_mca.watch.table import told_before
 
 Array = NDArray[np.float64]
@@ -46,8 +48,9 @@ class ImpactDriver:
         open_time: how long all contacts must be open for an impact to end [s].
     """
 
-    def __init__(self, setup: Setup) -> None:
-        self.setup, self.count, self.open_time = setup, 0, open_time(setup)
+    def __init__(self, setup: Setup, store: Checkpoint | None = None) -> None:
+        """Of a run that goes on from what `store` has, and stores its state there."""
+        self.setup, self.store, self.count, self.open_time = setup, store, 0, open_time(setup)
         self._places: Found = {}
 
     def run(self, motion: Motion) -> tuple[Motion | None, ImpactPart]:
@@ -85,7 +88,7 @@ class ImpactDriver:
         )
         if ended_by == "t_end":
             return None, part
-        if ended_by == "duration" and self._pressed(impact, 1):
+        if ended_by == "duration" and self._pressed(impact, -1):
             why = f"impact {self.count} had not ended after duration = {span:g} s; give a longer one"
             return None, replace(part, stopped=f"the run ends at t = {part.end:.4g} s: {why}")
         back = return_to_rigid(setup, motion, part, relaxation)
@@ -139,24 +142,39 @@ class ImpactDriver:
     def _advance(self, impact: Impact) -> None:
         """Until all contacts have been open for a while, or to the end of its time."""
         scene_run, interval, wait = impact.scene_runs[0], impact.steps.interval, self.open_time
-        ledger, contacts = scene_run.ledger, len(scene_run.ready.model.passes)
+        contacts = len(scene_run.ready.model.passes)
 
         def told() -> None:
             self.setup.tell("impact", impact.rows / (impact.steps.intervals + 1))
 
         def ended() -> bool:
-            sums = ledger.kept.sums
-            if (len(sums) - 1) * interval < wait or not contacts:
+            rows = _rows_read(impact)
+            if (rows - 1) * interval < wait or not contacts:
                 return False
-            return not self._pressed(impact, math.ceil(wait / interval))
+            return not self._pressed(impact, rows - math.ceil(wait / interval), rows)
 
-        impact.advance(told=told, ended=ended)
+        if self.store:
+            self.store.is_for(impact, impact.steps.interval * impact.steps.intervals, self.setup.settings, "mca")
+            self.store.rows = ROWS // math.gcd(ROWS, impact.steps.checks)
+            advance(impact, self.store, told, ended, self.count)
+        else:
+            impact.advance(told=told, ended=ended)
 
-    def _pressed(self, impact: Impact, rows: int) -> bool:
-        """Whether a contact was closed in the last rows of the history."""
+    def _pressed(self, impact: Impact, first: int, end: int | None = None) -> bool:
+        """Whether a contact was closed in the rows of the history from `first` to the one before `end`."""
         ledger = impact.scene_runs[0].ledger
-        springs = ledger.springs(np.array(ledger.kept.sums[-rows:]))
+        springs = ledger.springs(np.array(ledger.kept.sums[first:end]))
         return bool((springs[..., NORMAL_IMPULSE] > 0.0).any())
+
+
+def _rows_read(impact: Impact) -> int:
+    """Rows that a run which never pauses has read by now: the end of an impact must not depend on when it was stored.
+
+    Records come in sets of `ROWS`; a run pauses only where a set is complete.
+    """
+    steps = impact.steps
+    records = impact.state.steps // steps.per_interval * steps.checks
+    return -(-((records - 1) // ROWS * ROWS) // steps.checks) if records else 0
 
 
 def open_time(setup: Setup) -> float:

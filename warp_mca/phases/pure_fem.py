@@ -19,8 +19,9 @@ from warp_mca.base.log import warn
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import METHOD, Checkpoint, damage_explained, go_on
+from warp_mca.phases.checkpoint import Checkpoint, damage_explained, go_on
 from warp_mca.phases.division import coarser
+from warp_mca.phases.every import METHOD
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.prepare import Clock
@@ -226,7 +227,7 @@ class PureRun:
         found = checkpoint.stored()
         if found is None:
             return
-        place, more = found
+        place, more, _ = found
         with damage_explained(checkpoint.path):
             self.place = Place.of(place)
             for stage in self.clock.wall:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.phases.checkpoint import METHOD
 from warp_mca.phases.cycle_rows import STORED
+from warp_mca.phases.every import METHOD
 from warp_mca.phases.history_rows import contact_histories, history_columns
 from warp_mca.phases.pure_fem import PureRun
 from warp_mca.results.contact_history import ContactHistory

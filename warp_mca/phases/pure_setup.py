@@ -17,7 +17,7 @@ from warp_mca.model.paths import locate
 from warp_mca.model.precision import check_range
 from warp_mca.model.sensors import locate_sensors
 from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import METHOD
+from warp_mca.phases.every import METHOD
 from warp_mca.phases.meshing import mesh
 from warp_mca.phases.prepare import Clock, Prepared
 from warp_mca.phases.rate_groups import grouping

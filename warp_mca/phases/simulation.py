@@ -20,7 +20,8 @@ from warp_mca.phases.arguments import (
     span_of,
     teller,
 )
-from warp_mca.phases.checkpoint import METHOD, Checkpoint, Every, every_of
+from warp_mca.phases.checkpoint import Checkpoint
+from warp_mca.phases.every import METHOD, Every, every_of
 from warp_mca.phases.meshing import mesh
 from warp_mca.phases.progress import shows_progress
 from warp_mca.phases.settings import Settings, settings_of
@@ -128,7 +129,7 @@ def _every(
         RequestError: the run cannot store it, or `accuracy` is asked of one that would, or is none of this scene.
     """
     check_accuracy(scene, accuracy)
-    every = every_of(method, checkpoint, out, scene, recorders)
+    every = every_of(method, checkpoint, out, recorders)
     if accuracy is not None and (every or method == METHOD):
         remedy = "it is for runs of one impact that store nothing on the way; leave it out, or method and checkpoint"
         raise bad_value("accuracy", accuracy.percent if isinstance(accuracy, Accuracy) else accuracy, remedy)
@@ -228,7 +229,7 @@ def _single(
         GuardError: the run lost its footing.
     """
     if scene.t_end is not None:
-        return _cycle(scene, meshes, span, tell, settings, recorders)
+        return _cycle(scene, meshes, span, tell, settings, recorders, store)
     (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders, store)
     if found.stopped is not None:
         raise GuardError(found.stopped)
@@ -242,6 +243,7 @@ def _cycle(
     tell: Progress,
     settings: Settings,
     recorders: Sequence[Recorder],
+    store: Checkpoint | None,
 ) -> Result:
     """Swings and impacts in turn until `Scene.t_end`; arguments as in `simulate`.
 
@@ -256,4 +258,4 @@ def _cycle(
         remedy = "recorders show a single impact; leave t_end out, or the recorders"
         raise bad_value("Scene.t_end", scene.t_end, remedy)
     setup = begin_cycle(scene, meshes, span, settings, tell)
-    return cycle_result(setup, run_cycle(setup))
+    return cycle_result(setup, run_cycle(setup, store))
