@@ -30,7 +30,7 @@ class Limit:
     """Where a series of values goes as its small parameter goes to zero.
 
     Attributes:
-        value: the limit; None where there is none, or none can be told.
+        value: the limit; None if there is none, or if it cannot be found.
         left: greatest error that `value` is expected to have, as a share of it [-]; None without `value`.
         order: observed order p [-]; None where fewer than three values, or irregular ones, give none.
         ratio: of the last two differences [-], below 1 in size where they shrink; None with fewer than three values,

@@ -38,7 +38,7 @@ def figures_of(result: Result) -> Figures:
 
 
 def why_unsure(F_n: NDArray[np.float64]) -> str:
-    """Why the duration of a contact is that of the mesh, empty if it is not; F_n as of `contact_rows` [N]."""
+    """Why the duration of a contact depends on the mesh; empty if it does not. F_n as in `contact_rows` [N]."""
     if grazing_share(F_n):
         return "it counts touches with hardly any force, whose length is the mesh's; contacts has the first one's"
     if share := faint_share(F_n):
