@@ -157,7 +157,7 @@ def planned(
     return replace(found, wall=time.perf_counter() - begin - own)
 
 
-def carried_out(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -> Result:
+def run_planned(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -> Result:
     """The result of a plan, with less mass where its model would gain too much; errors are smaller then.
 
     How much mass elements gain is known once the model is made, which deciding does not wait for.
