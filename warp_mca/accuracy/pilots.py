@@ -2,7 +2,8 @@
 
 With cells of size h = 1 / refine, a figure f errs by C h^p. Two pilots give C with the usual p of low-order elements at
 edges of contacts; the run itself is the third value, which gives the order that is really there (`convergence`). Two
-cannot tell a series that goes nowhere: the second pilot is the run only where much less is left than was asked.
+values cannot reveal a series without a limit, so the second pilot serves as the run only if its estimated error is much
+smaller than asked.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Pilots:
         figures: of each pilot.
         resolution: of the contact duration: the output interval [s].
         bound: figures that must be accurate.
-        auto: penalties are chosen by the mesh, so that what springs give away does not shrink with the cells.
+        auto: penalties are chosen by the mesh, so that the loss in springs does not shrink with the cells.
         result: of the last pilot, where that is the run.
         wall: that this pilot took [s].
     """
@@ -72,7 +73,7 @@ class Pilots:
     wall: float = 0.0
 
     def estimate(self, result: Result) -> Mapping[str, float | str]:
-        """Error of each figure of the run [-], or why none can be told."""
+        """Estimated error of each figure of the run [-], or the reason why there is no estimate."""
         found = figures_of(result)
         sizes, runs = self.sizes, self.figures
         if self.result is None:
@@ -85,7 +86,7 @@ class Pilots:
         }
 
     def _error(self, values: Sequence[float | None], sizes: Sequence[float], name: str, lost: float) -> float | str:
-        """Error of the last value [-], or why none can be told; `lost` is what springs take of it [-]."""
+        """Estimated error of the last value [-], or the reason why there is none; `lost` is the loss in springs [-]."""
         if any(coarse < ANOTHER * fine for coarse, fine in pairwise(sizes)):
             return "meshes of other density are nearly the same, for bodies have few cells; make more"
         resolution = self.resolution if name == "contact_duration" else 0.0
@@ -175,7 +176,7 @@ def _first(
 def _with_springs(scene: Scene, asked: Accuracy, start: Variant, run: Callable[..., Result]) -> tuple[Variant, Result]:
     """The model and the result of the first pilot: with contact springs as stiff as the accuracy needs.
 
-    Where a guard stops it with these, the scene keeps its own; what they give away then asks for a finer mesh.
+    If a guard stops it with these springs, the scene keeps its own, whose loss then asks for a finer mesh.
     """
     first = _pilot(scene, start, run)
     stiffer = _stiffer(scene, asked, first)
@@ -218,13 +219,13 @@ class Springs:
 
 
 def _spring_loss(result: Result) -> float:
-    """What contact springs gave away of the greatest force [-], by estimate."""
+    """Estimated loss of the greatest force in contact springs [-]."""
     shares = result.summary["contact_spring_share"].values()
     return PEAK_LOSS * max((share for share in shares if share is not None), default=0.0)
 
 
 def _stiffer(scene: Scene, asked: Accuracy, first: Result) -> Mapping[str, Any] | None:
-    """What gives contact springs the stiffness that the accuracy needs, or None where they have it, or must stay."""
+    """Settings that make contact springs stiff enough for the accuracy; None if they are, or must stay."""
     (penalty, *others) = {contact.penalty for contact in scene.contacts}
     lost, allowed = _spring_loss(first), SPRINGS * asked.share
     if others or "penalty" in asked.typed or not isinstance(penalty, float | int) or lost <= allowed:
