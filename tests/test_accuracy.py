@@ -18,7 +18,7 @@ from warp_mca.accuracy import store
 from warp_mca.accuracy.choice import LEAST, REGRET, WORTH, Choice, best, choices
 from warp_mca.accuracy.figures import bound_errors
 from warp_mca.accuracy.hinges import without_limit
-from warp_mca.accuracy.plan import Plan, carried_out, command, planned
+from warp_mca.accuracy.plan import Plan, command, planned, run_planned
 from warp_mca.accuracy.prediction import Expected, processes_of
 from warp_mca.accuracy.request import Accuracy, accuracy_of
 from warp_mca.accuracy.variant import Variant
@@ -196,14 +196,14 @@ def test_of_mass_that_the_model_refuses_less_is_taken(known: store.Family):
     for most, expected in ((3.0, [2.4]), (2.0, [2.4, 1.5]), (1.0, [2.4, 1.5, None])):
         asked: list[object] = []
         plan = planned(scene, 0.09, {}, "cpu", None, fake)
-        result = carried_out(plan, lambda plan, most=most: carry_out(plan, most))
+        result = run_planned(plan, lambda plan, most=most: carry_out(plan, most))
         assert asked == expected
         assert result.summary["accuracy"]["chosen"].get("mass_scaling") == expected[-1]
         words = shlex.split(result.summary["accuracy"]["command"])
         assert ("--mass-scaling" in words) == (expected[-1] is not None)
     typed = planned(scene, Accuracy(share=0.09, typed={"mass_scaling": 2.4}), {}, "cpu", None, fake)
     with pytest.raises(RequestError, match="too much"):
-        carried_out(typed, lambda plan: carry_out(plan, 2.0))
+        run_planned(typed, lambda plan: carry_out(plan, 2.0))
 
 
 def test_what_was_typed_stays(known: store.Family):

@@ -9,8 +9,8 @@ import pytest
 from fake_run import fake
 
 import warp_mca as mca
-from warp_mca.accuracy.levels import Levels
 from warp_mca.accuracy.pilots import STEP, run_pilots
+from warp_mca.accuracy.refinements import Refinements
 from warp_mca.accuracy.request import Accuracy
 
 BOUND = ("F_n_first_peak", "impulse", "contact_duration")
@@ -53,27 +53,29 @@ def test_the_second_pilot_is_the_run_where_little_is_left_of_it(asked: float, re
 @pytest.mark.parametrize(("order", "known"), [(1.5, True), (0.2, False), (-1.0, False)])
 def test_a_figure_that_has_no_limit_has_no_estimate(order: float, known: bool):
     found = run_pilots(mca.make_scene("rod_on_wall"), Accuracy(share=0.05), BOUND, partial(fake, order=order, size=0.3))
-    peak = found.estimate(fake(found.variant.applied(found.levels.scene), order=order, size=0.3))["F_n_first_peak"]
+    peak = found.estimate(fake(found.variant.applied(found.refinements.scene), order=order, size=0.3))["F_n_first_peak"]
     assert isinstance(peak, float) == known
 
 
 def test_meshes_are_those_whose_counts_are_multiples():
     """Two cells through a thickness are one, four or six, not two again with others along the bar."""
-    levels = Levels(mca.make_scene("coaxial_rods"), 1.0)
-    assert levels.near(0.64, 0.3, 1.1) == 1.0
-    assert levels.finer(1.0, STEP, 4.0) == [2.0, 3.0, 4.0]
-    assert levels.unlike(0.64) > 0.3
-    assert levels.meshed(2.0) == pytest.approx(2.0)
-    assert Levels(mca.make_scene("coaxial_rods"), 2.0).unlike(1.5) == 0.0
+    refinements = Refinements(mca.make_scene("coaxial_rods"), 1.0)
+    assert refinements.near(0.64, 0.3, 1.1) == 1.0
+    assert refinements.finer(1.0, STEP, 4.0) == [2.0, 3.0, 4.0]
+    assert refinements.unlike(0.64) > 0.3
+    assert refinements.meshed(2.0) == pytest.approx(2.0)
+    assert Refinements(mca.make_scene("coaxial_rods"), 2.0).unlike(1.5) == 0.0
 
 
 def test_levels_have_meshes_of_their_own():
     """Few cells of a ball may be those of other values of refine."""
-    levels = Levels(mca.make_scene("hertz_sphere", section=4), 1.0)
-    assert levels.meshed(levels.near(0.64, 0.58, 0.99)) < 1.15 * levels.meshed(0.45)
-    second = levels.near(0.64, 0.58, 0.99, coarser=0.45)
-    assert levels.meshed(second) >= 1.15 * levels.meshed(0.45)
-    assert all(levels.meshed(level) >= 1.15 * levels.meshed(second) for level in levels.finer(second, STEP, 4.0))
+    refinements = Refinements(mca.make_scene("hertz_sphere", section=4), 1.0)
+    assert refinements.meshed(refinements.near(0.64, 0.58, 0.99)) < 1.15 * refinements.meshed(0.45)
+    second = refinements.near(0.64, 0.58, 0.99, coarser=0.45)
+    assert refinements.meshed(second) >= 1.15 * refinements.meshed(0.45)
+    assert all(
+        refinements.meshed(level) >= 1.15 * refinements.meshed(second) for level in refinements.finer(second, STEP, 4.0)
+    )
 
 
 def test_meshes_that_are_the_same_tell_nothing():
@@ -88,8 +90,8 @@ def test_meshes_that_are_the_same_tell_nothing():
 def test_a_recipe_without_counts_has_all_levels():
     scene = mca.make_scene("coaxial_rods")
     bodies = tuple(replace(body, geometry=Plain()) for body in scene.bodies)
-    levels = Levels(replace(scene, bodies=bodies), 1.0)
-    assert levels.near(0.64, 0.3, 1.1) == levels.meshed(0.64) == 0.64
+    refinements = Refinements(replace(scene, bodies=bodies), 1.0)
+    assert refinements.near(0.64, 0.3, 1.1) == refinements.meshed(0.64) == 0.64
 
 
 def test_what_cannot_be_had_is_refused_with_what_can():

@@ -22,6 +22,7 @@ CODE = ("kernels/", "scenes/", "tests/", "benchmarks/", "warp_mca/")  # shown as
 _LINK = re.compile(r"(?P<before>\]\()(?P<target>[^)#\s:]+)(?P<anchor>#[^)\s]*)?(?P<after>\))")
 # A formula as pymdownx.arithmatex leaves it: in a span within a line, in a div of its own.
 _FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>', re.S)
+_BOLD_DIGIT = re.compile(r'<mn mathvariant="bold">(\d)</mn>')
 
 
 def on_files(files: Files, *, config: Any) -> Files:
@@ -69,6 +70,9 @@ def _set_formula(match: re.Match[str]) -> str:
     """The `<math>` element of a formula; one of its own stands in a paragraph of its own."""
     block = match["tag"] == "div"
     math = convert(unescape(match["latex"]).strip(), display="block" if block else "inline")
+    math = _BOLD_DIGIT.sub(
+        lambda digit: f"<mn>{chr(0x1D7CE + int(digit[1]))}</mn>", math
+    )  # browsers ignore mathvariant
     return f'<div class="formula">{math}</div>' if block else math
 
 

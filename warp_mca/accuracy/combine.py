@@ -1,8 +1,8 @@
 """Owns promising combinations: which knobs to turn together, foreseen from what each does alone.
 
-Changes of a figure are taken to multiply, as are those of the cost. Of all combinations those are kept that no other
-one beats in both. Knobs on the way to the limit (cells, springs) change figures with their sign; what shortcuts change
-is added to the error, so that none is chosen because it happens to cancel another error.
+Relative changes of figures and of costs are assumed to multiply. Combinations are kept that no other one beats in both
+error and cost. Knobs that lead to the limit (cells, springs) change figures with their sign; changes by shortcuts are
+added to the error, so that none is chosen because it happens to cancel another error.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def combinations(
 
 
 def spread(count: int, most: int) -> list[int]:
-    """Numbers from 0 to count - 1, those first that lie evenly among them: `most` of these."""
+    """`most` numbers out of 0 to count - 1, evenly spread ones first."""
     first = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)).tolist()
     return first + [k for k in range(count) if k not in first]
 
@@ -84,7 +84,7 @@ def excluded(knobs: Sequence[str]) -> list[tuple[int, int]]:
 
 
 def merged(variants: Sequence[Variant]) -> Variant:
-    """One variant with what all of them change; they change different things."""
+    """One variant with the changes of all of them, which are of different knobs."""
     options: dict[str, object] = {}
     parameters: dict[str, object] = {}
     for variant in variants:
@@ -108,7 +108,7 @@ def _change(bench: Bench, base: Measured, run: Measured, names: Sequence[str]) -
 
 
 def _frontier(cost: Array, error: Array) -> list[int]:
-    """Those that no other beats in both, by rising cost."""
+    """Combinations that no other beats in both error and cost, by rising cost."""
     found, best = [], math.inf
     for k in np.lexsort((error, cost)):
         if error[k] < BETTER * best:

@@ -27,10 +27,10 @@ NO_RUN = "no run has this figure"
 
 @dataclass(frozen=True)
 class Limit:
-    """Where a series of values goes as its small parameter goes to zero.
+    """Limit of a series of values as its small parameter goes to zero.
 
     Attributes:
-        value: the limit; None where there is none, or none can be told.
+        value: the limit; None if there is none, or if it cannot be found.
         left: greatest error that `value` is expected to have, as a share of it [-]; None without `value`.
         order: observed order p [-]; None where fewer than three values, or irregular ones, give none.
         ratio: of the last two differences [-], below 1 in size where they shrink; None with fewer than three values,
@@ -46,7 +46,7 @@ class Limit:
 
 
 def limit_of(sizes: Sequence[float], values: Sequence[float | None], resolution: float = 0.0) -> Limit:
-    """The limit of a series, from its last three values; two are extrapolated with order 1, one has no error known.
+    """The limit of a series from its last three values; two are extrapolated with order 1, one gives no error.
 
     Args:
         sizes: the small parameter, each smaller than the one before, shape (count,).
@@ -73,9 +73,9 @@ def limits(
 
 
 def observed_order(sizes: Sequence[float], values: Sequence[float]) -> float | None:
-    """The order p with which three values approach their limit, from -8 to 8 [-]; None where they swing or stand still.
+    """Order p with which three values approach their limit, -8 to 8 [-]; None if they oscillate or do not change.
 
-    A negative order is that of a series that grows without bound, zero that of a logarithm.
+    A series that grows without bound has a negative order, a logarithm the order zero.
     """
     first, last = values[1] - values[0], values[2] - values[1]
     if first * last <= 0.0:
@@ -106,9 +106,9 @@ def _of_three(h: Sequence[float], f: Sequence[float], resolution: float) -> Limi
     if order is not None and order >= LEAST_ORDER:
         found = _extrapolated(h, f, min(max(order, ORDERS[0]), ORDERS[1]), resolution)
         return Limit(found.value, found.left, order, ratio)
-    if ratio is not None and -0.5 <= ratio <= 0.0:  # values swing around a limit
+    if ratio is not None and -0.5 <= ratio <= 0.0:  # values oscillate around a limit
         return Limit(f[-1], (abs(last) + resolution) / abs(f[-1]), None, ratio)
-    irregular = order is None or order < SINGULAR  # as of coarse meshes, whose first change is small by chance
+    irregular = order is None or order < SINGULAR  # as for coarse meshes, whose first change is small by chance
     if irregular and spread + resolution <= SETTLING * abs(f[-1]):
         return Limit(f[-1], (spread + resolution) / abs(f[-1]), None, ratio)
     moves = f"the last two are {_share(first, f)} and {_share(last, f)}"
@@ -117,7 +117,7 @@ def _of_three(h: Sequence[float], f: Sequence[float], resolution: float) -> Limi
 
 
 def _steady(h: Sequence[float], f: Sequence[float], ratio: float | None, resolution: float) -> Limit:
-    """A series that hardly moves: extrapolated where it shows an order, its last value otherwise."""
+    """Limit of a series that hardly changes: extrapolated if it shows an order, else its last value."""
     order = observed_order(h, f)
     if order is not None and order >= ORDERS[0]:
         found = _extrapolated(h, f, min(order, ORDERS[1]), resolution)
@@ -127,7 +127,7 @@ def _steady(h: Sequence[float], f: Sequence[float], ratio: float | None, resolut
 
 
 def _extrapolated(h: Sequence[float], f: Sequence[float], p: float, resolution: float) -> Limit:
-    """Richardson's limit of the last two values with order p; as much as it adds may be left."""
+    """Richardson's limit of the last two values with order p; what it adds is the expected error."""
     step = (f[-1] - f[-2]) * h[-1] ** p / (h[-2] ** p - h[-1] ** p)
     value = f[-1] + step
     if value == 0.0:

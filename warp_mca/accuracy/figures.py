@@ -22,8 +22,8 @@ NAMES = (*BOUND, "max_plastic_strain", "path_stress")  # [-], [Pa]
 def figures_of(result: Result) -> Figures:
     """Headline figures of a run, each None where it has none: a contact without a peak, elastic bodies, no path.
 
-    A contact that is still open when the run ends has no duration, nor has one that another mesh may cut or lengthen:
-    where bodies graze each other after it, or hardly touch between two compressions.
+    A contact that has not ended when the run ends has no duration. Neither has one that another mesh may shorten or
+    lengthen, because bodies graze each other after it or hardly touch between two compressions.
     """
     summary = result.summary
     unsure = summary.get("contact_open_at_end") or why_unsure(result.F_n)
@@ -38,7 +38,7 @@ def figures_of(result: Result) -> Figures:
 
 
 def why_unsure(F_n: NDArray[np.float64]) -> str:
-    """Why the duration of a contact is that of the mesh, empty if it is not; F_n as of `contact_rows` [N]."""
+    """Why the duration of a contact depends on the mesh; empty if it does not. F_n as in `contact_rows` [N]."""
     if grazing_share(F_n):
         return "it counts touches with hardly any force, whose length is the mesh's; contacts has the first one's"
     if share := faint_share(F_n):
@@ -54,7 +54,7 @@ def normal_impulse(result: Result) -> float:
 
 
 def errors(found: Figures, truth: Figures) -> dict[str, float | None]:
-    """Share by which each figure differs from the truth [-], signed; None where either has none."""
+    """Signed relative error of each figure against the truth [-]; None if either is missing."""
     shares: dict[str, float | None] = {}
     for name in NAMES:
         value, true = found.get(name), truth.get(name)

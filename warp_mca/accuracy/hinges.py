@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from warp_mca.scene import Revolute, Scene, Spherical
 
-# Figures that depend on what a joint gives back; the first force peak is over before.
+# Figures that depend on the reaction of a joint; the first force peak is over before.
 AFTER = ("impulse", "contact_duration", "max_plastic_strain")
 
 

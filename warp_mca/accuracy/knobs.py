@@ -13,7 +13,7 @@ from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Scene
 from warp_mca.scene.catalogue import load_source, scene_names
 
-# Values of each knob, those that tell most first: a budget drops the last ones.
+# Values of each knob, the most informative first; a budget drops the last ones.
 REFINE = (0.7, 1.4, 0.5, 1.2, 0.85)  # over the scene's own
 PENALTY = (1.0, 3.0, 10.0, 0.3, 0.1, "auto")
 MASS_SCALING = (2.0, 1.5, 3.0, 1.2)
@@ -57,7 +57,7 @@ EXCLUDED = {"mass scaling": {"coarse rods, tied", "plate of tied boxes", "far li
 
 @dataclass(frozen=True)
 class Trial:
-    """A variant to run, and the knob that it belongs to: variants of one knob exclude each other."""
+    """A variant to run and its knob; variants of one knob exclude each other."""
 
     knob: str
     variant: Variant
@@ -100,7 +100,7 @@ def _scales(scene: Scene) -> Iterator[float]:
 
 
 def _elements(scene: Scene) -> list[str]:
-    """Formulations that can take the place of the one that all bodies have."""
+    """Formulations that can replace the one that all bodies have."""
     found = {body.element for body in scene.bodies}
     own = ELEMENTS.get(str(found.pop())) if len(found) == 1 else None
     return [name for name, item in ELEMENTS.items() if own and item.cell == own.cell and item is not own]

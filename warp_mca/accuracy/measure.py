@@ -26,14 +26,14 @@ from warp_mca.scene import Scene
 FIXED = 20_000  # elements that a GPU computes in the time that a step costs in any case
 SPRINGS = 1.3  # penalty whose springs shorten the stable step by the square root of 2
 AUTO_PENALTY = 4.0  # about what "auto" chooses for links and balls, to foresee its cost
-MULTI_RATE = 0.4  # share of element steps that steps of several rates compute, about
-COMPILING = 2.0  # what takes longer before the first step is compiling kernels, which happens once [s]
-FORESEEN = 0.05  # share of the steps from which on these tell how long all will take
+MULTI_RATE = 0.4  # share of element steps that remain with several rates, roughly
+COMPILING = 2.0  # longer waits before the first step are compilations of kernels, which happen once [s]
+FORESEEN = 0.05  # share of the steps after which the time of all can be estimated
 ELEMENTS = {"hex8r": 0.5}  # time of an element over that of hex8, on a CPU
 
 
 class OutOfTimeError(McaError):
-    """A run would not end, or did not, before the time of the bench is over."""
+    """A run did not end, or would not end, before the time of the bench is over."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +82,8 @@ class Bench:
     def clock(self) -> str:
         """The time that variants are compared by, a key of `Measured.wall`.
 
-        One thread's processor time does not depend on what else a machine does, and is the wall time where it does
-        nothing else.
+        The processor time of one thread does not depend on what else the machine does; on an idle machine it equals the
+        wall time.
         """
         return "cpu" if self.device == "cpu" and self.threads == 1 else "fe"
 
@@ -93,7 +93,7 @@ class Bench:
             return self._meshes.key(variant)
 
     def run(self, trial: Trial) -> Measured:
-        """Run a variant; what it refuses and what guards stop is part of the measurement.
+        """Run a variant. A refusal, or a guard that stops it, is part of the measurement.
 
         Raises:
             McaError: the scene as written cannot be run; OutOfTimeError in the time that is left.
@@ -171,7 +171,7 @@ class Bench:
 
 @contextmanager
 def quiet(on: bool = True) -> Iterator[None]:
-    """No warnings of runs meanwhile: variants are meant to be worse than what one would run."""
+    """Silence warnings of runs: variants are meant to be worse than what one would run."""
     logger = logging.getLogger(LOGGER)
     before, logger.disabled = logger.disabled, on or logger.disabled
     try:
@@ -205,9 +205,9 @@ def _steps(variant: Variant, scene: Scene) -> float:
 
 
 class _Watch:
-    """Told of a run's progress; measures the processor time of its steps, and stops it where time is over.
+    """Follows the progress of a run, measures the processor time of its steps, and stops it when time is over.
 
-    The first report comes after some rows; the time until then is taken in proportion.
+    The first report comes after some rows; the time before it is extrapolated in proportion.
     """
 
     def __init__(self, steps: float = math.inf, end: float = math.inf) -> None:
@@ -221,10 +221,10 @@ class _Watch:
         self._last = (0.0, 0.0, 0.0)
 
     def __call__(self, stage: str, done: float) -> None:
-        """Note how far the steps are, and the times.
+        """Note the progress of the steps, and the times.
 
         Raises:
-            OutOfTimeError: the run does not end in time, as far as its steps until now tell.
+            OutOfTimeError: by the pace of its steps so far, the run does not end in time.
         """
         now = time.perf_counter()
         if self._stage == "compile" and now > self._told + COMPILING:

@@ -2,7 +2,8 @@
 
 With cells of size h = 1 / refine, a figure f errs by C h^p. Two pilots give C with the usual p of low-order elements at
 edges of contacts; the run itself is the third value, which gives the order that is really there (`convergence`). Two
-cannot tell a series that goes nowhere: the second pilot is the run only where much less is left than was asked.
+values cannot reveal a series without a limit, so the second pilot serves as the run only if its estimated error is much
+smaller than asked.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from warp_mca.accuracy.catalogued import source_of
 from warp_mca.accuracy.convergence import STEADY, limit_of
 from warp_mca.accuracy.figures import Figures, figures_of
-from warp_mca.accuracy.levels import ANOTHER, Levels
+from warp_mca.accuracy.refinements import ANOTHER, Refinements
 from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import GuardError, bad_value
@@ -32,7 +33,7 @@ COARSE = 0.45, 0.3, 1.0  # refine of the first pilot over that of the scene: wan
 NEXT = 1.42, 1.3, 2.2  # of the second over that of the first; the first takes a fourth of its time [-]
 BELOW = 0.8  # of the second over that of a scene whose refine was typed, at most [-]
 STEP = 2.0**0.25  # between meshes that are considered [-]: a factor of two in time
-TRIES = 3  # levels at which the first pilot is tried, where guards stop it
+TRIES = 3  # refinements at which the first pilot is tried, where guards stop it
 MOST = 4.0  # greatest refine over that of the scene [-]
 ORDER = 1.5  # assumed before the run [-]
 SURE = 0.4  # of what was asked that may be left of the second pilot, for it to be the run [-]
@@ -50,19 +51,19 @@ class Pilots:
     Attributes:
         variant: chosen.
         why: in one sentence.
-        levels: meshes of the scene, with refine 1 as their base.
+        refinements: meshes of the scene, with refine 1 as their base.
         sizes: of the pilots' cells over those of the scene, as meshed [-].
         figures: of each pilot.
         resolution: of the contact duration: the output interval [s].
         bound: figures that must be accurate.
-        auto: penalties are chosen by the mesh, so that what springs give away does not shrink with the cells.
+        auto: penalties are chosen by the mesh, so that the loss in springs does not shrink with the cells.
         result: of the last pilot, where that is the run.
         wall: that this pilot took [s].
     """
 
     variant: Variant
     why: str
-    levels: Levels
+    refinements: Refinements
     sizes: tuple[float, ...]
     figures: tuple[Figures, ...]
     resolution: float
@@ -72,12 +73,12 @@ class Pilots:
     wall: float = 0.0
 
     def estimate(self, result: Result) -> Mapping[str, float | str]:
-        """Error of each figure of the run [-], or why none can be told."""
+        """Estimated error of each figure of the run [-], or the reason why there is no estimate."""
         found = figures_of(result)
         sizes, runs = self.sizes, self.figures
         if self.result is None:
             assert self.variant.refine is not None
-            sizes, runs = (*sizes, 1.0 / self.levels.meshed(self.variant.refine)), (*runs, found)
+            sizes, runs = (*sizes, 1.0 / self.refinements.meshed(self.variant.refine)), (*runs, found)
         lost = _spring_loss(result)
         return {
             name: self._error([run[name] for run in runs], sizes, name, lost * (IMPULSE if name == "impulse" else 1.0))
@@ -85,7 +86,7 @@ class Pilots:
         }
 
     def _error(self, values: Sequence[float | None], sizes: Sequence[float], name: str, lost: float) -> float | str:
-        """Error of the last value [-], or why none can be told; `lost` is what springs take of it [-]."""
+        """Estimated error of the last value [-], or the reason why there is none; `lost` is the loss in springs [-]."""
         if any(coarse < ANOTHER * fine for coarse, fine in pairwise(sizes)):
             return "meshes of other density are nearly the same, for bodies have few cells; make more"
         resolution = self.resolution if name == "contact_duration" else 0.0
@@ -108,49 +109,49 @@ def run_pilots(scene: Scene, asked: Accuracy, bound: Sequence[str], run: Callabl
     """
     typed = asked.typed.get("refine")
     base = scene.refine if typed is None else float(typed)  # pyright: ignore[reportArgumentType]
-    levels, plain = Levels(scene, base), Levels(scene, 1.0)
-    coarse, start, first = _first(scene, asked, levels, typed is not None, run)
+    refinements, plain = Refinements(scene, base), Refinements(scene, 1.0)
+    coarse, start, first = _first(scene, asked, refinements, typed is not None, run)
     ratio, least, most = NEXT
     most = BELOW if typed is not None else most * coarse
-    level = levels.near(ratio * coarse, least * coarse, most, None if typed is not None else coarse)
-    sizes = tuple(1.0 / plain.meshed(found * base) for found in (coarse, level))
+    refinement = refinements.near(ratio * coarse, least * coarse, most, None if typed is not None else coarse)
+    sizes = tuple(1.0 / plain.meshed(found * base) for found in (coarse, refinement))
     if sizes[0] < ANOTHER * sizes[1]:
         remedy = "two meshes coarser than that are nearly the same, for bodies have few cells; make more"
         if typed is not None:
             raise bad_value("refine", typed, f"{remedy}, or leave it out")
         raise bad_value("accuracy", asked.share, remedy)
     begin = time.perf_counter()
-    second = _pilot(scene, replace(start, refine=level * base), run)
+    second = _pilot(scene, replace(start, refine=refinement * base), run)
     wall = time.perf_counter() - begin
     known = figures_of(first), figures_of(second)
     if all(known[1][name] is None for name in bound):
         remedy = "it binds figures of contacts, and in a coarse run of the scene none has a force; leave it out"
         raise bad_value("accuracy", asked.share, remedy)
     auto = any(contact.penalty == "auto" for contact in start.applied(scene).contacts)
-    springs = Springs(_spring_loss(second), auto, level)
+    springs = Springs(_spring_loss(second), auto, refinement)
     foreseen = {name: _foreseen(known[0][name], known[1][name], sizes[0] / sizes[1]) for name in bound}
     errors = {name: error for name, error in foreseen.items() if error is not None}
     worst = max(errors, key=lambda name: errors[name], default="")
-    chosen = _level(asked, (worst, errors.get(worst, 0.0)), springs, levels, typed is not None, second)
+    chosen = _refinement(asked, (worst, errors.get(worst, 0.0)), springs, refinements, typed is not None, second)
     at = f" after coarse runs that leave {errors[worst]:.1%} in {worst}" if worst else ""
     variant = replace(start, refine=chosen * base)
     stiff = f", penalty {start.knobs['penalty']:g}" if "penalty" in start.knobs else ""
     return Pilots(
         variant=variant,
         why=f"refine {chosen * base:.3g}{stiff}{at}",
-        levels=plain,
+        refinements=plain,
         sizes=sizes,
         figures=known,
         resolution=scene.impact.output_interval,
         bound=tuple(bound),
         auto=auto,
-        result=second if chosen == level else None,
+        result=second if chosen == refinement else None,
         wall=wall,
     )
 
 
 def _first(
-    scene: Scene, asked: Accuracy, levels: Levels, fixed: bool, run: Callable[..., Result]
+    scene: Scene, asked: Accuracy, refinements: Refinements, fixed: bool, run: Callable[..., Result]
 ) -> tuple[float, Variant, Result]:
     """Level, model and result of the first pilot: the coarsest that no guard stops.
 
@@ -161,21 +162,21 @@ def _first(
     most = BELOW / NEXT[1] if fixed else most
     left = 1 if fixed else TRIES
     while True:
-        level = levels.near(wanted, least, most)
-        start = Variant(refine=level * levels.base, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
+        refinement = refinements.near(wanted, least, most)
+        start = Variant(refine=refinement * refinements.base, multi_rate=asked.typed.get("multi_rate", "auto"))  # pyright: ignore
         left -= 1
         try:
-            return level, *_with_springs(scene, asked, start, run)
+            return refinement, *_with_springs(scene, asked, start, run)
         except GuardError:
             if not left:
                 raise
-        wanted, least, most = (ratio * level for ratio in NEXT)
+        wanted, least, most = (ratio * refinement for ratio in NEXT)
 
 
 def _with_springs(scene: Scene, asked: Accuracy, start: Variant, run: Callable[..., Result]) -> tuple[Variant, Result]:
     """The model and the result of the first pilot: with contact springs as stiff as the accuracy needs.
 
-    Where a guard stops it with these, the scene keeps its own; what they give away then asks for a finer mesh.
+    If a guard stops it with these springs, the scene keeps its own, whose loss then asks for a finer mesh.
     """
     first = _pilot(scene, start, run)
     stiffer = _stiffer(scene, asked, first)
@@ -205,26 +206,26 @@ class Springs:
     Attributes:
         lost: of the greatest force [-], by estimate.
         auto: the mesh chooses their penalty, so that the loss stays; otherwise they are softer in larger cells.
-        level: of the second pilot, its refine over that of the scene [-].
+        refinement: of the second pilot, its refine over that of the scene [-].
     """
 
     lost: float
     auto: bool
-    level: float
+    refinement: float
 
-    def left(self, level: float) -> float:
+    def left(self, refinement: float) -> float:
         """What is lost with another refine over that of the scene [-]."""
-        return self.lost if self.auto else self.lost * (self.level / level) ** SHRINKS
+        return self.lost if self.auto else self.lost * (self.refinement / refinement) ** SHRINKS
 
 
 def _spring_loss(result: Result) -> float:
-    """What contact springs gave away of the greatest force [-], by estimate."""
+    """Estimated loss of the greatest force in contact springs [-]."""
     shares = result.summary["contact_spring_share"].values()
     return PEAK_LOSS * max((share for share in shares if share is not None), default=0.0)
 
 
 def _stiffer(scene: Scene, asked: Accuracy, first: Result) -> Mapping[str, Any] | None:
-    """What gives contact springs the stiffness that the accuracy needs, or None where they have it, or must stay."""
+    """Settings that make contact springs stiff enough for the accuracy; None if they are, or must stay."""
     (penalty, *others) = {contact.penalty for contact in scene.contacts}
     lost, allowed = _spring_loss(first), SPRINGS * asked.share
     if others or "penalty" in asked.typed or not isinstance(penalty, float | int) or lost <= allowed:
@@ -244,26 +245,26 @@ def _foreseen(first: float | None, second: float | None, ratio: float) -> float 
     return abs(first / second - 1.0) / (max(ratio, NEXT[1]) ** ORDER - 1.0)
 
 
-def _level(
-    asked: Accuracy, worst: tuple[str, float], springs: Springs, levels: Levels, fixed: bool, second: Result
+def _refinement(
+    asked: Accuracy, worst: tuple[str, float], springs: Springs, refinements: Refinements, fixed: bool, second: Result
 ) -> float:
-    """Refine of the run over that of the scene [-]: the first level whose error stays within what was asked.
+    """Refine of the run over that of the scene [-]: the first refinement whose error stays within what was asked.
 
     Args:
         asked: accuracy.
         worst: figure of the second pilot, and the error that is foreseen of it [-].
         springs: of its contacts.
-        levels: meshes of the scene.
+        refinements: meshes of the scene.
         fixed: the user typed the scene's refine.
         second: that pilot.
 
     Raises:
         RequestError: no mesh is fine enough.
     """
-    coarse, (figure, error) = springs.level, worst
+    coarse, (figure, error) = springs.refinement, worst
 
-    def left(level: float) -> float:
-        return (error * (coarse / level) ** ORDER + springs.left(level)) / MARGIN
+    def left(refinement: float) -> float:
+        return (error * (coarse / refinement) ** ORDER + springs.left(refinement)) / MARGIN
 
     if fixed:
         if left(1.0) <= asked.share:
@@ -274,10 +275,10 @@ def _level(
         raise bad_value("refine", asked.typed["refine"], remedy)
     if left(coarse) <= SURE * asked.share:
         return coarse
-    found = levels.finer(coarse, STEP, max(MOST, NEXT[2] * coarse))
-    for level in found:
-        if left(level) <= asked.share:
-            return level
+    found = refinements.finer(coarse, STEP, max(MOST, NEXT[2] * coarse))
+    for refinement in found:
+        if left(refinement) <= asked.share:
+            return refinement
     finest = found[-1]
     if "penalty" in asked.typed and springs.left(finest) > 0.5 * MARGIN * left(finest):
         remedy = f"springs of this penalty give away about {springs.left(1.0):.1%}; leave it out, or give a larger one"
@@ -286,7 +287,7 @@ def _level(
     # An accuracy that is easier to have leaves contact springs softer.
     had = max(left(finest), (left(finest) * MARGIN - springs.left(finest)) / (MARGIN - SPRINGS))
     where = f" in {figure}" if figure else ""
-    remedy = f"about {_above(had)} can be had{where}, with refine {finest * levels.base:.3g} in some {steps:.1e}"
+    remedy = f"about {_above(had)} can be had{where}, with refine {finest * refinements.base:.3g} in some {steps:.1e}"
     remedy += " element-steps; ask for no less, or refine the scene where bodies touch"
     raise bad_value("accuracy", asked.share, remedy)
 

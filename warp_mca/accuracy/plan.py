@@ -157,10 +157,10 @@ def planned(
     return replace(found, wall=time.perf_counter() - begin - own)
 
 
-def carried_out(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -> Result:
-    """The result of a plan, with less mass where its model would gain too much; errors are smaller then.
+def run_planned(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -> Result:
+    """Carry out a plan, with less mass scaling if its model would gain too much, which makes errors smaller.
 
-    How much mass elements gain is known once the model is made, which deciding does not wait for.
+    The added mass is known only when the model is built, after the decision.
 
     Raises:
         RequestError: the request cannot be carried out.
@@ -180,7 +180,7 @@ def carried_out(plan: Plan | None, carry_out: Callable[[Plan | None], Result]) -
 
 
 def _lighter(plan: Plan, error: RequestError) -> Plan | None:
-    """The plan with less mass, if too much is what was refused."""
+    """The plan with less mass scaling, if the error is a refusal of too much mass; else None."""
     variant = None if "mass_scaling" in plan.asked.typed else lighter(plan.variant, error)
     if variant is None:
         return None
@@ -189,7 +189,7 @@ def _lighter(plan: Plan, error: RequestError) -> Plan | None:
 
 
 def lighter(variant: Variant, error: RequestError) -> Variant | None:
-    """The variant with less mass, if too much is what was refused."""
+    """The variant with less mass scaling, if the error is a refusal of too much mass; else None."""
     asked = variant.mass_scaling
     if asked is None or not str(error).startswith("ImpactPhase.mass_scaling"):
         return None
@@ -222,7 +222,7 @@ def _materials(material: Elastic | Mapping[str, Elastic]) -> Sequence[Elastic]:
 def _from_family(
     family: Family, scene: Scene, asked: Accuracy, reasons: Mapping[str, str], bound: Sequence[str], device: str
 ) -> Plan | None:
-    """By what scenes of the same family have shown; None where no variant is accurate enough."""
+    """A plan by measured scenes of the same family; None if no variant is accurate enough."""
     cpu = device.startswith("cpu")
     found = choices(family, scene.parameters, asked, bound, cost_of(device), cpu)
     chosen = best(found, asked.share)
@@ -252,7 +252,7 @@ def _why(chosen: Choice, found: Sequence[Choice], scenes: int, elements: float, 
 
 
 def _from_pilots(scene: Scene, asked: Accuracy, reasons: Mapping[str, str], bound: Sequence[str], run: Run) -> Plan:
-    """By coarse runs of the scene itself.
+    """A plan by coarse runs of the scene itself.
 
     Raises:
         RequestError: what is asked cannot be had, or contradicts what was typed.

@@ -1,4 +1,4 @@
-"""Owns what measured scenes tell of another one: expected errors of each variant there, and how uncertain they are.
+"""Owns predictions from measured scenes for another one: expected errors of each variant, and their uncertainty.
 
 Errors of one figure of one variant are a Gaussian process over the features x of a scene (Rasmussen and Williams,
 Gaussian Processes for Machine Learning, 2.2 and 5.4.2): with the mean m of all scenes and their variance s^2,
@@ -6,8 +6,8 @@ Gaussian Processes for Machine Learning, 2.2 and 5.4.2): with the mean m of all 
     k(x, y) = s^2 exp(-|x - y|^2 / (2 l^2)),  K = k(X, X) + diag(n^2),
     e(x) = m + k(x, X) K^-1 (e - m),   var(x) = s^2 - k(x, X) K^-1 k(X, x) + n^2
 
-with the length l under which each measured scene would have been foreseen best from the others. The noise n is that of
-the limits from which errors are counted, in each scene as far as these are known; for another scene it is the median.
+with the length l that predicts each measured scene best from the others. The noise n of a scene is the uncertainty of
+the limits to which its errors refer; for another scene it is the median.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ INTERVAL = 5e-3  # the same of durations, which are known to the output interval
 DEVIATION = 0.4  # standard deviation of a limit over what may be left of it at most [-]
 LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0)  # in standard deviations of the features, times the root of their number
 FAR = 6.0  # standard deviations from the median beyond which an error is an outlier
-NEAR = 0.02  # distance from the median within which it is none [-]
+NEAR = 0.02  # largest distance from the median of a run that is no outlier [-]
 NORMAL = 1.4826  # standard deviation of a normal distribution over the median distance from its mean
 CORES = (0.5, 1.2)  # least and greatest `Process.core` [-]
 MANY = 20  # scenes from which a median tells it
 FEWEST = 4  # scenes from which anything is foreseen
 LOW, HIGH = 0.5, 3.0  # estimates over true errors between which they are right [-]
-SMALL = 0.2  # of what was asked: errors below it need not be told apart [-]
+SMALL = 0.2  # share of what was asked below which errors need not be distinguished [-]
 SIZES = tuple(1e-4 * 1.04**k for k in range(220))  # estimates that are considered [-], up to 0.54
 
 
@@ -63,7 +63,7 @@ class Expected:
         return _normal((share - self.mean) / self.spread) - _normal((-share - self.mean) / self.spread)
 
     def estimate(self, small: float) -> float:
-        """The size that is most probably right [-]: LOW to HIGH times the true one, or both of them below `small`."""
+        """The estimate that is most probably LOW to HIGH times the true size, or below `small` together with it [-]."""
         most = replace(self, spread=self.core * self.spread)
 
         def right(size: float) -> float:
@@ -87,9 +87,9 @@ def expected_errors(
 
 
 def is_close(family: Family, parameters: Mapping[str, object]) -> bool:
-    """Whether some measured scene is nearer to this one than scenes lie from their mean; else nothing is known of it.
+    """Whether a measured scene is nearer to this one than scenes usually are to their mean; else nothing is known.
 
-    Scenes lie from it the root of the number of features, in standard deviations of these.
+    The usual distance is the root of the number of features, in standard deviations of these.
     """
     points = family.points
     if len(points) < FEWEST:
@@ -148,7 +148,7 @@ def gaussian_process(points: Array, errors: Array, here: Array, noise: Array, pr
 
 
 def fitted(points: Array, errors: Array, noise: Array) -> Process:
-    """The length under which each scene is foreseen best from the others, and how far most are off then.
+    """The length that predicts each scene best from the others, and the spread of most of these predictions.
 
     Left out, scene i is off by (K^-1 e)_i / (K^-1)_ii, with the variance 1 / (K^-1)_ii (Rasmussen and Williams, 5.12).
     Arguments are those of `gaussian_process`.
@@ -181,7 +181,7 @@ def _squares(points: Array) -> Array:
 
 
 def _without_outliers(errors: Array) -> Array:
-    """Errors; those far off, where another peak was taken for the first, say, are moved to the edge of the others."""
+    """Errors with outliers (another peak was taken for the first, say) moved to the edge of the others."""
     middle = _median(errors)
     reach = max(FAR * NORMAL * _median(np.abs(errors - middle)), NEAR)
     return np.clip(errors, middle - reach, middle + reach)

@@ -20,7 +20,7 @@ from warp_mca.scene import Scene
 
 LADDER = (1.0, 3.0, 10.0)  # penalties of which the softest is taken whose springs hold no more than STIFF
 UNCHECKED = 3.0  # penalty that is taken, at least, where there is no time for others
-STIFF = 0.005  # share by which the figures of a penalty may differ from those of stiff springs
+STIFF = 0.005  # largest relative difference of a penalty's figures from those of stiff springs
 FINEST = (2.0, 1.7, 1.4, 1.2, 1.0)  # finest mesh of the reference over the scene's own; the first that can be afforded
 STEP = 1.4  # between the cells of its meshes
 
@@ -78,7 +78,7 @@ def choose_penalty(
 
 
 def _stiff(found: Measured, taken: Mapping[str, float]) -> bool:
-    """Whether springs take next to nothing from the figures that an asked accuracy binds, as far as a run has them."""
+    """Whether the loss in springs is negligible for all figures that an asked accuracy binds."""
     return all(found.figures.get(name) is None or abs(taken.get(name, 1.0)) <= STIFF for name in BOUND)
 
 
@@ -157,5 +157,5 @@ def _levels(bench: Bench, finest: float, penalty: float | str | None) -> Iterato
 
 
 def _resolution(scene: Scene) -> dict[str, float]:
-    """To which figures are known: the start and end of a contact are rows of the history."""
+    """Resolution of each figure: the start and end of a contact are rows of the history."""
     return {"contact_duration": scene.impact.output_interval}

@@ -50,7 +50,7 @@ def accuracy_of(asked: float | str | Accuracy) -> Accuracy:
     """An accuracy as users write it: 0.02, "2%", or an `Accuracy`.
 
     Raises:
-        RequestError: it is none of these, or out of range.
+        RequestError: it is not an accuracy, or out of range.
     """
     if isinstance(asked, Accuracy):
         return asked
@@ -67,7 +67,7 @@ def check_accuracy(scene: Scene, asked: float | str | Accuracy | None) -> None:
     """Refuse what is no accuracy, and names in `Accuracy.typed` that a scene does not have.
 
     Raises:
-        RequestError: so it is.
+        RequestError: it is not an accuracy, or a name is unknown.
     """
     if asked is not None:
         check_names(scene, accuracy_of(asked).typed)

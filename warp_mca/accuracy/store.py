@@ -52,7 +52,7 @@ class Measured:
     Attributes:
         parameters: that differ from the scene's defaults.
         errors: signed, by variant and figure [-]; None where a run has no such figure.
-        left: how far off the limits may be from which errors are counted, by figure [-]; None where nobody knows.
+        left: uncertainty of the limits to which errors refer, by figure [-]; None if unknown.
     """
 
     parameters: Mapping[str, Any]
@@ -62,7 +62,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Process:
-    """What the scenes of a family tell of how the errors of one figure of one variant go with the features.
+    """How the errors of one figure of one variant depend on the features, learned from the scenes of a family.
 
     Attributes:
         length: over which they are alike, in standard deviations of the features [-].
@@ -124,7 +124,7 @@ class Family:
 
     @cached_property
     def left(self) -> dict[str, NDArray[np.float64]]:
-        """How far off the limits may be by figure [-], shape (scene_count,); 0 where nobody knows."""
+        """Uncertainty of the limits by figure [-], shape (scene_count,); 0 if unknown."""
         return {figure: np.array([scene.left.get(figure) or 0.0 for scene in self.scenes]) for figure in BOUND}
 
     def coordinates(self, parameters: Mapping[str, Any]) -> list[float]:

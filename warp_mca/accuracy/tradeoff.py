@@ -150,7 +150,7 @@ class _Study:
                 done += 1
 
     def note(self, trial: Trial) -> Measured:
-        """What a variant gave; each is run once, and those that are the same model together."""
+        """Measure a variant. Each is run once, and variants that are the same model share a run."""
         key = self.bench.key(trial.variant)
         if key in self.runs:
             first = self.runs[key].trial

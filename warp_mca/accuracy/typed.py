@@ -16,7 +16,7 @@ def check_values(typed: Mapping[str, object]) -> None:
     """Refuse values that no option of that name can have; a scene has checked its parameters when it was built.
 
     Raises:
-        RequestError: so it is.
+        RequestError: a value is not allowed.
     """
     for name, value in typed.items():
         if name == "multi_rate":
@@ -31,7 +31,7 @@ def check_names(scene: Scene, typed: Mapping[str, object]) -> None:
     """Refuse names that are neither options nor parameters of the scene.
 
     Raises:
-        RequestError: so it is.
+        RequestError: a name is unknown.
     """
     known = dict.fromkeys([*_VALUES, "multi_rate", *scene.parameters])
     for name, value in typed.items():

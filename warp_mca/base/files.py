@@ -105,7 +105,7 @@ def _temporary(make: Callable[[], tuple[int | None, str]]) -> Iterator[Path]:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove what processes that were killed left in a folder while they wrote: what nobody has locked."""
+    """Remove files that killed processes left in a folder while they wrote, which nobody has locked."""
     for path in [path for pattern in LEFTOVERS for path in folder.glob(pattern)]:
         with suppress(OSError):  # of another user, locked, or gone by now
             descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)

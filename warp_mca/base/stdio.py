@@ -20,7 +20,7 @@ def what_failed(error: OSError) -> str:
 
 
 def open_streams() -> None:
-    """Reopen closed standard streams, whose descriptors files would take; replace characters that they cannot print."""
+    """Reopen closed standard streams, so that files do not take their descriptors; replace unprintable characters."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)

@@ -57,7 +57,7 @@ def _overlapping(nodes: Index, owner: Index, group: NDArray, count: NDArray) -> 
 
 
 def _turns_left(faces: Index) -> NDArray[np.bool_]:
-    """Which way faces go around, the same for whichever corner comes first; opposite as seen from the other side."""
+    """Sense in which corners go around each face, whichever comes first; it is reversed as seen from behind."""
     rows, last = np.arange(len(faces)), np.where(is_triangle(faces), 2, 3)
     least = np.argmin(faces, axis=1)
     return faces[rows, (least + 1) % (last + 1)] < faces[rows, (least + last) % (last + 1)]

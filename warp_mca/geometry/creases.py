@@ -60,7 +60,7 @@ class Creases:
     def by_triangle(self, points: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
         """Normals at the corners of faces cut in triangles, shape (count, 3, 3); their vertices, shape (count, 3)."""
         normals = self.normals(points)
-        assert normals is not None  # asked for the first time
+        assert normals is not None  # first call
         group = np.zeros(self.quads.shape, dtype=np.int32)
         group[self._used] = self.group
         halves = [(slice(None), [0, 1, 2]), (self._used[:, 3], [0, 2, 3])]

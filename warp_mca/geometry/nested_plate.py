@@ -25,13 +25,13 @@ Axes = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, kw_only=True)
 class NestedPlate:
-    """A plate as of `Plate`, of bricks whose cells grow by a whole ratio from box to box.
+    """A plate like `Plate`, made of boxes around each other whose cells grow by a whole ratio.
 
     A box of fine cells lies in a larger one of coarser cells, and so on, out to the plate's faces. Boxes share no
     nodes: tie each pair of `tied`, for which the boxes' divisions are chosen such that no fine face crosses the edge of
     a coarse one.
 
-    Node sets: top, bottom, xmin, xmax, zmin, zmax, contact as of `Plate`, and those of `tied`. Cell set: body.
+    Node sets: top, bottom, xmin, xmax, zmin, zmax, contact as in `Plate`, and those of `tied`. Cell set: body.
 
     Attributes:
         length, width, height: extent along x, z, y [m].

@@ -80,7 +80,7 @@ def _weights(at: Array, x: Array) -> tuple[Array, Array]:
 
 
 def in_tetrahedra(at: Array, points: Array, cells: Index, boxes: Boxes) -> Located:
-    """The tetrahedron around or nearest to each point; arguments as of `in_hexahedra`.
+    """The tetrahedron around or nearest to each point; arguments as in `in_hexahedra`.
 
     Beyond its four corners the last one is repeated with weight 0.
     """

@@ -140,7 +140,7 @@ def carry_out_runs(
         out: folder of the report; runs are in a folder of it.
         device, precision, force, prepare, progress: as in `warp_mca.sweep`.
         workers: number of processes; one for each core, or SHARE for each GPU, if None.
-        deadline: no run begins so many seconds after this call [s]; with 0 the device need not be there.
+        deadline: no run begins later than this after the call [s]; with 0 no device is needed.
 
     Raises:
         RequestError, McaError: as in `warp_mca.sweep`; `out` holds runs of another level, among others.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from warp_mca.accuracy.plan import Plan, carried_out, planned
+from warp_mca.accuracy.plan import Plan, planned, run_planned
 from warp_mca.accuracy.request import Accuracy, check_accuracy
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.base.garbage import few_collections
@@ -97,7 +97,7 @@ def run(
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
     request = partial(_result, scene, meshes, span, tell, settings, recorders, method)
-    return carried_out(plan, partial(_carry_out, request, out, force, every))
+    return run_planned(plan, partial(_carry_out, request, out, force, every))
 
 
 def _carry_out(

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 Index = NDArray[np.int64]
 
-AT_ONCE = 2_000_000  # pixels that are looked at together, which bounds the memory that is needed
+AT_ONCE = 2_000_000  # pixels computed together, which bounds the memory
 NOTHING = np.iinfo(np.int64).max
-DEPTHS = 2.0**30  # depths that are told apart
+DEPTHS = 2.0**30  # number of depths that are distinguished
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from warp_mca.scene.sensors import check_class
 
 Array = NDArray[np.float64]
 
-CORNER = 2.0775  # corner of one pass over the class; -3 dB of both passes together are at 1.667 of it, SAE J211-1
+CORNER = 2.0775  # corner frequency of one pass over the class; SAE J211-1: both have -3 dB at 1.667 times the class
 SLACK = 1.01  # of the sampling rate: output intervals are rounded to whole steps
 UNEVEN = 1e-6  # share of the mean interval by which times may be uneven
 
@@ -19,8 +19,8 @@ UNEVEN = 1e-6  # share of the mean interval by which times may be uneven
 def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
     """Filter a history as SAE J211-1, Appendix C: a 2-pole Butterworth filter forwards, then backwards.
 
-    Before the start the history has its first value, as before a first touch. After the end it goes on as in a mirror:
-    where it still rings, its last value counts no more than those before it.
+    Before its start the history is continued with its first value, as before a first touch, and after its end by
+    reflection, so that the last value of a history that still rings weighs no more than those before it.
 
     Args:
         values: history along the first axis, shape (row_count, ...), float64.
@@ -28,8 +28,8 @@ def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
         cfc: channel frequency class [Hz], 60, 180, 600 or 1000 in the standard.
 
     Raises:
-        RequestError: class or interval is no finite number above 0, rows are too far apart for the class, or too near
-            each other, or a value is no finite number.
+        RequestError: class, interval or a value is not a finite number (the former above 0), or rows are too far apart
+            or too near each other for the class.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -51,14 +51,14 @@ def cfc_filter(values: Array, interval: float, cfc: float) -> Array:
     if len(values) < 2:
         return values.copy()
     sections = butter(2, CORNER * cfc, fs=1.0 / interval, output="sos")
-    period = int(np.ceil(1.0 / (CORNER * cfc * interval)))  # after so many rows the filter has forgotten its start
+    period = int(np.ceil(1.0 / (CORNER * cfc * interval)))  # rows after which the filter has forgotten its start
     count = min(len(values) - 1, 2 * period)
     seen = np.concatenate([np.repeat(values[:1], count, axis=0), values, values[-2 : -2 - count : -1]])
     return np.asarray(sosfiltfilt(sections, seen, axis=0, padlen=0))[count : count + len(values)]
 
 
 def is_even(time: Array) -> bool:
-    """Whether rows follow each other at even intervals, other than those of swings and impacts in turn.
+    """Whether rows are evenly spaced; those of swings and impacts in turn are not.
 
     Args:
         time: of each row [s], shape (row_count,).

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from warp_mca.results.result import Result
 
 COMPRESSION, RESTITUTION = "#5A5A5A", "#BDBDBD"
-REST = 1e-9  # share of the greatest energy of a run; contact forces that do less work are rounded at rest
+REST = 1e-9  # share of the greatest energy of a run; contact forces that do less work belong to bodies at rest
 STILL = 0.01  # share of the greatest component of velocity below which another one is not drawn
 # Column, label, colour, line style and width. A node of the surface of the plate rings with every wave: its lines are
 # thin and come first, so that they stay in the background.

@@ -48,14 +48,14 @@ def active_rows(active: NDArray[np.bool_]) -> NDArray[np.intp]:
 def joined(runs: NDArray[np.intp], length: int = 0) -> list[Rows]:
     """Join runs of rows that belong together.
 
-    Runs are one where the widest gap between them is below MERGED_GAP of the whole, from the first run to the last;
-    otherwise they are parted at this gap, and so on with the runs on either side. So a force that jitters on and off
-    throughout is one contact, however short its runs are, and contacts of very different durations each keep their own
-    measure.
+    If the widest gap between runs is below MERGED_GAP of the whole, from the first run to the last, all of them are one
+    contact. Otherwise they are split at this gap, and both sides are treated likewise. So a force that jitters on and
+    off is one contact, however short its runs are, and contacts of very different durations are each judged by their
+    own length.
 
     Args:
         runs: as from `active_rows`.
-        length: compare gaps with so many rows where the whole is shorter.
+        length: least number of rows with which gaps are compared, if the whole is shorter.
     """
     found: list[Rows] = []
     left = [runs] if len(runs) else []
@@ -82,18 +82,18 @@ def contact_rows(F_n: Array) -> list[Rows]:
 
 
 def unfinished(F_n: Array) -> bool:
-    """Whether a contact is still in progress in the last row; F_n as of `contact_rows`."""
+    """Whether a contact is still in progress in the last row; F_n as in `contact_rows`."""
     rows = contact_rows(F_n)
     return bool(rows) and rows[-1][1] == len(F_n)
 
 
 def grazing_share(F_n: Array) -> float:
-    """Share of the time in contact that goes by in finished contacts in which the bodies only graze each other [-].
+    """Share of the time in contact that belongs to finished contacts in which the bodies only graze each other [-].
 
-    Whether they touch then, and how long, depends on the mesh. 0 where it is too small to matter.
+    Whether they touch there, and how long, depends on the mesh. Shares too small to matter are returned as 0.
 
     Args:
-        F_n: as of `contact_rows`.
+        F_n: as in `contact_rows`.
     """
     rows = contact_rows(F_n)
     peak = max((float(F_n[first:end].max()) for first, end in rows), default=0.0)
@@ -104,10 +104,10 @@ def grazing_share(F_n: Array) -> float:
 def faint_share(F_n: Array) -> float:
     """Share of the time in contact in which the bodies hardly touch between two compressions [-].
 
-    Another mesh may part them there, and the contact is shorter by as much. 0 where it is too small to matter.
+    With another mesh they may part there, which shortens the contact. Shares too small to matter are returned as 0.
 
     Args:
-        F_n: as of `contact_rows`.
+        F_n: as in `contact_rows`.
     """
     rows = contact_rows(F_n)
     peak = float(np.max(F_n, initial=0.0))
@@ -120,13 +120,13 @@ def faint_share(F_n: Array) -> float:
 
 
 def _mattering(count: int, rows: list[Rows]) -> float:
-    """Share that some rows are of those in contact [-]; 0 where it is too small to matter."""
+    """Number of some rows over that of rows in contact [-]; 0 if it is too small to matter."""
     share = count / max(1, sum(end - first for first, end in rows))
     return share if share > GRAZING_TIME else 0.0
 
 
 def intervals(time: Array, rows: list[Rows]) -> list[Interval]:
-    """Start and end [s] of rows; what lies in the first row alone, at t = 0, has no length and is left out.
+    """Start and end of runs of rows [s]. A run in the first row alone, at t = 0, has no length and is left out.
 
     Args:
         time: ends of the output intervals [s], shape (row_count,).
@@ -166,8 +166,8 @@ def stick_intervals(time: Array, F_n: Array, stick_fraction: Array) -> list[Inte
 def reverses(F_t: Array, F_n: Array) -> bool:
     """Whether the tangential force changes sign: both signs reach 1 % of its greatest size.
 
-    Less is what the springs of a few nodes give back in the last microseconds of a contact. Where all of it is below a
-    millionth of the normal force, it is rounding.
+    Smaller values come from springs of a few nodes in the last microseconds of a contact. A tangential force below a
+    millionth of the normal force is rounding.
 
     Args:
         F_t: tangential force [N], shape (row_count,).
@@ -183,7 +183,7 @@ def reverses(F_t: Array, F_n: Array) -> bool:
 def smoothed(values: Array, rows: Rows) -> Array:
     """Values of a contact through a Gaussian of 2 % of its length, shape (rows of the contact,), float64.
 
-    They are taken as 0 beyond the contact, and beyond the history as they are in its first and last row.
+    Values beyond the contact count as 0, values beyond the history as in its first and last row.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -217,7 +217,7 @@ def force_peaks(time: Array, F_n: Array) -> list[Interval]:
 
 
 def _peak_rows(F_n: Array, rows: Rows, smooth: Array, prominence: float) -> list[int]:
-    """Rows of the peaks of one contact, whose `smooth` force they stand out of by `prominence` [N]."""
+    """Rows of the peaks of one contact that stand out of its `smooth` force by `prominence` [N]."""
     from scipy.signal import find_peaks
 
     ended = rows[1] < len(F_n)
@@ -258,7 +258,7 @@ def phases(F_n: Array, closing_speed: Array, least: float) -> tuple[list[Rows], 
 
 
 def _turns(values: Array, height: float) -> list[int]:
-    """Where values turn, at the ends of each rise and fall by `height` at least; none where they do neither."""
+    """Rows where values turn, at the ends of each rise and fall by at least `height`; empty without any."""
     found: list[int] = []
     low = high = direction = 0
     for i, value in enumerate(values.tolist()):

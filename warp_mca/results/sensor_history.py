@@ -47,7 +47,7 @@ class ProbeHistory:
     def acceleration(self) -> Array:
         """Change of the velocity over each output interval [m/s^2], shape (row_count, 3): its mean there, raw.
 
-        So its sum times the interval is the change of the velocity exactly. The first row ends no interval: 0.
+        Its sum times the interval is exactly the change of the velocity. The first row ends no interval and is 0.
         """
         found = np.zeros_like(self.velocity)
         np.divide(np.diff(self.velocity, axis=0), np.diff(self.time)[:, None], out=found[1:])
@@ -181,7 +181,7 @@ def _probe_figures(probe: ProbeHistory) -> dict[str, Any]:
 
 
 def _greatest(key: str, vectors: Array, time: Array) -> dict[str, Any]:
-    """The longest of some vectors and when it occurs; None where there is none."""
+    """The longest of some vectors and its time; None without vectors."""
     size = np.nan_to_num(np.linalg.norm(vectors, axis=1))
     if not size.any():
         return {key: 0.0, f"{key}_time": None}

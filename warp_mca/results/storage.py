@@ -156,9 +156,9 @@ def load(directory: str | os.PathLike[str]) -> Result:
 
 
 def _not_of_the_run(path: Path, digests: Mapping[str, str] | None) -> str:
-    """Name of the first file with data in `path` that is not as in the run whose `digests` these are; "" if all are.
+    """Name of the first data file in `path` that does not match the `digests` of the run; "" if all match.
 
-    Figures may be removed: nothing is read from them.
+    Figures may be removed, because nothing is read from them.
     """
     if digests is None:  # results of an earlier version
         return ""
@@ -198,7 +198,7 @@ def _read_history(path: Path) -> dict[str, Array]:
 
 
 def _with_output_time(result: Result, path: Path, seconds: float) -> Result:
-    """The result as saved in `path`, with the time that writing it took added to wall.output."""
+    """The result with its `path`, and with the time of writing added to wall.output."""
     summary = dict(result.summary)
     wall = summary.get("wall")
     if isinstance(wall, Mapping):

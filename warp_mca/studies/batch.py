@@ -78,7 +78,7 @@ def run_batch(
 
 
 def _check_meshes(meshes: object, count: int) -> None:
-    """Refuse meshes that are not a list with those of each of so many scenes.
+    """Refuse meshes that are not a list with an entry for each of the scenes.
 
     Raises:
         RequestError: so it is.

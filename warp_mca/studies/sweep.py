@@ -119,7 +119,8 @@ def carry_out(
         executor, workers, force, progress: as in `sweep`.
         meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
-        deadline: no run begins so many seconds after this call [s]; the others are not in the table, their rows say so.
+        deadline: no run begins later than this after the call [s]; the rows of others say so, but
+            are not in the table.
 
     Raises:
         RequestError, McaError: as in `sweep`.
@@ -262,7 +263,7 @@ class _Driver:
                 future.cancel()
 
     def _left(self) -> float | None:
-        """Time until the end [s]; None where there is none, or it is over."""
+        """Time until the deadline [s]; None without a deadline, or after it."""
         left = self.end - time.monotonic()
         return left if 0.0 < left < math.inf else None
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from warp_mca.phases.rate_groups import MultiRate
     from warp_mca.scene import Body, Contact
 
-FULL = 100_000  # elements that fill a GPU: docs/measurements/methods.md has the measurement
+FULL = 100_000  # elements that fill a GPU: docs/measurements/options.md has the measurement
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Plan:
 
 
 def run_name(number: int, count: int) -> str:
-    """The name of the folder of a run's files, in a sweep of so many runs."""
+    """Name of the folder for the files of a run, in a sweep of `count` runs."""
     return f"{number:0{len(str(count - 1))}d}"
 
 

@@ -170,7 +170,7 @@ def remove_sweep(folder: Path) -> None:
 
 
 def _is_run(path: Path, count: object) -> bool:
-    """Whether a folder has the name of one of so many runs, if that is a number."""
+    """Whether a folder has the name of one of `count` runs; False if that is not a valid number."""
     if type(count) is not int or not 0 < count <= MAX_COUNT:
         return False
     number = int(path.name) if re.fullmatch("[0-9]{1,10}", path.name) else count

@@ -101,7 +101,7 @@ def _packet(wave: str, angle: float, X: Array, start: Array, t: float) -> tuple[
 
 
 def sent_back(setup: Setup, wave: str, degrees: float, cells: int) -> tuple[float, float]:
-    """Share of a packet's energy that is sent back, by theory and measured, with so many cells in the wavelength."""
+    """Share of a packet's energy that is reflected, by theory and measured, for a number of cells per wavelength."""
     angle, theory = math.radians(degrees), math.nan
 
     def shape(solver: Solver, state: State) -> None:

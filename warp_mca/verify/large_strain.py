@@ -26,7 +26,7 @@ def _slope_of_log(C: Array, T: Array) -> Array:
 
 
 def _exact_course(F: Array, time: Array, beta: float, every: int) -> tuple[Array, float]:
-    """Stress xx, yy, zz, xy, yz, xz [Pa] in every so many rows, and work per volume done in all of them [J/m^3].
+    """Stress xx, yy, zz, xy, yz, xz [Pa] in every `every`-th row, and the work per volume done in all of them [J/m^3].
 
     T of the strain ln(F^T F) / 2, whose plastic part is taken off it, gives F (d ln C / d C : T) F^T / J.
 

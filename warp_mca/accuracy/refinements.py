@@ -1,8 +1,8 @@
 """Owns at which sizes of cells the meshes of a scene are alike, so that their figures make one series.
 
 Counts of cells are whole: two cells through a thickness are still two with `refine` 1.2, and the cells along a bar
-smaller. Figures of such meshes do not go as h^p. Levels are therefore taken where all counts are nearly multiples of
-the scene's, and what they are in truth is their mean.
+smaller. Figures of such meshes do not converge as h^p. Refinements are therefore chosen so that all counts of cells are
+nearly multiples of the scene's; the refinement as meshed is the mean of their ratios.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from warp_mca.base.errors import RequestError
 from warp_mca.geometry.refinement import refined
 from warp_mca.scene import Scene
 
-FEW = 16  # counts above it are nearly multiples at every level [-]
-APART = 1.4  # least ratio of two levels of a series [-]
-FAR = 0.5  # what a level may be from where it is wanted, over what counts may be from multiples, in logarithms [-]
-ANOTHER = 1.15  # least ratio of two levels as meshed, for their meshes to tell how figures go [-]
-ALIKE = 0.12  # by which counts of a mesh like the scene's differ from multiples, in logarithms [-]
-FINEST = 8.0  # level at which counts are told from other whole numbers of a recipe [-]
+FEW = 16  # counts above this are nearly multiples at every refinement [-]
+APART = 1.4  # least ratio of two refinements of a series [-]
+FAR = 0.5  # weight of the distance from a wanted refinement over that of counts from multiples, in logarithms [-]
+ANOTHER = 1.15  # least ratio of two refinements as meshed from which convergence can be judged [-]
+ALIKE = 0.12  # largest distance of counts from multiples in a mesh like the scene's, in logarithms [-]
+FINEST = 8.0  # refinement at which counts are told from other whole numbers of a recipe [-]
 
 
 @dataclass(frozen=True)
-class Levels:
+class Refinements:
     """Meshes of a scene by their refine over a base.
 
     Attributes:
         scene: whose bodies are refined.
-        base: refine at level 1 [-].
+        base: `refine` at which the refinement is 1 [-].
     """
 
     scene: Scene
@@ -39,37 +39,37 @@ class Levels:
     _known: dict[float, list[int]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def near(self, wanted: float, least: float, most: float, coarser: float | None = None) -> float:
-        """The level from `least` to `most` that is like the base and near a wanted one; both weigh.
+        """The refinement from `least` to `most` that best combines being like the base and near the wanted one.
 
-        Its mesh is another one than that of the level `coarser`; where all are the same, it is the first above.
+        Its mesh differs from that of the refinement `coarser`; if none does, it is the first refinement above `most`.
         """
         beyond = 0.0 if coarser is None else ANOTHER * self.meshed(coarser)
-        levels = (wanted, *self._whole)
-        found = [level for level in levels if least <= level <= most and self.meshed(level) >= beyond]
+        refinements = (wanted, *self._whole)
+        found = [r for r in refinements if least <= r <= most and self.meshed(r) >= beyond]
         if not found:
-            found = [next((level for level in self._whole if level > most and self.meshed(level) >= beyond), wanted)]
-        return min(found, key=lambda level: self.unlike(level) + FAR * abs(math.log(level / wanted)))
+            found = [next((r for r in self._whole if r > most and self.meshed(r) >= beyond), wanted)]
+        return min(found, key=lambda r: self.unlike(r) + FAR * abs(math.log(r / wanted)))
 
     def finer(self, than: float, step: float, most: float) -> list[float]:
-        """Levels above one, from one to the next about a step, up to the greatest; those like the base, if any are."""
+        """Refinements above `than`, about `step` apart, up to `most`; only those like the base, if any are."""
         found, wanted = list[float](), APART * than
         while wanted <= most * (1.0 + 1e-9):
             found.append(self.near(wanted, wanted, min(step * wanted, most), coarser=than))
             wanted = step * found[-1]
-        return [level for level in found if self.unlike(level) <= ALIKE] or found
+        return [r for r in found if self.unlike(r) <= ALIKE] or found
 
-    def unlike(self, level: float) -> float:
+    def unlike(self, refinement: float) -> float:
         """By how much counts differ from multiples of the base's at most, as a logarithm [-]."""
-        return max((abs(math.log(ratio / level)) for ratio in self._ratios(level)), default=0.0)
+        return max((abs(math.log(ratio / refinement)) for ratio in self._ratios(refinement)), default=0.0)
 
-    def meshed(self, level: float) -> float:
-        """The level as it is meshed: the mean of its counts over those of the base [-]."""
-        ratios = self._ratios(level)
-        return math.exp(sum(map(math.log, ratios)) / len(ratios)) if ratios else level
+    def meshed(self, refinement: float) -> float:
+        """The refinement as it is meshed: the mean of its counts over those of the base [-]."""
+        ratios = self._ratios(refinement)
+        return math.exp(sum(map(math.log, ratios)) / len(ratios)) if ratios else refinement
 
     @cached_property
     def _whole(self) -> list[float]:
-        """Levels at which a small count of the base is a whole number of cells."""
+        """Refinements at which a small count of the base is a whole number of cells."""
         small = {base for base, finest in zip(*self._ends, strict=True) if 0 < base != finest and base <= FEW}
         return sorted({k / count for count in small for k in range(1, math.ceil(FINEST * count) + 1)})
 
@@ -79,18 +79,18 @@ class Levels:
         base, finest = self._numbers(1.0), self._numbers(FINEST)
         return (base, finest) if len(base) == len(finest) else ([], [])
 
-    def _ratios(self, level: float) -> list[float]:
-        if level not in self._known:
-            self._known[level] = self._numbers(level)
-        (base, finest), found = self._ends, self._known[level]
+    def _ratios(self, refinement: float) -> list[float]:
+        if refinement not in self._known:
+            self._known[refinement] = self._numbers(refinement)
+        (base, finest), found = self._ends, self._known[refinement]
         if len(found) != len(base):  # a recipe whose numbers come and go
             return []
         return [n / b for b, f, n in zip(base, finest, found, strict=True) if 0 < b != f and n > 0]
 
-    def _numbers(self, level: float) -> list[int]:
-        """Whole numbers of all recipes at a level; none where a recipe has no such level."""
+    def _numbers(self, refinement: float) -> list[int]:
+        """Whole numbers of all recipes at a refinement; none where a recipe has no such refinement."""
         try:
-            recipes = [refined(body.name, body.geometry, self.base * level) for body in self.scene.bodies]
+            recipes = [refined(body.name, body.geometry, self.base * refinement) for body in self.scene.bodies]
         except RequestError:
             return []
         return [number for recipe in recipes for number in _whole_numbers(recipe)]
