@@ -444,6 +444,11 @@ def _(beyond: bool) -> list[str]:
 # events
 
 
+@pair(passing.overlap_at_the_start)
+def _(beyond: bool) -> list[str]:
+    return run(boxes(gap=-0.01 if beyond else 0.0, speed=1.0), duration=2e-5)
+
+
 @pair(passing.below_a_plane)
 def _(beyond: bool) -> list[str]:
     return run(ball("pole" if beyond else "boundary", duration=4e-4))

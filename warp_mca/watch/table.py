@@ -72,6 +72,7 @@ BEFORE: tuple[Row, ...] = (
 EVENTS: tuple[Row, ...] = (
     meshes.coarse_mass,
     motion.slender_rods,
+    passing.overlap_at_the_start,
     passing.below_a_plane,
     passing.bodies_in_each_other,
     passing.body_in_itself,
