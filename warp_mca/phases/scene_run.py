@@ -250,7 +250,6 @@ class SceneRun:
             model=self.ready.model,
             start=self.ready.start,
             ledger=self.ledger,
-            steps=self.steps,
             steps_taken=self.state.steps,
             u=u[nodes],
             v=v[nodes],

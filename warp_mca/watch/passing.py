@@ -113,8 +113,8 @@ def body_in_itself(c: Finished, _: float) -> Iterator[Values]:
 
 
 @row(
-    "{one} and {other} overlap at the start, {how}, and no contact, joint or tie is between them: their masses count "
-    "twice there, and they pass through each other;",
+    "{one} and {other} overlap at the start, {how}, and no contact, joint or tie is between them: their masses "
+    "count twice there, and nothing keeps them apart;",
     "move them apart, or bind them",
     unit=f"as deep at most as flat faces explain, {SLACK:g} of their width and of the thickness of the bodies",
     when=When.LOOKS,
@@ -122,8 +122,8 @@ def body_in_itself(c: Finished, _: float) -> Iterator[Values]:
 def overlap_at_the_start(c: Finished, _: float) -> Iterator[Values]:
     """How deep skins of two bodies cross before the first step."""
     for case, kept in zip(c.watch.cases, c.ledger.kept.passed, strict=False):
-        if isinstance(case, WithinBody) and not (case.passes or case.pair.edges) and kept[START] > case.slack:
-            one, other = case.names
+        if isinstance(case, WithinBody) and not (case.passes or case.edges) and kept[START] > case.slack:
+            one, other = (skin.name for skin in case.skins)
             how = f"up to {kept[START]:.2g} m deep" if kept[START] < math.inf else "one of them within the other"
             yield dict(one=one, other=other, how=how)
 
@@ -135,5 +135,5 @@ def _seen(c: Finished, kind: type[Case]) -> Iterator[Values]:
             digits = 1 - math.floor(math.log10(told[DEPTH]))  # place to a tenth of the depth or finer
             at = ", ".join(f"{round(x, digits) + 0.0:g}" for x in told[PLACE].tolist())
             seen = f"from t = {told[TIME] - c.origin:.3g} s on, up to {told[DEPTH]:.2g} m deep at ({at}) m"
-            one, *other = case.names
+            one, *other = (skin.name for skin in case.skins)
             yield dict(one=one, other="".join(other), seen=seen, remedy=case.remedy)
