@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,10 +72,12 @@ class Case:
     Attributes:
         skins: of one body or two.
         passes: contact passes that keep them apart.
+        remedies: without such passes, and with them.
     """
 
     skins: tuple[Skin, ...]
     passes: tuple[int, ...]
+    remedies: ClassVar[tuple[str, str]] = APART, BETWEEN
 
     @property
     def slack(self) -> float:
@@ -84,7 +87,7 @@ class Case:
     @property
     def remedy(self) -> str:
         """What helps."""
-        return BETWEEN if self.passes else APART
+        return self.remedies[bool(self.passes)]
 
     def found(self, look: Look, least: float) -> Found:
         """Where they lie deepest in each other, if deeper than `least` [m]."""
@@ -101,7 +104,7 @@ class BelowPlane(Case):
 
     kept_out: Mask
     plane: RigidPlane
-    remedy = APART
+    remedies = APART, APART
 
     def found(self, look: Look, least: float) -> Found:
         """The deepest node below the plane, if it is deeper than `least` [m]."""
@@ -151,11 +154,7 @@ class WithinItself(Case):
 
     number: int
     play: float
-
-    @property
-    def remedy(self) -> str:
-        """What helps."""
-        return BETWEEN if self.passes else PARTS
+    remedies = PARTS, BETWEEN
 
     def found(self, look: Look, least: float) -> Found:
         """Where its parts lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
