@@ -15,7 +15,7 @@ HEAD = """# Guards, warnings and advice
 What a run may say of itself; [When a run stops, or warns](how-to/stopped.md) has an example. **Guards** stop the run,
 **warnings** doubt some of its figures, **advice** doubts the scene. Values that a run fills in stand in *italics*.
 `python -m benchmarks.warnings` writes this page from `warp_mca/watch/table.py`; a new row is a condition with `@row` in
-a file of `warp_mca/watch/`, its name in that table, and a pair in `tests/warning_pairs.py`.
+a file of `warp_mca/watch/` and a pair in `tests/warning_pairs.py`.
 """
 TITLES = {
     When.FLAGS: "While it runs: what kernels see",

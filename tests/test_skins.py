@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.watch.skins import Skin, SkinPair
+from warp_mca.watch.skins import Skin, crossed
 
 NO_TURN = (0.0, 0.0, 0.0)
 
@@ -26,7 +26,7 @@ def box(size: tuple[float, float, float], cells: tuple[int, int, int], *place: t
 
 
 def depth(one: Skin, other: Skin, least: float = 0.0) -> float:
-    return SkinPair(one, other).crossed((one.box, other.box), one.box.mean(axis=0), least)[0]
+    return crossed(one, other, (one.box, other.box), one.box.mean(axis=0), least)[0]
 
 
 @pytest.mark.parametrize("scale", [1e-5, 1.0, 1e3])

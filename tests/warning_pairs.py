@@ -262,21 +262,21 @@ def _(beyond: bool) -> list[str]:
     angle = math.sqrt(2.0 * over(motion.stretched_set, beyond))
     scene = alone(cube(2), angular_velocity=(0.0, angle, 0.0))
     scene = replace(scene, fixed=(mca.Fixed(body="it", nodes="ymin"),))
-    return told_of(motion.stretched_set, scene, steps=SimpleNamespace(dt=1e-3), steps_taken=1000)
+    return told_of(motion.stretched_set, scene, ledger=ledger(steps=SimpleNamespace(dt=1e-3)), steps_taken=1000)
 
 
-@pair(motion.slender_rods)
+@pair(meshes.slender_rods)
 def _(beyond: bool) -> list[str]:
     scene = mca.make_scene("two_link", rigid_inertia="slender" if beyond else "mesh")
     start = SimpleNamespace(energy_mismatch=0.01, momentum_mismatch=0.01)
-    return told(motion.slender_rods, scene=scene, start=start)
+    return told(meshes.slender_rods, scene=scene, start=start)
 
 
-@pair(motion.creep)
+@pair(vibration.creep)
 def _(beyond: bool) -> list[str]:
     """Rows of a contact that holds half of what it may and creeps at 1 mm/s; its body moved just so far, or further."""
     count, dt, interval, mu = 60, 1e-6, 1e-4, 0.4
-    names = motion.IMPULSE, motion.NORMAL_IMPULSE, motion.FRICTION, motion.SPRING_ENERGY
+    names = vibration.IMPULSE, vibration.NORMAL_IMPULSE, vibration.FRICTION, vibration.SPRING_ENERGY
     springs = np.zeros((count // 2, 1, 64))
     impulse, normal, friction, stored = names
     springs[:, 0, impulse] = [0.5 * mu, 1.0, 0.0]
@@ -286,11 +286,11 @@ def _(beyond: bool) -> list[str]:
     plane = mca.RigidPlane()
     item = SimpleNamespace(contact=0, mu=mu, sign=1.0, plane=plane, slave=np.arange(3))
     model = SimpleNamespace(passes=[item], contact_axes=np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]]))
-    own = ledger({"count": count}, table=lambda first: springs, springs=lambda rows: rows, contact_dt=dt)
-    way = under(motion.creep, beyond) * 1e-3 * interval * (count - 1)
-    u = np.tile([way, 0.0, 0.0], (3, 1))
     steps = SimpleNamespace(interval=interval)
-    return told(motion.creep, ledger=own, model=model, contacts=[history([1.0])], u=u, steps=steps)
+    own = ledger({"count": count}, table=lambda first: springs, springs=lambda rows: rows, contact_dt=dt, steps=steps)
+    way = under(vibration.creep, beyond) * 1e-3 * interval * (count - 1)
+    u = np.tile([way, 0.0, 0.0], (3, 1))
+    return told(vibration.creep, ledger=own, model=model, contacts=[history([1.0])], u=u)
 
 
 # before the run
@@ -444,6 +444,11 @@ def _(beyond: bool) -> list[str]:
 # events
 
 
+@pair(passing.overlap_at_the_start)
+def _(beyond: bool) -> list[str]:
+    return run(boxes(gap=-0.01 if beyond else 0.0, speed=1.0), duration=2e-5)
+
+
 @pair(passing.below_a_plane)
 def _(beyond: bool) -> list[str]:
     return run(ball("pole" if beyond else "boundary", duration=4e-4))
@@ -458,7 +463,7 @@ def _(beyond: bool) -> list[str]:
 @pair(passing.body_in_itself)
 def _(beyond: bool) -> list[str]:
     case = object.__new__(passing.WithinItself)
-    for name, value in {"pair": SimpleNamespace(one=SimpleNamespace(name="clip")), "passes": ()}.items():
+    for name, value in {"skins": (SimpleNamespace(name="clip"),), "passes": ()}.items():
         object.__setattr__(case, name, value)
     kept = {"passed": np.array([[1e-3 if beyond else 0.0, 1e-4, 0.0, 0.0, 0.0, 0.0]])}
     return told(passing.body_in_itself, watch=SimpleNamespace(cases=[case]), ledger=ledger(kept), origin=0.0)
@@ -531,5 +536,5 @@ def _(beyond: bool) -> list[str]:
     material = scene.bodies[0].material
     assert isinstance(material, mca.Elastic)
     most = material.rho * material.wave_speeds["dilatational"] * 0.01**2
-    pressure = [0.0, over(vibration.ringing, beyond) * most, 0.0]
-    return told_of(vibration.ringing, scene, contacts=[history(pressure)], steps=SimpleNamespace(interval=1e-6))
+    pressure, steps = [0.0, over(vibration.ringing, beyond) * most, 0.0], SimpleNamespace(interval=1e-6)
+    return told_of(vibration.ringing, scene, contacts=[history(pressure)], ledger=ledger(steps=steps))

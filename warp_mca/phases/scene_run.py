@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.phases.history_rows import contact_histories, history_columns
 from warp_mca.phases.rate_groups import rate_figures
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.results.contact_history import ContactHistory, contact_names
+from warp_mca.results.contact_history import contact_names
 from warp_mca.results.paths import path_histories
 from warp_mca.results.result import Result, RunFacts, summarise
 from warp_mca.results.sensor_history import sensor_figures, sensor_histories
@@ -145,9 +145,9 @@ class SceneRun:
         paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
         probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
         summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
-        warnings = (*self._told(history, contacts, shares, stopped is not None, origin), *said)
+        told = self._told(stopped is not None, history=history, contacts=contacts, shares=shares, origin=origin)
         own = {"contacts": contacts, "probes": probes, "sections": sections}
-        return Result(summary, history, None, warnings, paths, stopped, **own)
+        return Result(summary, history, None, (*told, *said), paths, stopped, **own)
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> RunFacts:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
@@ -233,34 +233,23 @@ class SceneRun:
             "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _told(
-        self,
-        history: Mapping[str, Array],
-        contacts: Sequence[ContactHistory],
-        shares: Mapping[str, float | None],
-        stopped: bool,
-        origin: float,
-    ) -> tuple[str, ...]:
-        """What the run says of itself; arguments as in `Finished`."""
+    def _told(self, stopped: bool, **found: Any) -> tuple[str, ...]:
+        """What the run says of itself; arguments are fields of `Finished`."""
+        ready, nodes = self.ready, slice(*self.solver.layout.nodes[self.index : self.index + 2])
         u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
-        nodes = slice(*self.solver.layout.nodes[self.index : self.index + 2])
         finished = Finished(
-            scene=self.ready.scene,
-            meshes=self.ready.meshes,
-            model=self.ready.model,
-            start=self.ready.start,
+            scene=ready.scene,
+            meshes=ready.meshes,
+            model=ready.model,
+            start=ready.start,
             ledger=self.ledger,
-            steps=self.steps,
             steps_taken=self.state.steps,
             u=u[nodes],
             v=v[nodes],
             depths=[stage.depths(self.state, self.index) for stage in self.solver.contacts],
             bent=self.ledger.kept.stiffened if stopped else self.bent(u),
-            history=history,
-            contacts=contacts,
-            shares=shares,
             watch=self.watch,
             stopped=stopped,
-            origin=origin,
+            **found,
         )
-        return told_at_the_end(finished, self.ready.warnings)
+        return told_at_the_end(finished, ready.warnings)

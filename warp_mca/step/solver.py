@@ -11,6 +11,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import warp as wp
 
 from warp_mca.base.errors import bad_value
@@ -176,6 +177,7 @@ class Solver:
             for stage in self.contacts:
                 stage.begin(self.work, state)
 
+    @np.errstate(over="ignore")  # of speeds beyond float32, which are told or stopped elsewhere
     def start(self, state: State) -> None:
         """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.base.errors import GuardError
-from warp_mca.watch.row import Array, Kind, Values, When, row
+from warp_mca.watch.row import Array, Kind, Row, Values, When, row
 
 if TYPE_CHECKING:
     from warp_mca.watch.ledger import Ledger
@@ -119,7 +119,7 @@ def stop(when: When, reading: Reading) -> None:
     Raises:
         GuardError: a guard is broken: the sentence of the first.
     """
-    for item in ROWS:
+    for item in GUARDS:
         if item.when is when:
             for sentence in item.told(reading):
                 raise GuardError(sentence)
@@ -129,12 +129,4 @@ def _is_no_number(c: Reading) -> bool:
     return c.sums is not None and not c.balance and not np.isfinite(c.sums).all()
 
 
-ROWS = (
-    overflowed_list,
-    outrun_search,
-    sunken_node,
-    energy_imbalance,
-    no_number_at_the_start,
-    no_number,
-    inverted_element,
-)
+GUARDS = [item for item in vars().values() if isinstance(item, Row)]

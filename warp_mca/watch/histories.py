@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.results.force_history import FIRM, GRAZING, grazing_share
 from warp_mca.watch.contacts import symmetry_of
@@ -117,5 +118,5 @@ def _off_axis(contact: ContactHistory, normal: Array, tangent: Array) -> float:
     return math.degrees(math.asin(min(abs(contact.normal @ tangent), 1.0)))
 
 
-def _listed(vector: Array) -> str:
+def _listed(vector: NDArray[Any]) -> str:
     return ", ".join(f"{x:.3g}" for x in vector)

@@ -13,7 +13,7 @@ from warp_mca.geometry.quality import doubled_nodes, pieces
 from warp_mca.physics.contact.surfaces import face_geometry
 from warp_mca.scene import Prismatic, RigidPlane, Weld
 from warp_mca.watch.mass_report import body_report
-from warp_mca.watch.row import Context, Kind, Values, When, row
+from warp_mca.watch.row import Context, Finished, Kind, Values, When, row
 
 _MASS = "the cells of body {body} have {share:.1%} {than} mass than its shape, because they are flat where it is round;"
 COARSE = 0.02  # error of a mesh's mass: forces and stiffness are off by as much
@@ -109,12 +109,6 @@ def coarse_shape(c: Context, most: float) -> Iterator[Values]:
     return _missing_mass(c, most, exact=True)
 
 
-@row(f"{_MASS} the body has that mass:", "refine its mesh, as with --refine 2", COARSE, "of the shape's mass at most")
-def coarse_mass(c: Context, most: float) -> Iterator[Values]:
-    """Mass of a body's cells against that of its shape, without exact_mass: asked for, so not said before the run."""
-    return _missing_mass(c, most, exact=False)
-
-
 @advice(
     "joint {joint} binds {bound} of the {own} nodes {nodes} of {body} to the {others} nodes {other_nodes} of {other}; "
     "the others are free:",
@@ -152,6 +146,23 @@ def coarse_tied_slave(c: Context, most: float) -> Iterator[Values]:
     for fact in c.model.ties.facts:
         if (ratio := 1.0 / float(fact["size_ratio"])) > most:  # type: ignore[arg-type]
             yield dict(slave=fact["slave"], master=fact["master"], ratio=ratio)
+
+
+@row(f"{_MASS} the body has that mass:", "refine its mesh, as with --refine 2", COARSE, "of the shape's mass at most")
+def coarse_mass(c: Context, most: float) -> Iterator[Values]:
+    """Mass of a body's cells against that of its shape, without exact_mass: asked for, so not said before the run."""
+    return _missing_mass(c, most, exact=False)
+
+
+@row(
+    "the rigid phase took slender rods: momentum changes by {momentum:.1%} and kinetic energy by {energy:.1%} at "
+    "hand-off;",
+    "rigid_inertia=mesh keeps both",
+)
+def slender_rods(c: Finished, _: float) -> Iterator[Values]:
+    """Change of energy at the hand-off of a rigid phase with inertia="slender"."""
+    if c.scene.rigid and c.scene.rigid.inertia == "slender" and c.start.energy_mismatch > 0.0:
+        yield dict(momentum=c.start.momentum_mismatch, energy=c.start.energy_mismatch)
 
 
 def _foreign(c: Context) -> Iterator[tuple[str, Mesh]]:

@@ -16,7 +16,7 @@ import numpy as np
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
 from warp_mca.scene import Scene
-from warp_mca.watch.passing_cases import BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
+from warp_mca.watch.passing_cases import SLACK, BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
 from warp_mca.watch.row import Array, Finished, Values, When, row
 from warp_mca.watch.skins import Skin
 
@@ -112,6 +112,22 @@ def body_in_itself(c: Finished, _: float) -> Iterator[Values]:
     return _seen(c, WithinItself)
 
 
+@row(
+    "{one} and {other} overlap at the start, {how}, and no contact, joint or tie is between them: their masses "
+    "count twice there, and nothing keeps them apart;",
+    "move them apart, or bind them",
+    unit=f"as deep at most as flat faces explain, {SLACK:g} of their width and of the thickness of the bodies",
+    when=When.LOOKS,
+)
+def overlap_at_the_start(c: Finished, _: float) -> Iterator[Values]:
+    """How deep skins of two bodies cross before the first step."""
+    for case, kept in zip(c.watch.cases, c.ledger.kept.passed, strict=False):
+        if isinstance(case, WithinBody) and not (case.passes or case.edges) and kept[START] > case.slack:
+            one, other = (skin.name for skin in case.skins)
+            how = f"up to {kept[START]:.2g} m deep" if kept[START] < math.inf else "one of them within the other"
+            yield dict(one=one, other=other, how=how)
+
+
 def _seen(c: Finished, kind: type[Case]) -> Iterator[Values]:
     """Cases of a kind that were seen, by their bodies, with time, depth and place."""
     for case, told in zip(c.watch.cases, c.ledger.kept.passed, strict=False):
@@ -119,5 +135,5 @@ def _seen(c: Finished, kind: type[Case]) -> Iterator[Values]:
             digits = 1 - math.floor(math.log10(told[DEPTH]))  # place to a tenth of the depth or finer
             at = ", ".join(f"{round(x, digits) + 0.0:g}" for x in told[PLACE].tolist())
             seen = f"from t = {told[TIME] - c.origin:.3g} s on, up to {told[DEPTH]:.2g} m deep at ({at}) m"
-            one, *other = case.names
+            one, *other = (skin.name for skin in case.skins)
             yield dict(one=one, other="".join(other), seen=seen, remedy=case.remedy)

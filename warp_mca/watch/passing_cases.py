@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.watch.skins import NOWHERE, Found, Skin, SkinPair
+from warp_mca.watch.skins import NOWHERE, Found, Skin, crossed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -65,126 +66,105 @@ class Look:
 
 
 @dataclass(frozen=True)
-class BelowPlane:
-    """Nodes of a body's surface that no contact keeps above a plane that others of its nodes are in contact with."""
+class Case:
+    """What may go into each other.
 
-    skin: Skin
-    kept_out: Mask
-    plane: RigidPlane
+    Attributes:
+        skins: of one body or two.
+        passes: contact passes that keep them apart.
+        remedies: without such passes, and with them.
+    """
+
+    skins: tuple[Skin, ...]
     passes: tuple[int, ...]
-
-    @property
-    def slack(self) -> float:
-        """How deep nodes may lie [m]."""
-        return SLACK * min(self.skin.width, self.skin.thickness)
-
-    def found(self, look: Look, least: float) -> Found:
-        """The deepest node below the plane, if it is deeper than `least` [m]."""
-        depth = -self._height()
-        best = int(depth.argmax())
-        return (float(depth[best]), self.skin.x[best]) if depth[best] > least else NOWHERE
-
-    def room(self, look: Look) -> float:
-        """How far nodes can move before a look is due [m]: none comes out of a plane on its other side."""
-        return SHARE * float(self.skin.extents[2])
-
-    def _height(self) -> Array:
-        """Of the nodes above the plane [m], shape (node_count,); inf of those that contact keeps out."""
-        normal = np.asarray(self.plane.normal, dtype=float)
-        height = (self.skin.x - self.plane.point) @ normal / np.linalg.norm(normal)
-        return np.where(self.kept_out, np.inf, height)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The body."""
-        return (self.skin.name,)
-
-    remedy = APART
-
-
-@dataclass(frozen=True)
-class WithinBody:
-    """Two bodies, by their numbers among the skins."""
-
-    numbers: tuple[int, int]
-    pair: SkinPair
-    passes: tuple[int, ...]
+    remedies: ClassVar[tuple[str, str]] = APART, BETWEEN
 
     @property
     def slack(self) -> float:
         """How deep they may lie in each other [m]."""
-        return SLACK * min(min(skin.width, skin.thickness) for skin in (self.pair.one, self.pair.other))
+        return SLACK * min(min(skin.width, skin.thickness) for skin in self.skins)
+
+    @property
+    def remedy(self) -> str:
+        """What helps."""
+        return self.remedies[bool(self.passes)]
+
+    def found(self, look: Look, least: float) -> Found:
+        """Where they lie deepest in each other, if deeper than `least` [m]."""
+        raise NotImplementedError
+
+    def room(self, look: Look) -> float:
+        """How far nodes can approach each other before they are through [m]."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class BelowPlane(Case):
+    """Nodes of a body's surface that no contact keeps above a plane that others of its nodes are in contact with."""
+
+    kept_out: Mask
+    plane: RigidPlane
+    remedies = APART, APART
+
+    def found(self, look: Look, least: float) -> Found:
+        """The deepest node below the plane, if it is deeper than `least` [m]."""
+        (skin,) = self.skins
+        normal = np.asarray(self.plane.normal, dtype=float)
+        height = (skin.x - self.plane.point) @ normal / np.linalg.norm(normal)
+        depth = -np.where(self.kept_out, np.inf, height)
+        best = int(depth.argmax())
+        return (float(depth[best]), skin.x[best]) if depth[best] > least else NOWHERE
+
+    def room(self, look: Look) -> float:
+        """How far nodes can move before a look is due [m]: none comes out of a plane on its other side."""
+        return SHARE * float(self.skins[0].extents[2])
+
+
+@dataclass(frozen=True)
+class WithinBody(Case):
+    """Two bodies, by their numbers among the skins; `edges` of each count, as in `crossed`."""
+
+    numbers: tuple[int, int]
+    edges: tuple[Mask, Mask] | None
 
     def found(self, look: Look, least: float) -> Found:
         """Where they lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
         if look.gaps[self.numbers] > 0.0:
             return NOWHERE
-        one, other = (look.boxes[k] for k in self.numbers)
-        return self.pair.crossed((one, other), look.origin, least)
+        one, other = self.skins
+        a, b = (look.boxes[k] for k in self.numbers)
+        return crossed(one, other, (a, b), look.origin, least, self.edges)
 
     def room(self, look: Look) -> float:
         """How far they can approach each other before they are through [m]."""
-        return max(SHARE * min(self.pair.one.thickness, self.pair.other.thickness), 0.5 * look.gaps[self.numbers])
+        return max(SHARE * min(skin.thickness for skin in self.skins), 0.5 * look.gaps[self.numbers])
 
     def holds(self, look: Look) -> bool:
         """Whether one lies in the other as a whole, given that their skins do not cross."""
-        one, other = (look.boxes[k] for k in self.numbers)
-        for inner, outer, boxes in (
-            (self.pair.one, self.pair.other, (one, other)),
-            (self.pair.other, self.pair.one, (other, one)),
-        ):
-            if (boxes[0][0] > boxes[1][0]).all() and (boxes[0][1] < boxes[1][1]).all():
+        one, other = zip(self.skins, (look.boxes[k] for k in self.numbers), strict=True)
+        for (inner, own), (outer, around) in ((one, other), (other, one)):
+            if (own[0] > around[0]).all() and (own[1] < around[1]).all():
                 return outer.deepest(inner.x[:1])[0] > 0.0
         return False
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The bodies."""
-        return self.pair.one.name, self.pair.other.name
-
-    @property
-    def remedy(self) -> str:
-        """What helps."""
-        return BETWEEN if self.passes else APART
-
 
 @dataclass(frozen=True)
-class WithinItself:
-    """A body whose parts can meet once it is out of shape by more than `play` [m]."""
+class WithinItself(Case):
+    """A body, by its number, whose parts can meet once it is out of shape by more than `play` [m]."""
 
     number: int
-    pair: SkinPair
     play: float
-    passes: tuple[int, ...]
-
-    @property
-    def slack(self) -> float:
-        """How deep parts may lie in each other [m]."""
-        return SLACK * min(self.pair.one.width, self.pair.one.thickness)
+    remedies = PARTS, BETWEEN
 
     def found(self, look: Look, least: float) -> Found:
         """Where its parts lie deepest in each other, if edges lie deeper than `least` [m] behind faces."""
         if look.bent(self.number) < self.play:
             return NOWHERE
-        box = look.boxes[self.number]
-        return self.pair.crossed((box, box), look.origin, least)
+        return self.skins[0].crossed_by_itself(look.boxes[self.number], look.origin, least)
 
     def room(self, look: Look) -> float:
         """How far parts can approach each other before they are through [m]."""
-        return max(SHARE * self.pair.one.thickness, 0.5 * (self.play - look.bent(self.number)))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The body."""
-        return (self.pair.one.name,)
-
-    @property
-    def remedy(self) -> str:
-        """What helps."""
-        return BETWEEN if self.passes else PARTS
-
-
-Case = BelowPlane | WithinBody | WithinItself
+        return max(SHARE * self.skins[0].thickness, 0.5 * (self.play - look.bent(self.number)))
 
 
 def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequence[Skin]) -> Iterator[Case]:
@@ -203,18 +183,18 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
         skin = skins[number[name]]
         kept_out = np.isin(skin.nodes, np.concatenate([model.passes[k].slave for k in own]))
         if not kept_out.all():
-            yield BelowPlane(skin, kept_out, plane, own)
+            yield BelowPlane((skin,), own, kept_out, plane)
     bound = _bound_nodes(scene, meshes, model)
     for numbers in combinations(range(len(skins)), 2):
         one, other = (skins[k] for k in numbers)
         names = frozenset((one.name, other.name))
         edges = _free_edges(one, other, [model.X[nodes] for nodes in bound.get(names, ())])
-        yield WithinBody(numbers, SkinPair(one, other, edges), passes.get(names, ()))
+        yield WithinBody((one, other), passes.get(names, ()), numbers, edges)
     for k, skin in enumerate(skins):
         long = skin.extents[2] if skin.extents[2] > SLENDER * skin.extents[0] else np.inf
         play = BEND * min(skin.gap, long)
         if not scene.body(skin.name).rigid and np.isfinite(play):
-            yield WithinItself(k, SkinPair(skin, skin), play, passes.get(frozenset((skin.name,)), ()))
+            yield WithinItself((skin,), passes.get(frozenset((skin.name,)), ()), k, play)
 
 
 def _bound_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> dict[frozenset[str], list[Index]]:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from warp_mca.results.contact_history import ContactHistory
     from warp_mca.rigid.handoff import HandOff
     from warp_mca.scene import Contact, Scene
-    from warp_mca.step.steps import Steps
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 
@@ -119,7 +118,6 @@ class Finished(Context):
     Attributes:
         start: of the impact phase.
         ledger: rows and energy balance.
-        steps: how the run is divided.
         steps_taken: since the start of the phase [-].
         u: displacements of the nodes [m], shape (node_count, 3), float64.
         v: their velocities [m/s], shape (node_count, 3), float64.
@@ -135,7 +133,6 @@ class Finished(Context):
 
     start: HandOff
     ledger: Ledger
-    steps: Steps
     steps_taken: int
     u: Array
     v: Array

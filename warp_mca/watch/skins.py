@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -187,52 +186,46 @@ class Skin:
         best = int(depth.argmax())
         return (float(depth[best]), points[best]) if depth[best] > 0.0 else NOWHERE
 
+    def crossed_by_itself(self, box: Array, origin: Array, least: float) -> Found:
+        """How deep parts of it lie in others, where edges lie deeper than `least` [m] behind faces; as `crossed`."""
+        self.settle(origin)
+        depth, at = self.edges_in(self, self.near(box))
+        best = int(depth.argmax())
+        return (min(float(depth[best]), 0.5 * self.thickness), at[best]) if depth[best] > least else NOWHERE
 
-@dataclass(frozen=True)
-class SkinPair:
-    """Two skins, or one and itself.
 
-    Attributes:
+def crossed(
+    one: Skin,
+    other: Skin,
+    boxes: tuple[Array, Array],
+    origin: Array,
+    least: float,
+    edges: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None,
+) -> Found:
+    """How deep one skin lies in another, where edges of one lie deeper than `least` [m] behind faces of the other.
+
+    Args:
         one, other: the skins.
+        boxes: around the two, each shape (2, 3) [m].
+        origin: a point near them, for coordinates in float32 [m], shape (3,).
+        least: as above.
         edges: of each that count, as those near what binds the bodies do not; None for all.
     """
-
-    one: Skin
-    other: Skin
-    edges: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None
-
-    def crossed(self, boxes: tuple[Array, Array], origin: Array, least: float) -> Found:
-        """How deep one lies in the other, where edges of one lie deeper than `least` [m] behind faces of the other.
-
-        Args:
-            boxes: around the two, each shape (2, 3) [m].
-            origin: a point near them, for coordinates in float32 [m], shape (3,).
-            least: as above.
-        """
-        if self.one is self.other:
-            return self._in_itself(boxes[0], origin, least)
-        crossing, points = False, []
-        for skin, other, k in ((self.one, self.other, 0), (self.other, self.one, 1)):
-            chosen = skin.near(boxes[1 - k])
-            chosen = chosen[self.edges[k][chosen]] if self.edges else chosen
-            if not len(chosen):
-                continue
-            skin.settle(origin)
-            other.settle(origin)
-            depth, at = skin.edges_in(other, chosen)
-            crossing |= bool((depth > least).any())
-            points.append((other, skin, chosen, at[depth > least]))
-        if not crossing:
-            return NOWHERE
-        found = [body.deepest(np.concatenate([at, skin.samples(chosen)])) for body, skin, chosen, at in points]
-        return max(found, key=lambda item: item[0])
-
-    def _in_itself(self, box: Array, origin: Array, least: float) -> Found:
-        skin = self.one
+    crossing, points = False, []
+    for skin, body, k in ((one, other, 0), (other, one, 1)):
+        chosen = skin.near(boxes[1 - k])
+        chosen = chosen[edges[k][chosen]] if edges else chosen
+        if not len(chosen):
+            continue
         skin.settle(origin)
-        depth, at = skin.edges_in(skin, skin.near(box))
-        best = int(depth.argmax())
-        return (min(float(depth[best]), 0.5 * skin.thickness), at[best]) if depth[best] > least else NOWHERE
+        body.settle(origin)
+        depth, at = skin.edges_in(body, chosen)
+        crossing |= bool((depth > least).any())
+        points.append((body, skin, chosen, at[depth > least]))
+    if not crossing:
+        return NOWHERE
+    found = [body.deepest(np.concatenate([at, skin.samples(chosen)])) for body, skin, chosen, at in points]
+    return max(found, key=lambda item: item[0])
 
 
 def depths_below(points: Array, x: Array, triangle: Index) -> Array:

@@ -1,4 +1,4 @@
-"""Owns the rows about vibration in contact: flat ends that ring, flutter that friction on springs excites."""
+"""Owns the rows about what contact springs do to motion: flutter, flat ends that ring, bodies at rest that creep."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY
 from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.watch.row import Array, Finished, Values, row, sides_of
@@ -19,6 +20,13 @@ if TYPE_CHECKING:
 MEAN = 5  # rows whose mean is what the surface does besides
 SPAN = 20  # rows, all in contact, that vibrate
 SHARE = 0.07
+PARTS = 4  # of the second half of a run, in which a body at rest presses alike
+CREEPING = 3  # of them, at least: a body that slides until it rests does not
+ROWS = 5  # of a part, at least
+STEADY = 0.3  # by which normal forces of the parts differ from their mean, at most
+WITHIN = 0.95  # of mu F_n: friction below it in the mean does not slide
+ONE_WAY = 0.8  # of the friction of rows that their vector sum keeps, at least
+ELASTIC = 0.1  # of the energy of the springs: less friction work in a part is no creep
 LINEAR = 0.01  # strain v / c up to which bodies count as linear; beyond, twice of what is more may stiffen them
 ACROSS = 0.1  # component of the normal along an axis, from which on a node that is fixed there is held along the normal
 HELD = 9.0 / 8.0  # times rho c A v: the most from a master that is held, whose wave comes back; docs/decisions.md
@@ -75,9 +83,36 @@ def ringing(c: Finished, times: float) -> Iterator[Values]:
         greatest = float(history.pressure.max(initial=0.0))
         if item.sign < 0.0 or greatest == 0.0 or not _is_first_impact(c, contact, item):
             continue
-        most = _greatest_force(c, contact, item, c.steps.interval * int(history.pressure.argmax()))
+        most = _greatest_force(c, contact, item, c.ledger.steps.interval * int(history.pressure.argmax()))
         if greatest > times * most > 0.0:
             yield dict(name=history.name, greatest=greatest, times=greatest / most, most=most)
+
+
+@row(
+    "{name} creeps at {speed:.2g} m/s, though friction there is {share:.0%} of what holds it: nodes whose springs open "
+    "for a few steps lose their grip and slide when they close; a body that should rest moves so far, and friction "
+    "takes that work;",
+    "a lower penalty or a shorter time step lessens it",
+    30.0,
+    "times the creep at most; a body that moved further slid, or rolls with a creep of less than a hundredth",
+)
+def creep(c: Finished, times: float) -> Iterator[Values]:
+    """Way of bodies that slide in most of the second half of a run, though friction could hold them."""
+    ledger, model = c.ledger, c.model
+    rows = ledger.table(ledger.kept.count // 2)
+    if len(rows) <= PARTS * ROWS:
+        return
+    for contact, history in enumerate(c.contacts):
+        own = [k for k, item in enumerate(model.passes) if item.contact == contact]
+        normal = model.contact_axes[contact, 0]
+        mu = max((model.passes[k].mu for k in own), default=0.0)
+        if mu == 0.0 or not normal.any():
+            continue
+        sign = np.array([model.passes[k].sign for k in own])
+        speed, share = _creep(ledger.springs(rows)[:, own], sign, normal, mu, ledger.contact_dt)
+        time = c.ledger.steps.interval * (ledger.kept.count - 1)
+        if speed > 0.0 and _way(c, own[0], normal, time) < times * speed * time:
+            yield dict(name=history.name, speed=speed, share=share)
 
 
 def _vibrations(c: Finished) -> tuple[float, float, float]:
@@ -170,3 +205,37 @@ def _is_held(c: Finished, body: str, normal: Array) -> bool:
     """Whether some of its nodes are fixed along the normal."""
     fixed = int(np.bitwise_or.reduce(c.model.fixed_axes[c.nodes(body)]))
     return any(fixed >> axis & 1 for axis in range(3) if abs(normal[axis]) > ACROSS)
+
+
+def _creep(springs: Array, sign: Array, normal: Array, mu: float, dt: float) -> tuple[float, float]:
+    """Speed of creep [m/s], 0 where there is none, and friction over what it may be at most [-].
+
+    In a body at rest friction takes what its mean force does: E = F_t v t. `springs`: columns of rows and passes.
+    """
+    ends = np.linspace(0, len(springs) - 1, PARTS + 1).astype(int)
+    # a row holds the impulse of the interval before it, and the work up to its end
+    pressed = _sums(springs[:, :, NORMAL_IMPULSE].sum(axis=1), ends)
+    force = np.einsum("p,rpc->rc", sign, springs[:, :, IMPULSE])
+    along = force - np.outer(force @ normal, normal)
+    size, total = _sums(np.linalg.norm(along, axis=1), ends), np.linalg.norm(_sums(along, ends), axis=1)
+    work = np.diff(springs[ends, :, FRICTION].sum(axis=1))
+    held = float(springs[:, :, SPRING_ENERGY].sum(axis=1).mean())
+    creeps = (size < WITHIN * mu * pressed) & (total > ONE_WAY * size) & (work > ELASTIC * held)
+    mean = pressed / np.diff(ends)
+    if creeps.sum() < CREEPING or mean.min() <= 0.0 or np.abs(mean / mean.mean() - 1.0).max() > STEADY:
+        return 0.0, 0.0
+    return float(work.sum() / (dt * total.sum())), float(total.sum() / (mu * pressed.sum()))
+
+
+def _sums(values: Array, ends: NDArray[np.int_]) -> Array:
+    """Of the rows after each end up to the next, shape (PARTS, ...)."""
+    return np.add.reduceat(values[1:], ends[:-1], axis=0)
+
+
+def _way(c: Finished, k: int, normal: Array, time: float) -> float:
+    """How far the slave nodes of pass k moved along their master, in the mean [m]."""
+    item = c.model.passes[k]
+    plane = item.plane
+    other = c.u[item.master].mean(axis=0) if plane is None else time * np.asarray(plane.velocity, dtype=float)
+    way = c.u[item.slave].mean(axis=0) - other
+    return float(np.linalg.norm(way - (way @ normal) * normal))
