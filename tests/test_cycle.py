@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.phases.cycle import begin_cycle, run_cycle
+from warp_mca.phases.cycle import Cycle, begin_cycle
 from warp_mca.phases.cycle_result import cycle_result
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.impact_driver import bending_period
@@ -48,7 +48,7 @@ def cycle(name: str, inertia: str = "mesh", duration: float = 1.5e-3) -> tuple[S
     """A run of two impacts, in float64."""
     settings = Settings("cpu", "float64", 1)
     setup = begin_cycle(scene(name, rigid_inertia=inertia), None, duration, settings, lambda stage, done: None)
-    parts = run_cycle(setup)
+    parts = Cycle(setup).run()
     return setup, parts, cycle_result(setup, parts)
 
 

@@ -5,23 +5,28 @@ Each kind of phase has a driver, which takes a `Motion` and returns the next one
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.sensors import locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.film import Film
 from warp_mca.phases.impact_driver import ImpactDriver
 from warp_mca.phases.meshing import mesh
-from warp_mca.phases.parts import Part
+from warp_mca.phases.motion import Motion
+from warp_mca.phases.parts import Part, SwingPart
 from warp_mca.phases.prepare import Clock
 from warp_mca.phases.settings import Settings
 from warp_mca.phases.swing_driver import SwingDriver
 from warp_mca.physics.elements.cells import nodal_masses
+from warp_mca.recorders.recorder import Recorder
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import Scene
+
+Phase = Callable[[Motion | None], tuple[Motion | None, Part]]
 
 
 def begin_cycle(
@@ -59,22 +64,59 @@ def begin_cycle(
     )
 
 
-def run_cycle(setup: Setup, store: Checkpoint | None = None) -> list[Part]:
-    """Go through swings and impacts in turn until the time is up, from what `store` has of them.
+class Cycle:
+    """A run through swings and impacts in turn.
 
-    Raises:
-        RequestError: the scene cannot be built as written.
-        GuardError: an impact lost its footing.
+    Attributes:
+        setup: what the phases share.
+        parts: what each phase so far adds to the run.
+        film: what recorders see of it, from the first touch on; None without recorders.
     """
-    swings, impacts = SwingDriver(setup), ImpactDriver(setup, store)
-    motion, swing = swings.first()
-    parts: list[Part] = [swing]
-    while swing.swing.ended_by == "touch" and swing.stopped is None:
-        after, impact = impacts.run(motion)
-        parts.append(impact)
-        if after is None:
-            break
-        motion, swing = swings.run(after)
-        setup.clock.lap("rigid")
-        parts.append(swing)
-    return parts
+
+    def __init__(self, setup: Setup, store: Checkpoint | None = None, recorders: Sequence[Recorder] = ()) -> None:
+        """Of a run that goes on from what `store` has, and stores its state there."""
+        self.setup, self.recorders = setup, recorders
+        self.swings, self.impacts = SwingDriver(setup), ImpactDriver(setup, store)
+        self.parts: list[Part] = []
+
+    @property
+    def film(self) -> Film | None:
+        return self.impacts.film
+
+    def run(self) -> list[Part]:
+        """Until the time is up: each phase takes the motion that the one before left, its event says which one follows.
+
+        Raises:
+            RequestError: the scene cannot be built as written.
+            GuardError: an impact lost its footing.
+        """
+        phase: Phase | None = self.swings.first
+        motion: Motion | None = None
+        try:
+            while phase is not None:
+                motion, part = phase(motion)
+                phase = self._after(motion, part)
+                self._take(motion, part, phase is not None)
+        except BaseException:
+            if self.film:
+                self.film.finish(False)
+            raise
+        if self.film:
+            self.film.finish(True)
+        return self.parts
+
+    def _after(self, motion: Motion | None, part: Part) -> Phase | None:
+        """The phase that follows the event that ended another one."""
+        if motion is None or part.stopped is not None or part.ended_by == "t_end":
+            return None
+        return self.impacts.run if isinstance(part, SwingPart) else self.swings.run
+
+    def _take(self, motion: Motion | None, part: Part, following: bool) -> None:
+        """Keep what a phase adds, and show it."""
+        self.parts.append(part)
+        if self.recorders and self.impacts.film is None:
+            assert motion is not None
+            self.impacts.film = Film(self.setup, self.recorders, self.impacts.prepare(motion)[0])
+        if self.film:
+            self.film.take(part, following)
+            self.setup.clock.lap("output")

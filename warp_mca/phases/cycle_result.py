@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 NOTHING = "no phase of the run touched anything: give a later t_end, or check positions and speeds"
 
 
-def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
-    """What came of a cycle that is over."""
+def cycle_result(setup: Setup, parts: Sequence[Part], said: Sequence[str] = ()) -> Result:
+    """What came of a cycle that is over, with what recorders `said`."""
     story = tell_story(setup, parts)
     impacts = [part for part in parts if isinstance(part, ImpactPart)]
     wall = setup.clock.wall
@@ -46,7 +46,7 @@ def cycle_result(setup: Setup, parts: Sequence[Part]) -> Result:
     probes, sections = sensor_histories(setup.scene, history["time_s"], cycle_records(setup, parts))
     summary |= sensor_figures(probes, sections, history)
     own = {"contacts": contacts, "probes": probes, "sections": sections}
-    return Result(summary, history, None, (*warnings, *stopped), _paths(results, story), **own)
+    return Result(summary, history, None, (*warnings, *stopped, *said), _paths(results, story), **own)
 
 
 def _contacts(setup: Setup, results: Sequence[Result], story: Story) -> tuple[ContactHistory, ...]:

@@ -80,12 +80,21 @@ def tell_story(setup: Setup, parts: Sequence[Part]) -> Story:
     """The phases of a cycle that is over."""
     story = Story()
     for k, part in enumerate(parts):
-        following = k + 1 < len(parts)
-        if isinstance(part, SwingPart):
-            _add_swing(setup, part, story, slice(int(k > 0), -1 if following else None))
-        else:
-            _add_impact(setup, part, story)
+        add_part(setup, part, story, kept_rows(part, k == 0, k + 1 < len(parts)))
     return story
+
+
+def kept_rows(part: Part, first: bool, following: bool) -> slice:
+    """Rows of a phase that the history has: of swings not those whose times an impact before or after has too."""
+    return slice(int(not first), -1 if following else None) if isinstance(part, SwingPart) else slice(None)
+
+
+def add_part(setup: Setup, part: Part, story: Story, kept: slice) -> None:
+    """Let a story take in a phase that is over."""
+    if isinstance(part, SwingPart):
+        _add_swing(setup, part, story, kept)
+    else:
+        _add_impact(setup, part, story)
 
 
 def _add_swing(setup: Setup, part: SwingPart, story: Story, kept: slice) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.model.sensors import CHANNELS
+from warp_mca.phases.cycle_rows import kept_rows
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.parts import Part, SwingPart
 from warp_mca.rigid.placement import link_placements
@@ -22,7 +23,7 @@ def cycle_records(setup: Setup, parts: Sequence[Part]) -> list[Array]:
     for k, part in enumerate(parts):
         if isinstance(part, SwingPart):
             rows = _swing_records(setup, part)
-            found += rows[int(k > 0) : len(rows) - int(k + 1 < len(parts))]  # an impact's rows hold the other times
+            found += rows[kept_rows(part, k == 0, k + 1 < len(parts))]
         else:
             found += part.impact.scene_runs[0].ledger.kept.sensors
     return found

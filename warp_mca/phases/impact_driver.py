@@ -16,6 +16,7 @@ from warp_mca.model.paths import Found, locate
 from warp_mca.model.precision import check_range
 from warp_mca.phases.checkpoint import Checkpoint, advance
 from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.film import Film
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.motion import Motion
@@ -51,23 +52,30 @@ class ImpactDriver:
     def __init__(self, setup: Setup, store: Checkpoint | None = None) -> None:
         """Of a run that goes on from what `store` has, and stores its state there."""
         self.setup, self.store, self.count, self.open_time = setup, store, 0, open_time(setup)
+        self.film: Film | None = None
         self._places: Found = {}
+        self._prepared: tuple[Motion | None, tuple[Prepared, ByBody, ByBody]] | None = None
 
-    def run(self, motion: Motion) -> tuple[Motion | None, ImpactPart]:
+    def run(self, motion: Motion | None) -> tuple[Motion | None, ImpactPart]:
         """From a touch to rigid motion again, or to the end of the run: then there is no motion.
 
         Raises:
             GuardError: the impact lost its footing.
         """
+        assert motion is not None
         setup, self.count = self.setup, self.count + 1
-        ready, u, V = self._prepare(motion)
+        ready, u, V = self.prepare(motion)
         setup.clock.lap("mesh")
         setup.tell("compile", 0.0)
         relaxation = Relaxation(ready.model, setup.settings)
         settled: list[Shape] = []
         span = min(setup.span, setup.t_end - motion.t)
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
-        impact = Impact([ready], span, **setup.settings.solver, shape=shape)
+        film = self.film
+        shown = {"skins": film.surfaces, "needs": film.needs} if film else {}
+        impact = Impact([ready], span, **setup.settings.solver, **shown, shape=shape)
+        if film:
+            film.watch(impact, motion.t)
         setup.clock.lap("compile")
         if self.count == 1:
             announce(impact)
@@ -91,16 +99,21 @@ class ImpactDriver:
         if ended_by == "duration" and self._pressed(impact, -1):
             why = f"impact {self.count} had not ended after duration = {span:g} s; give a longer one"
             return None, replace(part, stopped=f"the run ends at t = {part.end:.4g} s: {why}")
-        back = return_to_rigid(setup, motion, part, relaxation)
+        back = return_to_rigid(setup, motion, part, relaxation, film is not None)
         setup.clock.lap("rigid")
         return back
 
-    def _prepare(self, motion: Motion) -> tuple[Prepared, ByBody, ByBody]:
+    def prepare(self, motion: Motion) -> tuple[Prepared, ByBody, ByBody]:
         """The scene with its bodies where they are; displacements [m] and velocities [m/s] of the nodes by body.
 
         Nodes without displacement lie where the undeformed chain has them, so that those of hinges coincide.
         """
-        setup = self.setup
+        if self._prepared is None or self._prepared[0] is not motion:
+            self._prepared = motion, self._assemble(motion)
+        return self._prepared[1]
+
+    def _assemble(self, motion: Motion) -> tuple[Prepared, ByBody, ByBody]:
+        setup, first = self.setup, not motion.shapes
         placed = setup.chain.moved_to(motion.t)
         plain = {**motion.placements, **link_placements(placed, motion.theta, motion.theta_dot)}
         X, u, V = {}, {}, {}
@@ -118,9 +131,9 @@ class ImpactDriver:
         )
         check_range(model, settings.precision)
         probes = locate(setup.scene, model, setup.meshes, self._places)
-        warnings = told_before(setup.scene, setup.meshes, model) if self.count == 1 else ()
+        warnings = told_before(setup.scene, setup.meshes, model) if first else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
-        start = setup.first if self.count == 1 else replace(setup.first, **mismatch)  # those are of the first hand-off
+        start = setup.first if first else replace(setup.first, **mismatch)  # those are of the first hand-off
         return Prepared(setup.scene, setup.meshes, start, model, probes, setup.sensors, warnings), u, V
 
     def _shape(

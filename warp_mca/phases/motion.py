@@ -16,6 +16,23 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
+class Stress:
+    """What recorders show of bodies at rest.
+
+    Attributes:
+        stress: xx, yy, zz, xy, yz, xz at all nodes in the world frame [Pa], shape (node_count, 6), float32.
+        von_mises: [Pa], shape (node_count,), float32.
+        plastic_strain: equivalent plastic strain [-], shape (node_count,), float32.
+        rotations: of the bodies by name when it was so [-], each shape (3, 3), float64.
+    """
+
+    stress: NDArray[np.float32]
+    von_mises: NDArray[np.float32]
+    plastic_strain: NDArray[np.float32]
+    rotations: Mapping[str, Array]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Motion:
     """Rigid motion of all bodies, and the shape and history that earlier impacts left them.
 
@@ -29,6 +46,7 @@ class Motion:
             nothing has been deformed.
         history: plastic history of the elements; empty while nothing has yielded.
         elastic, plastic, hourglass: energies that the bodies hold [J].
+        rest: what recorders show of the bodies; None where nothing has been deformed, or without recorders.
     """
 
     t: float
@@ -41,6 +59,7 @@ class Motion:
     elastic: float = 0.0
     plastic: float = 0.0
     hourglass: float = 0.0
+    rest: Stress | None = None
 
     def points(self, name: str, points: Array) -> Array:
         """Shape of a body in its frame, from its nodes without displacement [m], each shape (node_count, 3)."""

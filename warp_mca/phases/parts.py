@@ -32,6 +32,11 @@ class SwingPart:
     kinetic: float
     stopped: str | None = None
 
+    @property
+    def ended_by(self) -> str:
+        """What ended it: "touch" or "t_end"."""
+        return self.swing.ended_by
+
 
 @dataclass(frozen=True, kw_only=True)
 class ImpactPart:

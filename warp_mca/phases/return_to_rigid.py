@@ -6,23 +6,28 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.phases.cycle_setup import Setup
-from warp_mca.phases.motion import Motion
+from warp_mca.phases.motion import Motion, Stress
 from warp_mca.phases.parts import ImpactPart
 from warp_mca.phases.plastic_history import take_history
 from warp_mca.phases.residual import Relaxation, Shape
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import HandBack, carriage_motion, deformed_chain, hand_back
+from warp_mca.rigid.placement import Placement
 from warp_mca.rigid.scene_chain import pins
+from warp_mca.step.output import NodalStress
+from warp_mca.step.solver import Solver
+from warp_mca.step.state import State
 
 Array = NDArray[np.float64]
 ByBody = dict[str, Array]
 
 
 def return_to_rigid(
-    setup: Setup, before: Motion, part: ImpactPart, relaxation: Relaxation
+    setup: Setup, before: Motion, part: ImpactPart, relaxation: Relaxation, shown: bool = False
 ) -> tuple[Motion, ImpactPart]:
     """Project the motion at the end of an impact on the rigid motions of the bodies' shapes at rest.
 
@@ -31,6 +36,7 @@ def return_to_rigid(
         before: the motion at the start of the impact.
         part: the impact.
         relaxation: of its model.
+        shown: recorders show the bodies at rest.
 
     Returns:
         The motion that goes on, and the part with what the way back leaves out.
@@ -58,6 +64,7 @@ def return_to_rigid(
         elastic=kept.elastic,
         plastic=kept.plastic,
         hourglass=kept.hourglass,
+        rest=_stress_at_rest(relaxation.solver, kept.state, back.placements) if shown else None,
     )
     points = {name: setup.meshes[name].points + shapes[name] for name in names}
     return after, replace(
@@ -67,6 +74,18 @@ def return_to_rigid(
         jump_back=setup.rigid_kinetic(after) - back.kinetic_energy,
         hinge_impulse=_hinge_impulses(setup, back, points, velocities),
     )
+
+
+def _stress_at_rest(solver: Solver, state: State, placements: Mapping[str, Placement]) -> Stress:
+    """What recorders show of bodies in a state of equilibrium."""
+    with wp.ScopedDevice(solver.device):
+        found = NodalStress(solver, np.arange(solver.model.node_count, dtype=np.int32))
+        found.launch(state)
+        fields = [
+            np.asarray(array.numpy(), dtype=np.float32) for array in (found.tensor, found.von_mises, found.plastic)
+        ]
+    rotations = {name: placement.rotation for name, placement in placements.items()}
+    return Stress(stress=fields[0], von_mises=fields[1], plastic_strain=fields[2], rotations=rotations)
 
 
 def _fit(

@@ -251,11 +251,10 @@ def _cycle(
         RequestError: the request cannot be carried out.
         GuardError: an impact lost its footing.
     """
-    from warp_mca.phases.cycle import begin_cycle, run_cycle
+    from warp_mca.phases.cycle import Cycle, begin_cycle
     from warp_mca.phases.cycle_result import cycle_result
 
-    if recorders:
-        remedy = "recorders show a single impact; leave t_end out, or the recorders"
-        raise bad_value("Scene.t_end", scene.t_end, remedy)
-    setup = begin_cycle(scene, meshes, span, settings, tell)
-    return cycle_result(setup, run_cycle(setup, store))
+    cycle = Cycle(begin_cycle(scene, meshes, span, settings, tell), store, recorders)
+    parts, film = cycle.run(), cycle.film
+    result = cycle_result(cycle.setup, parts, film.said if film else ())
+    return replace(result, failed=film.failed if film else ())

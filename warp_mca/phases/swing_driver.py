@@ -24,7 +24,7 @@ class SwingDriver:
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
 
-    def first(self) -> tuple[Motion, SwingPart]:
+    def first(self, motion: Motion | None = None) -> tuple[Motion, SwingPart]:
         """From the release to the first touch, as the first hand-off has it."""
         start = self.setup.first
         assert start.swing is not None
@@ -43,8 +43,9 @@ class SwingDriver:
         kinetic = self.setup.others(start.placements)
         return motion, SwingPart(motion=release, swing=start.swing, kinetic=kinetic, stopped=stopped)
 
-    def run(self, motion: Motion) -> tuple[Motion, SwingPart]:
+    def run(self, motion: Motion | None) -> tuple[Motion, SwingPart]:
         """From a separation to the next touch of any link."""
+        assert motion is not None
         setup = self.setup
         setup.tell("rigid", motion.t / setup.t_end)
         plane = self._plane(motion)
@@ -60,6 +61,7 @@ class SwingDriver:
         placements = {name: p.after(run.t_end - motion.t) for name, p in motion.placements.items()} | links
         after = replace(motion, t=run.t_end, theta=run.theta, theta_dot=run.theta_dot, placements=placements)
         stopped = self._unknown_touch(after, run, plane) if run.ended_by == "touch" else None
+        setup.clock.lap("rigid")
         return after, SwingPart(motion=motion, swing=run, kinetic=setup.others(motion.placements), stopped=stopped)
 
     def _plane(self, motion: Motion) -> TargetPlane | TurningPlane:

@@ -6,26 +6,20 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
-from warp_mca.base.errors import bad_value
-from warp_mca.kernels.records.output import OPEN, STICK
 from warp_mca.recorders.checks import files_of
+from warp_mca.recorders.frame_parts import FrameParts, Times, frame_values, rows_of_phase, wanted_rows
 from warp_mca.recorders.recorder import (
-    CONTACT,
-    PATHS,
-    SURFACE,
-    VOLUME,
     Frame,
     Recorder,
     RunInfo,
     SurfaceMesh,
-    Volume,
 )
 from warp_mca.step.transfer import SLOTS, Transfer
 
@@ -63,29 +57,6 @@ def _begin(index: int, recorder: Recorder, method: str, info: RunInfo) -> None:
     validate.call(f"recorders[{index}]", recorder.name, f"{method}()", getattr(recorder, method), info)
 
 
-def _wanted(recorder: Recorder, intervals: int, info: RunInfo) -> NDArray[np.bool_]:
-    """The ends of output intervals at which a recorder wants a frame, see `Cadence.rows`.
-
-    Raises:
-        RequestError: the run does not reach one of its times.
-    """
-    for at in recorder.cadence.times or ():
-        if at > info.duration + 0.5 * info.output_interval:
-            remedy = f"the run ends at {info.duration:g} s; give times until then"
-            raise bad_value(f"time of {recorder.name}", at, remedy)
-    return recorder.cadence.rows(intervals, info.output_interval)
-
-
-NOTHING: dict[str, Any] = {  # what a frame holds that needs nothing
-    "points": {},
-    "von_mises": {},
-    "plastic_strain": {},
-    "contact_points": np.zeros((0, 3), np.float32),
-    "contact_stick": np.zeros(0, bool),
-    "path_stress": {},
-}
-
-
 class Recording:
     """The recorders of one run. Beside a GPU they start and work while it has work.
 
@@ -101,20 +72,46 @@ class Recording:
         Raises:
             RequestError: an output cannot be made, or a time is not reached; what others had made by then is removed.
         """
-        wanted = [_wanted(recorder, intervals, info) for recorder in recorders]
+        wanted = [wanted_rows(recorder, intervals, info) for recorder in recorders]
         for k, recorder in enumerate(recorders):
             if hasattr(recorder, "check"):
                 _begin(k, recorder, "check", info)
         self.failed: list[str] = []
-        self.info, self.steps, self.output = info, steps, output
+        self.info = info
         self.rows: list[tuple[Recorder, NDArray[np.bool_]]] = list(zip(recorders, wanted, strict=True))
         self.taken: dict[int, int] = {}
-        self.cuts = {
-            SURFACE: _cuts({body: len(skin.nodes) for body, skin in info.surfaces.items()}),
-            PATHS: _cuts({path: len(position) for path, position in info.paths.items()}),
-        }
-        self.transfer: Transfer[tuple[str, str]] | None = None
+        self.parts = FrameParts(info)
         self.started = False
+        self.times = Times(0.0, info.output_interval, steps)
+        self._read(output)
+
+    def follow(
+        self,
+        begin: float,
+        interval: float,
+        intervals: int,
+        *,
+        output: Output | None = None,
+        shift: NDArray[np.float32] | None = None,
+    ) -> None:
+        """Go on with the frames of another phase, once those of the one before are passed on.
+
+        Args:
+            begin: time of its first row [s].
+            interval: between its rows [s].
+            intervals: number of these; it may end earlier.
+            output: of the solver that computes it; None for rigid bodies, whose frames `show` takes.
+            shift: displacement of the nodes [m] where those of the solver are zero, shape (node_count, 3), float32.
+        """
+        until = self.times.of(self.row) if self.row >= 0 else -np.inf
+        self.times, self.parts.shift = Times(begin, interval, round(interval / self.info.dt)), shift
+        self.rows = [(item, rows_of_phase(item.cadence, begin, interval, intervals, until)) for item, _ in self.rows]
+        self._read(output)
+
+    def _read(self, output: Output | None) -> None:
+        """Take frames from what a solver shows, and start the recorders if nothing computes beside them."""
+        self.output, self.row = output, -1  # the latest row that was offered
+        self.transfer: Transfer[tuple[str, str]] | None = None
         self.patience = PATIENCE if output and _computes_beside(output) else 0.0
         self.due = time.monotonic() + self.patience  # when they have their turn between rows [s]
         if output and self.rows:
@@ -147,6 +144,7 @@ class Recording:
 
     def needs(self, row: int) -> frozenset[str]:
         """What a frame at the end of interval `row` must hold; empty when none is due."""
+        self.row = row
         return frozenset().union(*(recorder.needs for recorder, rows in self.rows if rows[row]))
 
     def take(self, row: int, needs: frozenset[str]) -> None:
@@ -168,6 +166,11 @@ class Recording:
             self._deliver(self.transfer)
         else:
             self.due = time.monotonic() + self.patience
+
+    def show(self, row: int, make: Callable[[frozenset[str]], Mapping[tuple[str, str], NDArray]]) -> None:
+        """Pass on a frame of rigid bodies, if one is due; `make` gives what it needs as the arrays of an `Output`."""
+        if needs := self.needs(row):
+            self._pass_on(row, make(needs))
 
     def work(self, until: Callable[[], bool]) -> None:
         """Pass on frames that have arrived while the device has work, until it may be given more.
@@ -221,12 +224,15 @@ class Recording:
 
     def _deliver(self, transfer: Transfer[tuple[str, str]]) -> None:
         self.start()
-        row, arrays = transfer.receive()
-        parts = self._parts(arrays)
+        self._pass_on(*transfer.receive())
+
+    def _pass_on(self, row: int, arrays: Mapping[tuple[str, str], NDArray]) -> None:
+        parts = self.parts.of(arrays)
         for recorder, rows in list(self.rows):
             if rows[row]:
                 index = self.taken.get(id(recorder), 0)
-                frame = self._frame(row, parts, recorder.needs, index)
+                time, step = self.times.of(row), self.times.step(row, self.info.dt)
+                frame = Frame(index=index, step=step, time=time, **frame_values(parts, recorder.needs))
                 self._call(recorder, lambda recorder=recorder, frame=frame: recorder.frame(frame))
                 self.taken[id(recorder)] = index + 1
 
@@ -242,28 +248,6 @@ class Recording:
             self.rows = [item for item in self.rows if item[0] is not recorder]
             with suppress(Exception, SystemExit):
                 recorder.finish(False)
-
-    def _parts(self, sent: Mapping[tuple[str, str], NDArray]) -> dict[str, dict[str, Any]]:
-        """What frames hold of the arrays that were sent, by need and the name in `Frame`."""
-        parts: dict[str, dict[str, Any]] = {}
-        for (need, name), array in sent.items():
-            cut = self.cuts.get(need)
-            parts.setdefault(need, {})[name] = array if cut is None else {key: array[at] for key, at in cut.items()}
-        if CONTACT in parts:
-            points, state = (parts[CONTACT][name] for name in ("points", "state"))
-            closed = state != OPEN
-            parts[CONTACT] = {"contact_points": points[closed], "contact_stick": state[closed] == STICK}
-        if PATHS in parts:
-            parts[PATHS] = {"path_stress": parts[PATHS]["von_mises"]}
-        if VOLUME in parts:
-            parts[VOLUME] = {"volume": Volume(**parts[VOLUME])}
-        return parts
-
-    def _frame(self, row: int, parts: Mapping[str, Mapping[str, Any]], needs: frozenset[str], index: int) -> Frame:
-        found = dict(NOTHING)
-        for need in needs:
-            found |= parts.get(need, {})
-        return Frame(index=index, step=row * self.steps, time=row * self.info.output_interval, **found)
 
 
 def _goes_on_beside(row: tuple[Recorder, object]) -> bool:
@@ -286,9 +270,3 @@ def _sets(output: Output, arrays: Iterable[wp.array]) -> int:
         return SLOTS  # they arrive at once
     size = sum(array.capacity for array in arrays)
     return max(SLOTS, min(AHEAD, AHEAD_BYTES // max(1, size)))
-
-
-def _cuts(lengths: Mapping[str, int]) -> dict[str, slice]:
-    """Where each of several arrays stands that follow each other."""
-    ends = np.cumsum(list(lengths.values()), dtype=int).tolist()
-    return {name: slice(end - length, end) for (name, length), end in zip(lengths.items(), ends, strict=True)}

@@ -82,8 +82,10 @@ class RunInfo:
         paths: position of the probes along each path [m], shape (probe_count,), float64, by the path's name.
         dt: time step [s].
         output_interval: time between rows of the history [s].
-        duration: simulated time of the run [s].
+        duration: simulated time of the run, from first contact on [s].
         warn: takes a sentence about what a recorder could not do; it is shown with the run's other warnings.
+        phases: whether the run goes through swings and impacts in turn: frames then have times before first contact
+            too, each phase has as many as the cadence says of a run, and how many there will be is not known.
     """
 
     scene: Scene
@@ -94,6 +96,7 @@ class RunInfo:
     output_interval: float
     duration: float
     warn: Callable[[str], None]
+    phases: bool = False
 
     @property
     def striking(self) -> list[str]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     _Datasets = dict[str, h5py.Dataset]
 
 FRAMES = Cadence(frames=100)
+MOST = 5_000  # frames of a run of many phases
 FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (), "plastic_strain": ()}
 # Bounds from above of what is written at the start for a node, an element, a frame, and in headers [byte].
 NODE_BYTES, ELEMENT_BYTES, FRAME_BYTES, HEADER_BYTES = 24, 88, 256, 256 << 10
@@ -83,7 +84,7 @@ class VtkHdfFile:
             RequestError: the system refuses it.
         """
         count = self._planned(info)
-        at_start, whole = _file_sizes(info.model, count)
+        at_start, whole = _file_sizes(info.model, count, 1 if info.phases else count)
         try:
             with tempfile.TemporaryFile(dir=folder) as trial:
                 trial.truncate(whole)  # takes no space
@@ -94,7 +95,9 @@ class VtkHdfFile:
             raise bad_value("vtkhdf", str(self.path), remedy) from error
 
     def _planned(self, info: RunInfo) -> int:
-        """Frames of the whole run."""
+        """Frames of the whole run, or the most that a run of many phases can have."""
+        if info.phases:
+            return MOST
         intervals = round(info.duration / info.output_interval)
         return int(self.cadence.rows(intervals, info.output_interval).sum())
 
@@ -116,7 +119,7 @@ class VtkHdfFile:
             self._check_room(info, self.path.parent)  # again: the run may have begun since `check`
             self._file = h5py.File(_create(self._unborn))
             root = self._file.create_group("VTKHDF")
-            self._steps, self._values, self._places = _make_steps(root, count, self.node_count)
+            self._steps, self._values, self._places = _make_steps(root, count, self.node_count, info.phases)
             _write_mesh(root, info.model)
             _write_setting(root, info.scene, count)
             self._file.flush()
@@ -167,8 +170,12 @@ class VtkHdfFile:
         needed = DISK_RESERVE + sum(field.nbytes for field in fields.values())
         if shutil.disk_usage(self.path.parent).free < needed:
             raise OSError(f"less than {needed >> 20} MiB are free on its disk")
+        if self.frame_count == len(self._places["step"]):
+            raise OSError(f"it has room for {self.frame_count} frames; take fewer")
         place = slice(self.frame_count * self.node_count, (self.frame_count + 1) * self.node_count)
         for name in FIELDS:
+            if len(self._places[name]) < place.stop:  # of a run of many phases
+                self._places[name].resize(place.stop, axis=0)
             self._places[name][place] = fields[name]
         self._places["step"][self.frame_count] = step
         file.flush()  # the frame is written before the number of steps counts it
@@ -216,16 +223,20 @@ def _create(path: Path) -> h5py.h5f.FileID:
     return h5f.create(os.fsencode(path), h5f.ACC_TRUNC, fapl=access)
 
 
-def _file_sizes(model: Model, count: int) -> tuple[int, int]:
-    """Size of a file [byte], bounded from above: what is written at the start, and the whole with `count` frames."""
+def _file_sizes(model: Model, count: int, filled: int) -> tuple[int, int]:
+    """Bounds from above of a file with `count` places for frames [byte]: at the start, and with `filled` frames."""
     mesh = NODE_BYTES * model.node_count + ELEMENT_BYTES * len(model.element_of)
     at_start = HEADER_BYTES + mesh + FRAME_BYTES * count
     values = sum(int(np.prod(width)) for width in FIELDS.values())
-    return at_start, at_start + count * model.node_count * values * np.dtype(np.float32).itemsize
+    return at_start, at_start + filled * model.node_count * values * np.dtype(np.float32).itemsize
 
 
-def _make_steps(root: h5py.Group, count: int, node_count: int) -> tuple[h5py.Group, h5py.Dataset, _Datasets]:
+def _make_steps(
+    root: h5py.Group, count: int, node_count: int, grows: bool
+) -> tuple[h5py.Group, h5py.Dataset, _Datasets]:
     """Make places for `count` frames and say where each is: the group Steps, its Values, what frames are written to.
+
+    With `grows` the places of fields are made as frames come.
 
     `Values` is as long as the number of steps, because VTK reads all of it. Its header and the one that holds this
     number come first in the file, side by side.
@@ -242,8 +253,10 @@ def _make_steps(root: h5py.Group, count: int, node_count: int) -> tuple[h5py.Gro
         steps[name] = np.zeros((count, 1), dtype=np.int64)
     places = {}
     for name, width in FIELDS.items():
-        shape = (count * node_count, *width)
-        places[name] = root.create_dataset(f"PointData/{name}", shape=shape, dtype=np.float32)
+        one = (node_count, *width)
+        room = {"maxshape": (None, *width), "chunks": one} if grows else {}
+        shape = one if grows else (count * node_count, *width)
+        places[name] = root.create_dataset(f"PointData/{name}", shape=shape, dtype=np.float32, **room)
         places[name][:1] = 0.0  # with the first value HDF5 allots the whole
         steps[f"PointDataOffsets/{name}"] = node_count * np.arange(count)
     places["step"] = root.create_dataset("FieldData/step", data=np.zeros(count, dtype=np.int64))
