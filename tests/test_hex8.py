@@ -54,9 +54,10 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         energy = wp.full((5, count), np.nan, dtype=t.real)
         extreme = wp.zeros((2, count), dtype=t.real)
         kernel = hex8.force_kernel(precision, law_name)
-        wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count], outputs=[*history, extreme, force])
+        wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count, 0.0], outputs=[*history, extreme, force])
         kernel = hex8.energy_kernel(precision, law_name)
-        wp.launch(kernel, count, inputs=[*arrays, law, *history, extreme, field, 0], outputs=[energy])
+        nodal = wp.zeros((0, 0), dtype=int), wp.zeros(0, dtype=t.real)
+        wp.launch(kernel, count, inputs=[*arrays, law, *history, extreme, field, 0, *nodal], outputs=[energy])
     total = np.zeros_like(X)
     for a in range(8):
         np.add.at(total, hexahedra[:, a], force.numpy().reshape(8, count, 3)[a].astype(float))

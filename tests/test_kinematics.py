@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_mca.kernels.elements.kinematics import eigen_function
-from warp_mca.kernels.elements.logarithm import log_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
+from warp_mca.kernels.materials.kinematics import eigen_function
+from warp_mca.kernels.materials.logarithm import log_function
 
 PRECISIONS = ("mixed", "float64")
 

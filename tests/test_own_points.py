@@ -2,50 +2,54 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
-import linear_tet_kernels
 import numpy as np
 import pytest
+import warp as wp
 from impacts import begun, finished, result_of
 from linear_tet import LinearTet
+from linear_tet_kernels import formulation
 
 import warp_mca as mca
-from warp_mca.kernels.elements import hourglass
-from warp_mca.kernels.materials.laws import HISTORY_SIZE
+from warp_mca.kernels.elements.formulation import Formulation, force_kernel
+from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
+from warp_mca.kernels.materials.laws import FLOW_HISTORY, row_count
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import ElementStage
 
 METAL = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=50e6, E_t=1e9)
 LAST = 8  # point that flows
+HISTORY_SIZE = row_count(FLOW_HISTORY)
 
 
-@pytest.fixture(scope="module")
-def kernels(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """Those of `linear_tet`, whose history is that of point LAST."""
-    source = Path(str(linear_tet_kernels.__file__)).read_text()
-    for name in ("history", "history_out"):
-        assert f"plastic_strain({name}, 0, e" in source
-        source = source.replace(f"plastic_strain({name}, 0, e", f"plastic_strain({name}, {LAST}, e")
-    path = tmp_path_factory.mktemp("kernels") / "last_point_kernels.py"
-    path.write_text(source)
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@wp.func
+def last_place(g: int):
+    return LAST
 
 
-def scene(monkeypatch: pytest.MonkeyPatch, kernels: ModuleType, points: int) -> mca.Scene:
+def last_point(precision: str, law_name: str, finite: bool) -> Formulation:
+    """`linear_tet`, whose history is that of point LAST."""
+    return replace(formulation(precision, law_name, finite), place=last_place)
+
+
+KERNELS = SimpleNamespace(
+    force_kernel=partial(force_kernel, last_point),
+    energy_kernel=partial(energy_kernel, last_point),
+    stress_kernel=partial(stress_kernel, last_point),
+)
+
+
+def scene(monkeypatch: pytest.MonkeyPatch, points: int) -> mca.Scene:
     """A bar that flows where it strikes a wall, of elements with so many points."""
 
     class Own(LinearTet):
         name = f"own{points}"
 
         def stage(self, block, X, precision):
-            return ElementStage(block, precision, kernels, points=points)
+            return ElementStage(block, precision, KERNELS, points=points)
 
     monkeypatch.setitem(ELEMENTS, Own.name, Own())
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(8, 2, 2))
@@ -56,9 +60,9 @@ def scene(monkeypatch: pytest.MonkeyPatch, kernels: ModuleType, points: int) -> 
     return mca.Scene(name="bar", bodies=(bar,), contacts=(contact,), impact=impact)
 
 
-def test_a_point_has_rows_of_its_own(monkeypatch: pytest.MonkeyPatch, kernels: ModuleType):
+def test_a_point_has_rows_of_its_own(monkeypatch: pytest.MonkeyPatch):
     """However many points there are besides; all that reads the history finds it there."""
-    impacts = [finished(scene(monkeypatch, kernels, points)) for points in (LAST + 1, 27)]
+    impacts = [finished(scene(monkeypatch, points)) for points in (LAST + 1, 27)]
     summaries = [result_of(impact).summary for impact in impacts]
     first, second = (impact.state.elements[0].history.numpy() for impact in impacts)
     rows = slice(LAST * HISTORY_SIZE, (LAST + 1) * HISTORY_SIZE)
@@ -72,28 +76,16 @@ def test_a_point_has_rows_of_its_own(monkeypatch: pytest.MonkeyPatch, kernels: M
 
 
 @pytest.mark.parametrize("points", [1, LAST])
-def test_a_point_without_rows_stops_the_run(points: int, monkeypatch: pytest.MonkeyPatch, kernels: ModuleType):
+def test_a_point_without_rows_stops_the_run(points: int, monkeypatch: pytest.MonkeyPatch):
     with pytest.raises(mca.GuardError, match="not a number"):
-        mca.run(scene(monkeypatch, kernels, points))
+        mca.run(scene(monkeypatch, points))
 
 
-def test_plastic_strains_of_all_points_turn_with_the_element(monkeypatch: pytest.MonkeyPatch, kernels: ModuleType):
+def test_plastic_strains_of_all_points_turn_with_the_element(monkeypatch: pytest.MonkeyPatch):
     """A quarter turn about z exchanges xx and yy, and yz takes the place of xz."""
-    stage = begun(scene(monkeypatch, kernels, 3)).solver.elements[0]
+    stage = begun(scene(monkeypatch, 3)).solver.elements[0]
     history = np.arange(1.0, 3.0 * HISTORY_SIZE + 1.0)[:, None] * [[1.0, 2.0]]
     turned = stage.rotated(history, np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]] * 2))
     xx, yy, xy, yz, xz, p = history.reshape(3, HISTORY_SIZE, 2).transpose(1, 0, 2)
     expected = np.stack([yy, xx, -xy, xz, -yz, p], axis=1).reshape(history.shape)
     np.testing.assert_allclose(turned, expected, atol=1e-12)
-
-
-def test_a_history_with_too_few_rows_is_refused(monkeypatch: pytest.MonkeyPatch, kernels: ModuleType):
-    block = begun(scene(monkeypatch, kernels, 2)).solver.elements[0].block
-    with pytest.raises(mca.RequestError, match="Rows of the history of element own2 = 17: give at least 18"):
-        ElementStage(block, "mixed", kernels, points=3, rows=17)
-    with pytest.raises(mca.RequestError, match=r"give at least 18, for 1 points of 6 and 4 vectors of 3"):
-        kernels.VECTORS = hourglass.VECTORS  # type: ignore[attr-defined]
-        try:
-            ElementStage(block, "mixed", kernels, points=1, rows=6)
-        finally:
-            del kernels.VECTORS  # type: ignore[attr-defined]

@@ -125,7 +125,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "stress_not_turned": Mutation(
         "recorded stress is left in the element's own frame",
-        "kernels/elements/hex8.py",
+        "kernels/elements/readings.py",
         "Q * local * wp.transpose(Q)",
         "local",
     ),
@@ -191,13 +191,13 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "shown_pressure_halved": Mutation(
         "the pressure in the stress that is shown is halved",
-        "kernels/elements/hex8.py",
-        "N, d, pressure)",
-        "N, d, R(0.5) * pressure)",
+        "kernels/elements/readings.py",
+        "local = cauchy(H, S, N, d, pressure)",
+        "local = cauchy(H, S, N, d, R(0.5) * pressure)",
     ),
     "logarithmic_strain_doubled": Mutation(
         "logarithmic strain lacks the factor 1 / 2",
-        "kernels/elements/kinematics.py",
+        "kernels/materials/kinematics.py",
         "mean = (e0 + e1 + e2) / R(3.0)",
         "e0, e1, e2 = R(2.0) * e0, R(2.0) * e1, R(2.0) * e2\n        mean = (e0 + e1 + e2) / R(3.0)",
     ),
@@ -211,7 +211,7 @@ MUTATIONS: dict[str, Mutation] = {
     "hourglass_stays_elastic": Mutation(
         "hourglass strains of hex8r do not flow where the element yields",
         "kernels/elements/hex8r.py",
-        "kept = S_eq / (S_eq + R(3.0) * G * (p_new - p))",
+        "kept = S_eq / (S_eq + R(3.0) * G * dp)",
         "kept = R(1.0)",
         element="hex8r",
     ),
@@ -225,8 +225,8 @@ MUTATIONS: dict[str, Mutation] = {
     "own_pressure": Mutation(
         "tetrahedra take the pressure of their own volume change in place of the nodes' means",
         "kernels/elements/tet4.py",
-        "\n        strain, N, d = deviator(H)\n        S = ",
-        "\n        pressure = pressure_of(law[m, 0], wp.trace(H))\n        strain, N, d = deviator(H)\n        S = ",
+        "\n        strain, N, d = deviator(H)\n",
+        "\n        pressure = pressure_of(law[m, 0], wp.trace(H))\n        strain, N, d = deviator(H)\n",
         element="tet4",
     ),
     "tetrahedra_twice_as_large": Mutation(

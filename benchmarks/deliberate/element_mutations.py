@@ -7,13 +7,13 @@ from benchmarks.deliberate.mutation import Mutation
 ELEMENT_MUTATIONS: dict[str, Mutation] = {
     "finite_pressure_unscaled": Mutation(
         "the pressure of finite strain is K ln J in place of K ln J / J",
-        "kernels/elements/kinematics.py",
+        "kernels/materials/kinematics.py",
         "return K * theta * log_over(theta) / (R(1.0) + theta)",
         "return K * theta * log_over(theta)",
     ),
     "finite_shear_unscaled": Mutation(
         "shear off the axes of a large strain is not scaled by the divided difference of the logarithm",
-        "kernels/elements/kinematics.py",
+        "kernels/materials/kinematics.py",
         "xy = T[0, 1] * log_over((d[0] - d[1]) / (one + d[1])) / (one + d[1])",
         "xy = T[0, 1] / (one + d[0])",
     ),
@@ -27,15 +27,15 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
     "hex8r_shear_low": Mutation(
         "the deviatoric stress of hex8r is 1.99 G e in place of 2 G e",
         "kernels/elements/hex8r.py",
-        "S = R(2.0) * G * strain",
-        "S = R(1.99) * G * strain",
+        "update(strain, theta, G,",
+        "update(R(0.995) * strain, theta, G,",
         element="hex8r",
     ),
     "tet4_shear_low": Mutation(
         "the deviatoric stress of tet4 is 1.99 G e in place of 2 G e",
         "kernels/elements/tet4.py",
-        "S = R(2.0) * G * strain",
-        "S = R(1.99) * G * strain",
+        "update(strain, R(0.0),",
+        "update(R(0.995) * strain, R(0.0),",
         element="tet4",
     ),
     "tet4_forces_not_turned_back": Mutation(

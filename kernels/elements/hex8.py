@@ -6,12 +6,13 @@ Mean dilatation: Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413; at finite st
 Meth. Appl. Mech. Engng 51 (1985) 177.
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.hex8_finite import finite_force_kernel, pressure_function
+from warp_mca.kernels.elements.formulation import MEAN, Formulation
+from warp_mca.kernels.elements.hex8_points import points_force_kernel
 from warp_mca.kernels.elements.hex8_small import small_strain_function
 from warp_mca.kernels.elements.hexahedron import (
     LINE_SCALE,
@@ -21,11 +22,11 @@ from warp_mca.kernels.elements.hexahedron import (
     history_place,
     store_function,
 )
-from warp_mca.kernels.elements.kinematics import kinematics
-from warp_mca.kernels.elements.point_records import history_functions, stress_function
+from warp_mca.kernels.elements.readings import energy_kernel as energy_of
+from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
@@ -37,8 +38,8 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     Every plastic element takes the return map, which suits a CPU that computes several elements side by side; a GPU
     runs `kernels.elements.hex8_patch`.
     """
-    if finite:
-        return finite_force_kernel(precision, law_name)
+    if finite or law_functions(law_name, precision).general:
+        return points_force_kernel(precision, law_name, finite)
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     load_in_frame = framed_function(precision)
@@ -56,6 +57,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         u: wp.array(dtype=wp.vec3d),
         slot: int,
         count: int,
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -76,121 +78,54 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
 
 
 @cache
-def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
-
-    The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
-    """
-    k = kinematics(precision, finite)
-    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
+def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
+    """Its points, of which each shows its stress at the corner that lies nearest."""
     t = scalars(precision)
-    R, mat33 = t.real, t.mat33
+    mat33, mat43 = t.mat33, t.mat43
     gauss_lines = gauss_line_function(precision, scaled=True)
     load_in_frame = framed_function(precision, finite)
     point_gradient = gradient_function(precision)
-    read_plastic_strain, _ = history_functions(precision, points=8)
-    plastic, functions = bool(law_name), law_functions(law_name, precision)
-    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
 
-    # logarithms need all their digits
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
-    def hex8_energy(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        extreme: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        first: int,
-        energy_out: wp.array2d(dtype=R),
-    ):
-        e = wp.tid()
+    @wp.struct
+    class Hex8:
+        """Rotation W = Q - I; Gauss lines gx, gy, gz of the corners and lx, ly, lz of their local displacements."""
+
+        W: mat33
+        gx: mat43
+        gy: mat43
+        gz: mat43
+        lx: mat43
+        ly: mat43
+        lz: mat43
+
+    @wp.func
+    def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+        shape = Hex8()
         Xl, ul, W, _J = load_in_frame(X, u, conn, e)
+        shape.W = W
         gx, gy, gz = gauss_lines(Xl)
         lx, ly, lz = gauss_lines(ul)
-        m = material[e]
-        identity = wp.identity(n=3, dtype=R)
-        volume = R(0.0)
-        dilatation = R(0.0)
-        elastic = R(0.0)
-        dissipated = R(0.0)
-        largest = extreme[STRAIN_SQUARE, e]
-        smallest = R(1.0)
-        for g in range(8):
-            det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
-            volume += det
-            dilatation += dilatation_of(grad) * det
-            strain, _N, _d = deviator(grad)
-            largest = wp.max(largest, wp.ddot(strain, strain))
-            eps_p = mat33()
-            if wp.static(plastic):
-                if yielded[e] != 0:
-                    eps_p, p = read_plastic_strain(history, history_place(g), e)
-                    dissipated += det * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
-            elastic += det * law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
-            smallest = wp.min(smallest, wp.determinant(identity + grad))
-        energy_out[0, first + e] = elastic + volume * volumetric_energy(law[m, 0], dilatation / volume)
-        energy_out[1, first + e] = dissipated
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
-        energy_out[4, first + e] = R(0.0)
-        # an inverted element's Q is a reflection, which would hide the inversion in its own frame
-        smallest = smallest * wp.determinant(identity + W)
-        energy_out[3, first + e] = wp.min(smallest, R(1.0) - extreme[VOLUME_LOSS, e])
+        shape.gx = gx
+        shape.gy = gy
+        shape.gz = gz
+        shape.lx = lx
+        shape.ly = ly
+        shape.lz = lz
+        return shape
 
-    return hex8_energy
+    @wp.func
+    def gradient(shape: Hex8, g: int):
+        return point_gradient(shape.gx, shape.gy, shape.gz, shape.lx, shape.ly, shape.lz, g)
+
+    @wp.func
+    def rotation(shape: Hex8):
+        return shape.W
+
+    @wp.func
+    def corner_of(g: int, j: int):
+        return g ^ ((g >> 1) & 1)  # corners run around the faces
+
+    return Formulation("hex8", 8, 8, MEAN, Hex8, load_shape, gradient, rotation, 1, corner_of, place=history_place)
 
 
-@cache
-def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: stress [Pa] and plastic strain [-] at the integration points of some elements, in the world frame.
-
-    A point's values go to the slot of the element's corner that lies nearest: rows xx, yy, zz, xy, yz, xz, p.
-    """
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    gauss_lines = gauss_line_function(precision, scaled=True)
-    load_in_frame = framed_function(precision, finite)
-    point_gradient = gradient_function(precision)
-    read_plastic_strain, _ = history_functions(precision, points=8)
-    plastic = bool(law_name)
-    write_stress = stress_function(precision)
-    k = kinematics(precision, finite)
-    deviator, cauchy, element_pressure = k.deviator, k.cauchy, pressure_function(precision, finite)
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def hex8_stress(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        element: wp.array(dtype=wp.int32),
-        first: int,
-        stress_out: wp.array2d(dtype=wp.float32),
-    ):
-        item = wp.tid()
-        e = element[item]
-        Xl, ul, W, _J = load_in_frame(X, u, conn, e)
-        gx, gy, gz = gauss_lines(Xl)
-        lx, ly, lz = gauss_lines(ul)
-        m = material[e]
-        identity = wp.identity(n=3, dtype=R)
-        Q = identity + W
-        pressure = element_pressure(gx, gy, gz, lx, ly, lz, law[m, 0])
-        for g in range(8):
-            _det, grad = point_gradient(gx, gy, gz, lx, ly, lz, g)
-            eps_p = mat33()
-            p = R(0.0)
-            if wp.static(plastic):
-                if yielded[e] != 0:
-                    eps_p, p = read_plastic_strain(history, history_place(g), e)
-            strain, N, d = deviator(grad)
-            local = cauchy(grad, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure)
-            corner = g ^ ((g >> 1) & 1)  # corners run around the faces
-            write_stress(stress_out, first + 8 * item + corner, Q * local * wp.transpose(Q), p)
-
-    return hex8_stress
+energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)

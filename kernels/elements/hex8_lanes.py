@@ -16,10 +16,12 @@ from warp_mca.kernels.elements.patch_element import load_functions, material_of
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
-from warp_mca.kernels.materials.laws import HISTORY_SIZE, law_functions
+from warp_mca.kernels.materials.laws import FLOW_HISTORY, law_functions, row_count
 from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
+
+HISTORY_SIZE = row_count(FLOW_HISTORY)
 
 
 @cache

@@ -14,9 +14,8 @@ from warp_mca.kernels.elements.hexahedron import (
     lines_of_point,
     node_force_function,
 )
-from warp_mca.kernels.elements.point_records import history_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.materials.laws import law_functions
+from warp_mca.kernels.materials.point import flow_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -70,45 +69,6 @@ def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_function(precision: str, law_name: str) -> Any:
-    """The function that takes the elastic stress at Gauss point g of element e to the yield surface.
-
-    It keeps the plastic strain if that grows. Returns the stress and whether the element has yielded.
-    """
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    read_plastic_strain, write_plastic_strain = history_functions(precision, points=8)
-    functions = law_functions(law_name, precision)
-    read_parameters, return_map = functions.parameters, functions.return_map
-    scale = LINE_SCALE**3
-
-    @wp.func
-    def flow_at(
-        S: mat33,
-        G: R,
-        g: int,
-        e: int,
-        m: int,
-        flag: int,
-        flag_new: int,
-        law: wp.array2d(dtype=R),
-        history_out: wp.array2d(dtype=R),
-    ):
-        eps_p = mat33()
-        p = R(0.0)
-        yielded = flag_new
-        if flag != 0:
-            eps_p, p = read_plastic_strain(history_out, history_place(g), e)
-        S_new, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(scale)))
-        if p_new > p:
-            write_plastic_strain(history_out, history_place(g), e, eps_new, p_new)
-            yielded = int(1)
-        return S_new, yielded
-
-    return flow_at
-
-
-@cache
 def small_strain_function(precision: str, law_name: str) -> Any:
     """The function that gives the corner forces of an element, and the greatest S : S / 2 of a point.
 
@@ -122,7 +82,7 @@ def small_strain_function(precision: str, law_name: str) -> Any:
     _, to_lines = line_functions(precision)
     edge_to_node = node_force_function(precision)
     add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
-    plastic, flow_at = bool(law_name), flow_function(precision, law_name)
+    plastic, flow_at = bool(law_name), flow_function(precision, law_name, points=8, scale=LINE_SCALE**3)
 
     @wp.func
     def element_forces(
@@ -167,7 +127,9 @@ def small_strain_function(precision: str, law_name: str) -> Any:
             S = deviator(direct, shear, mean, xx, yy, zz, xy, yz, xz)
             largest = wp.max(largest, invariant(S))
             if wp.static(plastic):
-                S, flag_new = flow_at(S, G, g, e, m, flag, flag_new, law, history_out)
+                S, dp = flow_at(S, G, history_place(g), e, m, flag, law, history_out)
+                if dp > R(0.0):
+                    flag_new = int(1)
             Sx[jx] = add_traction(S, b0, Sx[jx])
             Sy[jy] = add_traction(S, b1, Sy[jy])
             Sz[jz] = add_traction(S, b2, Sz[jz])

@@ -6,25 +6,27 @@ element over the height. Where the element yields, its hourglass strains flow wi
 of the full element would about their mean.
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
-from warp_mca.kernels.elements.hourglass import DISSIPATED, amplitude_functions, hourglass_functions
-from warp_mca.kernels.elements.hourglass import VECTORS as HOURGLASS_VECTORS
-from warp_mca.kernels.elements.kinematics import kinematics
+from warp_mca.kernels.elements.hourglass import AMPLITUDE_ROWS, KEPT, amplitude_functions, hourglass_functions
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
-from warp_mca.kernels.elements.point_records import history_functions, stress_function
+from warp_mca.kernels.elements.readings import energy_kernel as energy_of
+from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+from warp_mca.kernels.materials.point import material_point
+from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-VECTORS = HOURGLASS_VECTORS  # plastic hourglass amplitudes, which turn with the element
+__all__ = ["KEPT", "element_functions", "energy_kernel", "force_kernel", "stress_kernel"]
 
 
 @cache
@@ -42,11 +44,11 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     rotated = mean_frame(precision, finite)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     amplitudes, hourglass = hourglass_functions(precision)
-    read_plastic_strain, write_plastic_strain = history_functions(precision, points=1)
-    read_amplitudes, write_amplitudes = amplitude_functions(precision)
+    point = material_point(precision, law_name, finite, points=1)
+    plastic, general, update = bool(law_name), point.general, point.update
+    read_amplitudes, write_amplitudes = amplitude_functions(precision, point.size)
+    lost = point.size + AMPLITUDE_ROWS
     keep_strain, _, _ = keep_functions(R)
-    plastic, functions = bool(law_name), law_functions(law_name, precision)
-    read_parameters, return_map = functions.parameters, functions.return_map
     k = kinematics(precision, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
 
@@ -67,6 +69,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         e: int,
         m: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -76,30 +79,30 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         kept = R(1.0)
         strain, N, d = deviator(H)
         keep_strain(e, wp.ddot(strain, strain), extreme_out)
-        S = R(2.0) * G * strain
+        theta = dilatation_of(H)
+        flag = int(0)
         if wp.static(plastic):
-            eps_p = mat33()
-            p = R(0.0)
-            q_p = mat43()
             flag = yielded_out[e]
+        S, pressure, dp = update(strain, theta, G, 0, e, m, flag, law, dt, history_out)
+        if wp.static(plastic):
+            q_p = mat43()
             if flag != 0:
-                eps_p, p = read_plastic_strain(history_out, 0, e)
                 q_p = read_amplitudes(history_out, e)
                 q = q - q_p
-            S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
-            if p_new > p:
-                write_plastic_strain(history_out, 0, e, eps_new, p_new)
+            if dp > R(0.0):
                 # the flow rule at a point is linear in its stress: the part about the mean relaxes by 3 G dp / S_eq
                 S_eq = wp.sqrt(R(1.5) * wp.ddot(S, S))
-                kept = S_eq / (S_eq + R(3.0) * G * (p_new - p))
+                kept = S_eq / (S_eq + R(3.0) * G * dp)
                 write_amplitudes(history_out, e, q_p + (R(1.0) - kept) * q)
                 if flag == 0:
                     yielded_out[e] = int(1)
-        P = nominal(H, S, N, d, pressure_of(K, dilatation_of(H)))
+        if wp.static(not general):
+            pressure = pressure_of(K, theta)
+        P = nominal(H, S, N, d, pressure)
         Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):
             if kept < R(1.0):
-                row = wp.static(DISSIPATED)
+                row = wp.static(lost)
                 # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
                 history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
             Q = kept * Q
@@ -144,6 +147,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         u: wp.array(dtype=wp.vec3d),
         slot: int,
         count: int,
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -153,7 +157,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         x = to_patterns(load_element(X, conn, e))
         du = to_patterns(load_element(u, conn, e))
         b, volume, W, H, J, q = shape_and_strain(x, du)
-        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, yielded_out, history_out, extreme_out)
+        P, Q = stress_and_flow(x, volume, H, q, e, material[e], law, dt, yielded_out, history_out, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
         keep_volume(e, R(1.0) - J, extreme_out)
         for a in range(8):
@@ -163,120 +167,72 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
 
 
 @cache
-def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
+def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
+    """Its one point, whose stress all corners show, and its hourglass modes."""
     t = scalars(precision)
-    R, mat33, mat43 = t.real, t.mat33, t.mat43
+    R, mat33, mat43, mat73 = t.real, t.mat33, t.mat43, t.mat73
     to_patterns, _ = pattern_functions(precision)
     rotated = mean_frame(precision, finite)
     load_element = load_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
     amplitudes, hourglass = hourglass_functions(precision)
-    read_plastic_strain, _ = history_functions(precision, points=1)
-    read_amplitudes, _ = amplitude_functions(precision)
-    plastic, functions = bool(law_name), law_functions(law_name, precision)
-    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
-    k = kinematics(precision, finite)
-    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
+    first = law_functions(law_name, precision).size
+    read_amplitudes, _ = amplitude_functions(precision, first)
+    plastic, lost = bool(law_name), first + AMPLITUDE_ROWS
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
-    def hex8r_energy(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        extreme: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        first: int,
-        energy_out: wp.array2d(dtype=R),
-    ):
-        e = wp.tid()
+    @wp.struct
+    class Hex8r:
+        """Patterns x and du, mean gradient H_world, rotation W = Q - I, H in the rotated frame, volume [m^3]."""
+
+        x: mat73
+        du: mat73
+        H_world: mat33
+        H: mat33
+        W: mat33
+        volume: R
+
+    @wp.func
+    def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+        shape = Hex8r()
         x = to_patterns(load_element(X, conn, e))
         du = to_patterns(load_element(u, conn, e))
         b, scaled_volume = mean_gradients(x)
         H_world = mean_gradient_of(du, b, scaled_volume)
         W, H = rotated(H_world)
-        volume = R(VOLUME_SCALE) * scaled_volume
-        m = material[e]
-        K = law[m, 0]
-        G = law[m, 1]
-        strain, _N, _d = deviator(H)
-        eps_p = mat33()
+        shape.x = x
+        shape.du = du
+        shape.H_world = H_world
+        shape.W = W
+        shape.H = H
+        shape.volume = R(VOLUME_SCALE) * scaled_volume
+        return shape
+
+    @wp.func
+    def gradient(shape: Hex8r, g: int):
+        return shape.volume, shape.H
+
+    @wp.func
+    def rotation(shape: Hex8r):
+        return shape.W
+
+    @wp.func
+    def corner_of(g: int, j: int):
+        return j
+
+    @wp.func
+    def modes(shape: Hex8r, K: R, G: R, flag: int, history: wp.array2d(dtype=R), e: int):
+        q = amplitudes(shape.x, shape.du, shape.H_world, shape.W)
         dissipated = R(0.0)
         if wp.static(plastic):
-            if yielded[e] != 0:
-                eps_p, p = read_plastic_strain(history, 0, e)
-                dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
-                dissipated += history[wp.static(DISSIPATED), e]
-        q = amplitudes(x, du, H_world, W)
-        if wp.static(plastic):
             q_p = mat43()
-            if yielded[e] != 0:
+            if flag != 0:
                 q_p = read_amplitudes(history, e)
+                dissipated = history[wp.static(lost), e]
             q = q - q_p
-        _Q, stored = hourglass(q, x, volume, K, G)
-        elastic = G * wp.ddot(strain - eps_p, strain - eps_p) + volumetric_energy(K, dilatation_of(H))
-        energy_out[0, first + e] = volume * elastic
-        energy_out[1, first + e] = dissipated
-        identity = wp.identity(n=3, dtype=R)
-        square = wp.max(wp.ddot(strain, strain), extreme[STRAIN_SQUARE, e])
-        J = wp.determinant(identity + H) * wp.determinant(identity + W)
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * square)
-        energy_out[3, first + e] = wp.min(J, R(1.0) - extreme[VOLUME_LOSS, e])
-        energy_out[4, first + e] = stored
+        _Q, stored = hourglass(q, shape.x, shape.volume, K, G)
+        return stored, dissipated
 
-    return hex8r_energy
+    return Formulation("hex8r", 8, 1, OWN, Hex8r, load_shape, gradient, rotation, 8, corner_of, modes=modes)
 
 
-@cache
-def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    to_patterns, _ = pattern_functions(precision)
-    rotated = mean_frame(precision, finite)
-    load_element = load_function(precision)
-    mean_gradients, mean_gradient_of = mean_functions(precision)
-    read_plastic_strain, _ = history_functions(precision, points=1)
-    plastic = bool(law_name)
-    write_stress = stress_function(precision)
-    k = kinematics(precision, finite)
-    dilatation_of, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def hex8r_stress(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        element: wp.array(dtype=wp.int32),
-        first: int,
-        stress_out: wp.array2d(dtype=wp.float32),
-    ):
-        item = wp.tid()
-        e = element[item]
-        x = to_patterns(load_element(X, conn, e))
-        du = to_patterns(load_element(u, conn, e))
-        b, scaled_volume = mean_gradients(x)
-        H_world = mean_gradient_of(du, b, scaled_volume)
-        W, H = rotated(H_world)
-        m = material[e]
-        eps_p = mat33()
-        p = R(0.0)
-        if wp.static(plastic):
-            if yielded[e] != 0:
-                eps_p, p = read_plastic_strain(history, 0, e)
-        strain, N, d = deviator(H)
-        pressure = pressure_of(law[m, 0], dilatation_of(H))
-        local = cauchy(H, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure)
-        Q = wp.identity(n=3, dtype=R) + W
-        sigma = Q * local * wp.transpose(Q)
-        for a in range(8):
-            write_stress(stress_out, first + 8 * item + a, sigma, p)
-
-    return hex8r_stress
+energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)

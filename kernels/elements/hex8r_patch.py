@@ -95,7 +95,7 @@ def force_kernel(precision: str, law_name: str) -> Any:
             copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
                 b, volume, W, H, J, q = shape_and_strain(x, du)
-                P, Q = stress_and_flow(x, volume, H, q, e, m, law, yielded_out, history_out, extreme_out)
+                P, Q = stress_and_flow(x, volume, H, q, e, m, law, R(0.0), yielded_out, history_out, extreme_out)
                 keep_forces(forces, lane, corner_forces(x, b, volume, W, P, Q))
                 keep_volume(e, R(1.0) - J, extreme_out)
             corners = corners_of(patches, next_head, lane)

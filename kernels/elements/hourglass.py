@@ -11,15 +11,12 @@ import warp as wp
 
 from warp_mca.kernels.elements.fused import NOTHING, fused
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.laws import HISTORY_SIZE
 
 wp.set_module_options({"enable_backward": False})
 
-# Rows of the history beside those of the plastic strain: plastic hourglass amplitudes, and the energy they took [J].
-VECTORS = 4  # of amplitudes
-_AMPLITUDES = HISTORY_SIZE
-DISSIPATED = _AMPLITUDES + 3 * VECTORS
-HISTORY_ROWS = DISSIPATED + 1
+# Kept beside the history of the point: plastic hourglass amplitudes, and the energy they took [J].
+KEPT = ("vector", "vector", "vector", "vector", "scalar")
+AMPLITUDE_ROWS = 12
 
 
 @cache
@@ -87,8 +84,8 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def amplitude_functions(precision: str) -> tuple[Any, Any]:
-    """Functions that read and write the plastic hourglass amplitudes of an element."""
+def amplitude_functions(precision: str, first: int) -> tuple[Any, Any]:
+    """Functions that read and write the plastic hourglass amplitudes of an element, from row `first` on."""
     t = scalars(precision)
     R, mat43 = t.real, t.mat43
 
@@ -97,13 +94,13 @@ def amplitude_functions(precision: str) -> tuple[Any, Any]:
         q = mat43()
         for m in range(4):
             for i in range(3):
-                q[m, i] = history[wp.static(_AMPLITUDES) + 3 * m + i, e]
+                q[m, i] = history[wp.static(first) + 3 * m + i, e]
         return q
 
     @wp.func
     def write_amplitudes(history_out: wp.array2d(dtype=R), e: int, q: mat43):
         for m in range(4):
             for i in range(3):
-                history_out[wp.static(_AMPLITUDES) + 3 * m + i, e] = q[m, i]
+                history_out[wp.static(first) + 3 * m + i, e] = q[m, i]
 
     return read_amplitudes, write_amplitudes

@@ -5,19 +5,21 @@ incompressible elasticity nor plastic flow locks: Bonet and Burton, Commun. Nume
 kernels follow each other: volume changes of elements, their means at nodes, forces.
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.formulation import NODAL, Formulation
 from warp_mca.kernels.elements.fused import fused
-from warp_mca.kernels.elements.kinematics import kinematics
 from warp_mca.kernels.elements.patterns import mean_frame
-from warp_mca.kernels.elements.point_records import history_functions, stress_function
+from warp_mca.kernels.elements.readings import energy_kernel as energy_of
+from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.hardware.early_launch import begins_early, wait_for_previous
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS, keep_functions
+from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.point import material_point
+from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
@@ -108,11 +110,9 @@ def average_kernel(precision: str) -> Any:
 def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    R, vec3 = t.real, t.vec3
     tet_gradient = gradient_function(precision, finite)
-    read_plastic_strain, write_plastic_strain = history_functions(precision, points=1)
-    plastic, functions = bool(law_name), law_functions(law_name, precision)
-    read_parameters, return_map = functions.parameters, functions.return_map
+    plastic, update = bool(law_name), material_point(precision, law_name, finite, points=1).update
     add_matrices = fused(precision).add_matrices
     keep_strain, keep_volume, _ = keep_functions(R)
     k = kinematics(precision, finite)
@@ -130,6 +130,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         count: int,
         group: wp.array2d(dtype=wp.int32),
         dilatation: wp.array(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -139,25 +140,19 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         e = wp.tid()
         W, H, c, _volume, J = tet_gradient(X, conn, u, e)
         m = material[e]
-        G = law[m, 1]
         pressure = R(0.0)
         for a in range(4):
             pressure += R(0.25) * pressure_of(law[m, 0], dilatation[group[a, e]])
         strain, N, d = deviator(H)
-        S = R(2.0) * G * strain
         keep_strain(e, wp.ddot(strain, strain), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)
+        flag = int(0)
         if wp.static(plastic):
-            eps_p = mat33()
-            p = R(0.0)
             flag = yielded_out[e]
-            if flag != 0:
-                eps_p, p = read_plastic_strain(history_out, 0, e)
-            S, eps_new, p_new = return_map(S, eps_p, p, G, read_parameters(law, m, R(1.0)))
-            if p_new > p:
-                write_plastic_strain(history_out, 0, e, eps_new, p_new)
-                if flag == 0:
-                    yielded_out[e] = int(1)
+        S, _pressure, dp = update(strain, R(0.0), law[m, 1], 0, e, m, flag, law, dt, history_out)
+        if wp.static(plastic):
+            if dp > R(0.0) and flag == 0:
+                yielded_out[e] = int(1)
         P = nominal(H, S, N, d, pressure)
         P = R(-0.5) * R(THIRD) * add_matrices(P, W, P)
         f0 = P * c[0]
@@ -173,102 +168,52 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
 
 
 @cache
-def energy_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far."""
+def tetrahedron(precision: str, law_name: str, finite: bool, name: str, pressure: str) -> Formulation:
+    """A tetrahedron of constant strain: its one point, whose stress all corners show."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     tet_gradient = gradient_function(precision, finite)
-    read_plastic_strain, _ = history_functions(precision, points=1)
-    plastic, functions = bool(law_name), law_functions(law_name, precision)
-    read_parameters, plastic_energy = functions.parameters, functions.plastic_energy
-    k = kinematics(precision, finite)
-    deviator, volumetric_energy = k.deviator, k.volumetric_energy
 
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
-    def tet4_energy(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        extreme: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        first: int,
-        group: wp.array2d(dtype=wp.int32),
-        dilatation: wp.array(dtype=R),
-        energy_out: wp.array2d(dtype=R),
-    ):
-        e = wp.tid()
-        W, H, _c, volume, _J = tet_gradient(X, conn, u, e)
-        m = material[e]
-        elastic = R(0.0)
-        for a in range(4):
-            elastic += R(0.25) * volumetric_energy(law[m, 0], dilatation[group[a, e]])
-        strain, _N, _d = deviator(H)
-        eps_p = mat33()
-        dissipated = R(0.0)
-        if wp.static(plastic):
-            if yielded[e] != 0:
-                eps_p, p = read_plastic_strain(history, 0, e)
-                dissipated = volume * plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
-        elastic += law[m, 1] * wp.ddot(strain - eps_p, strain - eps_p)
-        energy_out[0, first + e] = volume * elastic
-        energy_out[1, first + e] = dissipated
-        identity = wp.identity(n=3, dtype=R)
-        square = wp.max(wp.ddot(strain, strain), extreme[STRAIN_SQUARE, e])
-        J = wp.determinant(identity + H) * wp.determinant(identity + W)
-        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * square)
-        energy_out[3, first + e] = wp.min(J, R(1.0) - extreme[VOLUME_LOSS, e])
-        energy_out[4, first + e] = R(0.0)
+    @wp.struct
+    class Tetrahedron:
+        """Rotation W = Q - I, gradient H in that frame, cofactors of the edges, volume [m^3]."""
 
-    return tet4_energy
+        W: mat33
+        H: mat33
+        cofactors: mat33
+        volume: R
+
+    @wp.func
+    def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+        shape = Tetrahedron()
+        W, H, cofactors, volume, _J = tet_gradient(X, conn, u, e)
+        shape.W = W
+        shape.H = H
+        shape.cofactors = cofactors
+        shape.volume = volume
+        return shape
+
+    @wp.func
+    def gradient(shape: Tetrahedron, g: int):
+        return shape.volume, shape.H
+
+    @wp.func
+    def rotation(shape: Tetrahedron):
+        return shape.W
+
+    @wp.func
+    def slope(shape: Tetrahedron, g: int, a: int):
+        c = shape.cofactors
+        if a == 0:
+            return R(-0.5) * R(THIRD) * (c[0] + c[1] + c[2])
+        return R(0.5) * R(THIRD) * c[a - 1]
+
+    @wp.func
+    def corner_of(g: int, j: int):
+        return j
+
+    return Formulation(name, 4, 1, pressure, Tetrahedron, load_shape, gradient, rotation, 4, corner_of, slope=slope)
 
 
-@cache
-def stress_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
-    """Kernel: stress [Pa] and plastic strain [-] of some elements, in the world frame, once for each corner."""
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    tet_gradient = gradient_function(precision, finite)
-    read_plastic_strain, _ = history_functions(precision, points=1)
-    plastic = bool(law_name)
-    write_stress = stress_function(precision)
-    k = kinematics(precision, finite)
-    deviator, pressure_of, cauchy = k.deviator, k.pressure, k.cauchy
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def tet4_stress(
-        X: wp.array(dtype=wp.vec3d),
-        conn: wp.array2d(dtype=wp.int32),
-        material: wp.array(dtype=wp.int32),
-        law: wp.array2d(dtype=R),
-        yielded: wp.array(dtype=wp.int32),
-        history: wp.array2d(dtype=R),
-        u: wp.array(dtype=wp.vec3d),
-        element: wp.array(dtype=wp.int32),
-        first: int,
-        group: wp.array2d(dtype=wp.int32),
-        dilatation: wp.array(dtype=R),
-        stress_out: wp.array2d(dtype=wp.float32),
-    ):
-        item = wp.tid()
-        e = element[item]
-        W, H, _c, _volume, _J = tet_gradient(X, conn, u, e)
-        m = material[e]
-        pressure = R(0.0)
-        for a in range(4):
-            pressure += R(0.25) * pressure_of(law[m, 0], dilatation[group[a, e]])
-        eps_p = mat33()
-        p = R(0.0)
-        if wp.static(plastic):
-            if yielded[e] != 0:
-                eps_p, p = read_plastic_strain(history, 0, e)
-        strain, N, d = deviator(H)
-        local = cauchy(H, R(2.0) * law[m, 1] * (strain - eps_p), N, d, pressure)
-        Q = wp.identity(n=3, dtype=R) + W
-        sigma = Q * local * wp.transpose(Q)
-        for a in range(4):
-            write_stress(stress_out, first + 4 * item + a, sigma, p)
-
-    return tet4_stress
+formulation = partial(tetrahedron, name="tet4", pressure=NODAL)
+energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)

@@ -1,53 +1,93 @@
-"""Owns what the kernels ask of a law of plastic flow; `kernels.materials.j2` is one.
+"""Owns what the kernels ask of a material law: one of two families of functions, with a history of any size.
 
-The kernels are made for one family of laws: elasticity is isotropic, flow keeps the volume, the first flow comes where
-the von Mises stress passes the law's first parameter, and plastic strain and equivalent plastic strain are all the
-history. Others need kernels of their own.
+A law of *flow* has isotropic elasticity, keeps the volume when it flows, and keeps the plastic strain and its
+equivalent; `kernels.materials.j2` is one. A *general* law gives the whole stress of the whole strain: anisotropy,
+rubber, rates and damage. Its module has the functions that `GENERAL` names, and the constants below.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from typing import Any
 
 from warp_mca.base.errors import bad_value
 
-HISTORY_SIZE = 6  # xx, yy, xy, yz, xz of the plastic strain, and the equivalent plastic strain
+# Rows of each kind of quantity that a history may hold: a traceless symmetric tensor xx, yy, xy, yz, xz, a symmetric
+# tensor xx, yy, zz, xy, yz, xz, a vector and a number. All but numbers turn with the body.
+ROWS = {"deviator": 5, "tensor": 6, "vector": 3, "scalar": 1}
+FLOW_HISTORY = ("deviator", "scalar")  # plastic strain and equivalent plastic strain
+FLOW = ("parameters", "return_map", "plastic_energy")
+GENERAL = ("parameters", "stress", "energies")
+
+
+def row_count(history: tuple[str, ...]) -> int:
+    """Rows of a history of these kinds."""
+    return sum(ROWS[kind] for kind in history)
 
 
 @dataclass(frozen=True)
 class Law:
-    """Functions of a law in the scalars of one precision; its module makes each by a factory of that name.
+    """A law in the scalars of one precision. Each function is made by a factory of its name, (precision) -> function.
 
-    G is the shear modulus [Pa]; eps_p the plastic strain [-], symmetric and traceless; p the equivalent plastic strain
-    [-], which must not shrink; c what `parameters` gives.
+    Stresses and moduli are in Pa, strains have no unit, energies are in J/m^3 of the reference volume. K and G of the
+    first two columns of `Model.law` bound the moduli of any state: stable step, penalty and hourglass stiffness take
+    these.
 
     Attributes:
         parameters: (law, m, scale) -> what the law wants of row m of `Model.law`, as a vector or a struct, from column
-            2 on. Stresses are multiplied by `scale`, as those that `return_map` takes and gives are.
-        return_map: (elastic, eps_p, p, G, c) -> (S, eps_p, p), with 2 G e of the deviatoric strain e for `elastic` and
-            the deviatoric stress S [Pa]. Where nothing flows, p comes back bit for bit.
-        plastic_energy: (eps_p, p, c) -> plastic work per volume [J/m^3], stored and dissipated: a function of state.
+            2 on. Stresses are multiplied by `scale`, as those that `return_map` takes and gives are; general laws are
+            given 1.
+        return_map: of a law of flow: (elastic, eps_p, p, G, c) -> (S, eps_p, p), with 2 G e of the deviatoric strain e
+            for `elastic`, the deviatoric stress S, the plastic strain eps_p, symmetric and traceless, the equivalent
+            plastic strain p, which must not shrink, and c from `parameters`. The first flow comes where the von Mises
+            stress passes column 2 of `Model.law`. Where nothing flows, p comes back bit for bit.
+        plastic_energy: of a law of flow: (eps_p, p, c) -> plastic work, stored and dissipated: a function of state.
+        stress: of a general law: (strain, history, dt, c) -> (stress, history). The strain is measured in the axes of
+            the reference, which have turned with the element where strains are small, and is logarithmic where
+            `Body.kinematics` is finite; the stress is the one conjugate to it. The history is a vector of the law's
+            rows, 0 at first. dt [s] is the time since the history was kept; 0 asks for the stress of the history as it
+            stands.
+        energies: of a general law: (strain, history, c) -> (stored, dissipated), with the history that `stress` gave.
+        history: kinds of what each point keeps, out of `ROWS`; HISTORY of the module of a general law.
+        plastic_row: of the equivalent plastic strain in the history, which must not shrink; PLASTIC_ROW of a general
+            law, -1 where it has none.
     """
 
     parameters: Any = None
     return_map: Any = None
     plastic_energy: Any = None
+    stress: Any = None
+    energies: Any = None
+    history: tuple[str, ...] = ()
+    plastic_row: int = -1
+
+    @property
+    def general(self) -> bool:
+        """Whether it gives the whole stress, pressure included."""
+        return self.stress is not None
+
+    @property
+    def size(self) -> int:
+        """Rows of the history of a point."""
+        return row_count(self.history)
 
 
 @cache
-def law_functions(law_name: str, precision: str) -> Law:
-    """The functions of the law in the module of that name; those of no law, "", are None.
+def law_functions(name: str, precision: str) -> Law:
+    """The law in the module of that name; no law, "", is elastic and has none of the functions.
 
     Raises:
-        RequestError: there is no such module, or it lacks one of them.
+        RequestError: there is no such module, or it lacks one of the functions of its family.
     """
-    if not law_name:
+    if not name:
         return Law()
     try:
-        module = import_module(law_name)
-        factories = [getattr(module, field.name) for field in fields(Law)]
+        module = import_module(name)
+        general = hasattr(module, "stress")
+        made = {key: getattr(module, key)(precision) for key in (GENERAL if general else FLOW)}
     except (ImportError, AttributeError) as error:
-        remedy = f"name a module that makes {', '.join(field.name for field in fields(Law))}: {error}"
-        raise bad_value("law of a material", law_name, remedy) from error
-    return Law(*(factory(precision) for factory in factories))
+        remedy = f"name a module that makes {', '.join(FLOW)}, or {', '.join(GENERAL)}: {error}"
+        raise bad_value("law of a material", name, remedy) from error
+    if not general:
+        return Law(**made, history=FLOW_HISTORY, plastic_row=row_count(FLOW_HISTORY) - 1)
+    return Law(**made, history=tuple(module.HISTORY), plastic_row=getattr(module, "PLASTIC_ROW", -1))

@@ -26,7 +26,7 @@ class Elements(list[ElementStage], Actor):
         super().__init__(ELEMENTS[block.element].stage(block, model.X, solver.precision) for block in model.blocks)
         self.solver = solver
         for index, stage in enumerate(self):
-            stage.index = index
+            stage.index, stage.dt = index, solver.dt / (model.rates.substeps if model.rates else 1)
 
     def new_state(self) -> list[ElementState]:
         """State of elements that have never flowed, by block."""

@@ -104,7 +104,7 @@ class Hex8r:
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
-        from warp_mca.kernels.elements import hex8r, hex8r_patch, hourglass
+        from warp_mca.kernels.elements import hex8r, hex8r_patch
         from warp_mca.physics.elements.patch_stage import hexahedral_stage
 
-        return hexahedral_stage(block, X, precision, hex8r, hex8r_patch, points=1, rows=hourglass.HISTORY_ROWS)
+        return hexahedral_stage(block, X, precision, hex8r, hex8r_patch, points=1)

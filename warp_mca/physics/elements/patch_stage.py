@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.kernels.elements import patch
 from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
+from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.physics.elements.patches import Array, grid_points, make_patches
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage, levels_of
 from warp_mca.physics.elements.state import ElementState
@@ -48,10 +49,9 @@ class PatchStage(ElementStage):
         kernels: Any,
         patch_kernels: Any,
         points: int,
-        rows: int | None = None,
     ) -> None:
         """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
-        super().__init__(block, precision, kernels, points, rows)
+        super().__init__(block, precision, kernels, points)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         mixed = precision == "mixed"
         ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
@@ -144,15 +144,9 @@ class PatchStage(ElementStage):
 
 
 def hexahedral_stage(
-    block: Block,
-    X: Array,
-    precision: str,
-    kernels: Any,
-    patch_kernels: Any,
-    points: int,
-    rows: int | None = None,
+    block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int
 ) -> ElementStage:
-    """By patches on a GPU at small strain, one by one otherwise; arguments as `ElementStage`, `PatchStage`."""
-    if block.finite or not wp.get_device().is_cuda:
-        return ElementStage(block, precision, kernels, points, rows)
-    return PatchStage(block, X, precision, kernels, patch_kernels, points, rows)
+    """By patches on a GPU at small strain, one by one otherwise and with a general law; arguments as `PatchStage`."""
+    if block.finite or law_functions(block.law, precision).general or not wp.get_device().is_cuda:
+        return ElementStage(block, precision, kernels, points)
+    return PatchStage(block, X, precision, kernels, patch_kernels, points)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import bad_value
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
-from warp_mca.kernels.materials.laws import HISTORY_SIZE
+from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.threads import ELEMENTS, Split, whole
 
@@ -33,6 +35,15 @@ def levels_of(ends: Sequence[int]) -> Index:
     return np.repeat(np.arange(len(ends), dtype=np.int32), counts)
 
 
+def _turned(rows: NDArray[np.float64], rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Symmetric tensors, traceless where `rows` lack zz, that are turned; arguments as `ElementStage.rotated`."""
+    xx, yy, *zz, xy, yz, xz = rows
+    tensor = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz[0] if zz else -xx - yy], axis=-1).reshape(-1, 3, 3)
+    turned = rotation @ tensor @ rotation.transpose(0, 2, 1)
+    i, j = ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]) if zz else ([0, 1, 0, 1, 0], [0, 1, 1, 2, 2])
+    return turned[:, i, j].T
+
+
 class ElementStage:
     """Device side of one block of elements.
 
@@ -40,9 +51,10 @@ class ElementStage:
         block: the host side.
         index: of the block in the model; its state is `State.elements[index]`.
         conn, material: as in `Block`.
-        points: integration points that keep a plastic strain.
-        rows: of the history.
-        vectors: that follow the plastic strains in the history, and turn with the element.
+        dt: time step of level 0 [s], for laws that depend on rates; 0, as it is at first, asks for the stress of the
+            history as it stands.
+        points: integration points that keep a history.
+        kept: kinds of what the history of an element holds, of `kernels.materials.laws.ROWS`, point by point.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
         slot_level: level of `Model.rates` of each slot, shape (slot_count,), int32; empty with one rate.
@@ -51,19 +63,15 @@ class ElementStage:
 
     rounds = 0
 
-    def __init__(self, block: Block, precision: str, kernels: Any, points: int, rows: int | None = None) -> None:
+    def __init__(self, block: Block, precision: str, kernels: Any, points: int) -> None:
         """Allocate.
 
         Args:
             block: the elements.
             precision: as in `warp_mca.run`.
-            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says in VECTORS how many
-                vectors follow the plastic strains in the history, if any do.
-            points: integration points that keep a plastic strain.
-            rows: of the history, where an element keeps more.
-
-        Raises:
-            RequestError: the history has fewer rows than the points and vectors need.
+            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says in KEPT what follows the
+                history of the points, if anything does.
+            points: integration points that keep a history.
         """
         self.block, self.corners, self.index = block, block.conn.shape[0], 0
         self.conn = wp.array(block.conn, dtype=wp.int32)
@@ -71,14 +79,11 @@ class ElementStage:
         self.count = block.conn.shape[1]
         self.slot_node: Index = block.conn.ravel()
         self.slot_level: Index = np.tile(levels_of(block.level_ends), self.corners)
-        self.slot = 0
-        self.vectors: int = getattr(kernels, "VECTORS", 0)
-        needed = points * HISTORY_SIZE + 3 * self.vectors
-        self.points, self.rows = points, needed if rows is None else rows
-        if points < 0 or self.rows < needed:
-            remedy = f"give at least {needed}, for {points} points of {HISTORY_SIZE} and {self.vectors} vectors of 3"
-            raise bad_value(f"Rows of the history of element {block.element}", self.rows, remedy)
+        self.slot, self.dt, self.points = 0, 0.0, points
+        self.law = law_functions(block.law, precision)
+        self.kept: tuple[str, ...] = points * self.law.history + getattr(kernels, "KEPT", ())
         self.real = scalars(precision).real
+        self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
         kind = (precision, block.law, block.finite)
         self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite)
         self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
@@ -88,8 +93,12 @@ class ElementStage:
         """Those of a step."""
         return [self.force_kernel, self.energy_kernel]
 
+    def nodal(self, part: slice) -> list[Any]:
+        """Pressure nodes of the corners of a range of elements, and dilatation of all pressure nodes; empty without."""
+        return self.no_nodes
+
     def more(self, part: slice) -> list[Any]:
-        """What kernels of this formulation take beside what all take, of a range of elements."""
+        """What the force kernel takes beside what all take, of a range of elements."""
         return []
 
     def new_state(self) -> ElementState:
@@ -97,7 +106,7 @@ class ElementStage:
         kept = self.count if self.block.plastic else 0
         return ElementState(
             yielded=wp.zeros(kept, dtype=wp.int32),
-            history=wp.zeros((self.rows, kept), dtype=self.real),
+            history=wp.zeros((row_count(self.kept), kept), dtype=self.real),
             extreme=wp.zeros((2, self.count), dtype=self.real),
         )
 
@@ -108,14 +117,14 @@ class ElementStage:
             history: as in `ElementState`, shape (row_count, element_count).
             rotation: of each element [-], shape (element_count, 3, 3), float64.
         """
-        found = np.array(history, dtype=np.float64)
-        for first in range(0, self.points * HISTORY_SIZE, HISTORY_SIZE):
-            xx, yy, xy, yz, xz = found[first : first + 5]
-            strain = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, -xx - yy], axis=-1).reshape(-1, 3, 3)
-            turned = rotation @ strain @ rotation.transpose(0, 2, 1)
-            found[first : first + 5] = turned[:, [0, 1, 0, 1, 0], [0, 1, 1, 2, 2]].T
-        for first in range(self.points * HISTORY_SIZE, self.points * HISTORY_SIZE + 3 * self.vectors, 3):
-            found[first : first + 3] = np.einsum("eij,je->ie", rotation, found[first : first + 3])
+        found, first = np.array(history, dtype=np.float64), 0
+        for kind in self.kept:
+            part = slice(first, first + ROWS[kind])
+            first = part.stop
+            if kind == "vector":
+                found[part] = np.einsum("eij,je->ie", rotation, found[part])
+            elif kind != "scalar":
+                found[part] = _turned(found[part], rotation)
         return found.astype(history.dtype)
 
     def _history(self, own: ElementState, part: slice) -> list[Any]:
@@ -156,12 +165,19 @@ class ElementStage:
 
         def launch(part: slice) -> None:
             inputs = [work.X, self.conn[:, part], self.material[part], work.law, work.displacements(state)]
-            inputs += [self.slot + part.start, self.count, *self.more(part)]
+            dt = self.dt * (1 << bisect_right(self.block.level_ends, part.start))
+            inputs += [self.slot + part.start, self.count, *self.more(part), dt]
             outputs = [*self._history(own, part), own.extreme[:, part], work.force]
             wp.launch(self.force_kernel, part.stop - part.start, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
+        def launch_from(first: int, part: slice) -> None:
+            launch(slice(first + part.start, first + part.stop))
+
         if chain is None:
-            split(self.count if level is None else self.active(level), launch, ELEMENTS)
+            count = self.count if level is None else self.active(level)
+            ends = [end for end in self.block.level_ends if end < count] if self.law.general else []
+            for first, end in pairwise([0, *ends, count]):
+                split(end - first, partial(launch_from, first), ELEMENTS)
             return
         assert level is not None
         for part in self.parts(level, chain):
@@ -177,7 +193,7 @@ class ElementStage:
 
         def launch(part: slice) -> None:
             inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
-            inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.more(part)]
+            inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.nodal(part)]
             count = part.stop - part.start
             wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
 
@@ -189,16 +205,16 @@ class ElementStage:
         """Stress [Pa] and plastic strain [-] at the corners of some elements with displacements u, from `first` on."""
         own = state.elements[self.index]
         inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, u, element, first]
-        inputs += self.more(slice(0, self.count))
+        inputs += self.nodal(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
 
     def max_plastic_strain(self, state: State, part: slice) -> float:
         """Greatest equivalent plastic strain of any point of a range of elements [-]."""
-        if not self.block.plastic or not self.points or part.start == part.stop:
+        row, size = self.law.plastic_row, self.law.size
+        if row < 0 or not self.points or part.start == part.stop:
             return 0.0
         history = state.elements[self.index].history
-        last = history[HISTORY_SIZE - 1 : self.points * HISTORY_SIZE : HISTORY_SIZE, part]
-        return float(last.numpy().max())
+        return float(history[row : self.points * size : size, part].numpy().max())
 
 
 def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index, Index]:

@@ -13,9 +13,9 @@ class ElementState:
 
     Attributes:
         yielded: not 0 where an element has yielded [-], shape (element_count,), int32; empty where elastic.
-        history: plastic strain tensor and equivalent plastic strain of each integration point [-], in the order of
-            `kernels.elements.point_records.history_functions`, then what the element keeps besides, shape
-            (row_count, element_count), float32 or float64; empty where elastic.
+        history: history that the law keeps at each integration point, as `kernels.materials.laws.Law.history` says,
+            point by point, then what the element keeps besides, shape (row_count, element_count), float32 or float64;
+            empty where elastic.
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on,
             shape (2, element_count), float32 or float64.
     """

@@ -45,9 +45,11 @@ class Tet4Stage(ElementStage):
         """Those of a step."""
         return [*super().kernels(), self.dilatation_kernel, self.average_kernel]
 
-    def more(self, part: slice) -> list[Any]:
+    def nodal(self, part: slice) -> list[Any]:
         """Pressure nodes of each element of a range, and the dilatation of all."""
         return [self.group[:, part], self.dilatation]
+
+    more = nodal
 
     def launch(
         self,

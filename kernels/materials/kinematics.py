@@ -12,8 +12,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.logarithm import log_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.materials.logarithm import log_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -100,6 +100,8 @@ class Kinematics:
             pressure, which goes with the derivative of J with respect to F.
         pressure: (K, J - 1) -> derivative of the volumetric energy with respect to J [Pa].
         volumetric_energy: (K, J - 1) -> energy per reference volume [J/m^3].
+        volume_strain: J - 1 -> trace of the strain [-].
+        conjugate_pressure: (derivative of an energy with respect to that trace [Pa], J - 1) -> with respect to J [Pa].
         cauchy: (H, S, N, d, pressure) -> Cauchy stress in the rotated frame [Pa].
     """
 
@@ -108,6 +110,8 @@ class Kinematics:
     nominal: Any
     pressure: Any
     volumetric_energy: Any
+    volume_strain: Any
+    conjugate_pressure: Any
     cauchy: Any
 
 
@@ -149,7 +153,24 @@ def _small(precision: str) -> Kinematics:
     def small_volumetric(K: R, theta: R):
         return R(0.5) * K * theta * theta
 
-    return Kinematics(small_dilatation, small_deviator, small_stress, small_pressure, small_volumetric, small_stress)
+    @wp.func
+    def small_volume_strain(theta: R):
+        return theta
+
+    @wp.func
+    def small_conjugate(mean: R, theta: R):
+        return mean
+
+    return Kinematics(
+        small_dilatation,
+        small_deviator,
+        small_stress,
+        small_pressure,
+        small_volumetric,
+        small_volume_strain,
+        small_conjugate,
+        small_stress,
+    )
 
 
 def _logarithmic(precision: str) -> Kinematics:
@@ -227,4 +248,21 @@ def _logarithmic(precision: str) -> Kinematics:
         sigma = (P + P * wp.transpose(H)) / (R(1.0) + log_dilatation(H))
         return R(0.5) * (sigma + wp.transpose(sigma)) + pressure * wp.identity(n=3, dtype=R)
 
-    return Kinematics(log_dilatation, log_deviator, log_nominal, log_pressure, log_volumetric, log_cauchy)
+    @wp.func
+    def log_volume_strain(theta: R):
+        return theta * log_over(theta)
+
+    @wp.func
+    def log_conjugate(mean: R, theta: R):
+        return mean / (R(1.0) + theta)
+
+    return Kinematics(
+        log_dilatation,
+        log_deviator,
+        log_nominal,
+        log_pressure,
+        log_volumetric,
+        log_volume_strain,
+        log_conjugate,
+        log_cauchy,
+    )

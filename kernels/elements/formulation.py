@@ -1,0 +1,147 @@
+"""Owns what a formulation of elements is to the kernels, and the forces of one whose points each have their pressure.
+
+A formulation says where its points lie and which change of volume gives the pressure; strain, material point, energy
+and stress are the same for all.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.base.errors import bad_value
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.point import material_point
+from warp_mca.kernels.records.extremes import keep_functions
+
+wp.set_module_options({"enable_backward": False})
+
+OWN, MEAN, NODAL = "own", "mean", "nodal"
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """An element of one precision, law and strain measure.
+
+    Attributes:
+        name: of the element.
+        corners, points: numbers of its nodes and of its integration points.
+        pressure: from which change of volume it comes: OWN of each point, MEAN of the element, NODAL of the pressure
+            nodes of each corner, which `ElementStage.nodal` gives.
+        struct: what the functions below need of an element.
+        load: (X, u, conn, e) -> struct.
+        gradient: (struct, g) -> (volume of point g [m^3], displacement gradient there in the element's frame).
+        rotation: struct -> W = Q - I of that frame.
+        shown: corners that show the stress of one point.
+        corner_of: (g, j) -> corner number j < `shown` that shows the stress of point g.
+        slope: (struct, g, a) -> volume times gradient of the shape function of node a at point g [m^2]; for
+            `force_kernel` only.
+        place: g -> number of point g in the history.
+        modes: (struct, K, G, flag, history, e) -> (stored, dissipated) energy of what deforms without strain at the
+            points [J]; None where nothing does.
+    """
+
+    name: str
+    corners: int
+    points: int
+    pressure: str
+    struct: Any
+    load: Any
+    gradient: Any
+    rotation: Any
+    shown: int
+    corner_of: Any
+    slope: Any = None
+    place: Any = None
+    modes: Any = None
+
+
+Maker = Callable[[str, str, bool], Formulation]  # of a precision, a law, and whether strains may be large
+
+
+@wp.func
+def same_place(g: int):
+    return g
+
+
+def parts_of(maker: Maker, precision: str, law_name: str, finite: bool) -> tuple[Formulation, Any, Any]:
+    """A formulation, its material point, and the place of a point in the history.
+
+    Raises:
+        RequestError: the law gives the pressure of a point, where the element takes that of its nodes.
+    """
+    form = maker(precision, law_name, finite)
+    point = material_point(precision, law_name, finite)
+    if point.general and form.pressure == NODAL:
+        remedy = "its law gives the pressure at each point; choose an element without nodal pressure"
+        raise bad_value("Body.element", form.name, remedy)
+    return form, point, form.place or same_place
+
+
+@cache
+def force_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces -V P grad N of the points of each element on its nodes [N], with the pressure of each point."""
+    form, point, place = parts_of(maker, precision, law_name, finite)
+    load_shape, gradient, rotation, slope = form.load, form.gradient, form.rotation, form.slope
+    points, corners, update = form.points, form.corners, point.update
+    plastic, general = bool(law_name), point.general
+    t = scalars(precision)
+    R, vec3, forces = t.real, t.vec3, wp.types.matrix((corners, 3), t.real)
+    keep_strain, keep_volume, _ = keep_functions(R)
+    k = kinematics(precision, finite)
+    dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def element_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        count: int,
+        dt: R,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        e = wp.tid()
+        shape = load_shape(X, u, conn, e)
+        m = material[e]
+        flag = int(0)
+        if wp.static(plastic):
+            flag = yielded_out[e]
+        flows = int(flag)
+        W = rotation(shape)
+        largest = R(0.0)
+        smallest = R(1.0)
+        f = forces()
+        for g in range(wp.static(points)):
+            _weight, H = gradient(shape, g)
+            strain, N, d = deviator(H)
+            theta = dilatation_of(H)
+            largest = wp.max(largest, wp.ddot(strain, strain))
+            smallest = wp.min(smallest, wp.determinant(wp.identity(n=3, dtype=R) + H))
+            S, pressure, dp = update(strain, theta, law[m, 1], place(g), e, m, flag, law, dt, history_out)
+            if dp > R(0.0):
+                flows = int(1)
+            if wp.static(not general):
+                pressure = pressure_of(law[m, 0], theta)
+            P = nominal(H, S, N, d, pressure)
+            P = P + W * P
+            for a in range(wp.static(corners)):
+                f[a] = f[a] - P * slope(shape, g, a)
+        if wp.static(plastic):
+            if flows != flag:
+                yielded_out[e] = flows
+        keep_strain(e, largest, extreme_out)
+        keep_volume(e, R(1.0) - smallest, extreme_out)
+        for a in range(wp.static(corners)):
+            for i in range(3):  # by components, as in `hexahedron.store_function`
+                force_out[slot + a * count + e][i] = f[a, i]
+
+    return element_force

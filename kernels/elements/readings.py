@@ -1,0 +1,185 @@
+"""Owns the kernels that read elements of every formulation: energies, strains and Jacobians, stresses."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, parts_of
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def shared_function(maker: Maker, precision: str, law_name: str, finite: bool) -> Any:
+    """The function (struct, e, K, group, dilatation) -> what points share: (J - 1, pressure [Pa], energy [J]).
+
+    Nothing where pressures are those of the points; J - 1 alone is of use to a general law.
+    """
+    form, _, _ = parts_of(maker, precision, law_name, finite)
+    struct, gradient, points, corners = form.struct, form.gradient, form.points, form.corners
+    k, R = kinematics(precision, finite), scalars(precision).real
+    dilatation_of, pressure_of, volumetric_energy = k.dilatation, k.pressure, k.volumetric_energy
+    mean, nodal, share = form.pressure == MEAN, form.pressure == NODAL, 1.0 / corners
+
+    @wp.func
+    def shared_by_points(shape: struct, e: int, K: R, group: wp.array2d(dtype=wp.int32), dilatation: wp.array(dtype=R)):
+        theta = R(0.0)
+        pressure = R(0.0)
+        energy = R(0.0)
+        if wp.static(mean):
+            volume = R(0.0)
+            for g in range(wp.static(points)):
+                weight, H = gradient(shape, g)
+                volume += weight
+                theta += dilatation_of(H) * weight
+            theta = theta / volume
+            pressure = pressure_of(K, theta)
+            energy = volume * volumetric_energy(K, theta)
+        if wp.static(nodal):
+            for a in range(wp.static(corners)):
+                pressure += R(share) * pressure_of(K, dilatation[group[a, e]])
+                energy += R(share) * volumetric_energy(K, dilatation[group[a, e]])
+            weight, H = gradient(shape, 0)
+            energy = weight * energy
+        return theta, pressure, energy
+
+    return shared_by_points
+
+
+@cache
+def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
+
+    The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
+    """
+    form, point, place = parts_of(maker, precision, law_name, finite)
+    load_shape, gradient, rotation, modes, points = form.load, form.gradient, form.rotation, form.modes, form.points
+    shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
+    plastic, general, has_modes, read = bool(law_name), point.general, form.modes is not None, point.read
+    k, R = kinematics(precision, finite), scalars(precision).real
+    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
+
+    # logarithms need all their digits
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
+    def element_energy(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        yielded: wp.array(dtype=wp.int32),
+        history: wp.array2d(dtype=R),
+        extreme: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        first: int,
+        group: wp.array2d(dtype=wp.int32),
+        dilatation: wp.array(dtype=R),
+        energy_out: wp.array2d(dtype=R),
+    ):
+        e = wp.tid()
+        shape = load_shape(X, u, conn, e)
+        m = material[e]
+        K = law[m, 0]
+        G = law[m, 1]
+        flag = int(0)
+        if wp.static(plastic):
+            flag = yielded[e]
+        identity = wp.identity(n=3, dtype=R)
+        theta, _pressure, volumetric = shared(shape, e, K, group, dilatation)
+        elastic = R(0.0)
+        dissipated = R(0.0)
+        largest = extreme[STRAIN_SQUARE, e]
+        smallest = R(1.0)
+        for g in range(wp.static(points)):
+            weight, H = gradient(shape, g)
+            strain, _N, _d = deviator(H)
+            largest = wp.max(largest, wp.ddot(strain, strain))
+            if wp.static(own):
+                theta = dilatation_of(H)
+            _S, _pressure, _p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
+            if wp.static(own and not general):
+                stored += volumetric_energy(K, theta)
+            elastic += weight * stored
+            dissipated += weight * spent
+            smallest = wp.min(smallest, wp.determinant(identity + H))
+        if wp.static(not general):
+            elastic += volumetric
+        energy_out[0, first + e] = elastic
+        energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
+        # an inverted element's Q is a reflection, which would hide the inversion in its own frame
+        smallest = smallest * wp.determinant(identity + rotation(shape))
+        energy_out[3, first + e] = wp.min(smallest, R(1.0) - extreme[VOLUME_LOSS, e])
+        hourglass = R(0.0)
+        if wp.static(has_modes):
+            hourglass, spent = modes(shape, K, G, flag, history, e)
+            dissipated += spent
+        energy_out[1, first + e] = dissipated
+        energy_out[4, first + e] = hourglass
+
+    return element_energy
+
+
+@cache
+def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: stress [Pa] and plastic strain [-] at the points of some elements, in the world frame.
+
+    A point's values go to the slots of the corners that show them: rows xx, yy, zz, xy, yz, xz, p.
+    """
+    form, point, place = parts_of(maker, precision, law_name, finite)
+    load_shape, gradient, rotation, corner_of = form.load, form.gradient, form.rotation, form.corner_of
+    points, corners, shown = form.points, form.corners, form.shown
+    shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
+    plastic, general, read = bool(law_name), point.general, point.read
+    k, R = kinematics(precision, finite), scalars(precision).real
+    dilatation_of, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def element_stress(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        yielded: wp.array(dtype=wp.int32),
+        history: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        element: wp.array(dtype=wp.int32),
+        first: int,
+        group: wp.array2d(dtype=wp.int32),
+        dilatation: wp.array(dtype=R),
+        stress_out: wp.array2d(dtype=wp.float32),
+    ):
+        item = wp.tid()
+        e = element[item]
+        shape = load_shape(X, u, conn, e)
+        m = material[e]
+        K = law[m, 0]
+        flag = int(0)
+        if wp.static(plastic):
+            flag = yielded[e]
+        Q = wp.identity(n=3, dtype=R) + rotation(shape)
+        theta, mean_pressure, _energy = shared(shape, e, K, group, dilatation)
+        for g in range(wp.static(points)):
+            _weight, H = gradient(shape, g)
+            strain, N, d = deviator(H)
+            if wp.static(own):
+                theta = dilatation_of(H)
+                mean_pressure = pressure_of(K, theta)
+            S, pressure, p, _stored, _spent = read(strain, theta, law[m, 1], place(g), e, m, flag, law, history)
+            if wp.static(not general):
+                pressure = mean_pressure
+            local = cauchy(H, S, N, d, pressure)
+            sigma = Q * local * wp.transpose(Q)
+            for j in range(wp.static(shown)):
+                slot = first + wp.static(corners) * item + corner_of(g, j)
+                stress_out[0, slot] = wp.float32(sigma[0, 0])
+                stress_out[1, slot] = wp.float32(sigma[1, 1])
+                stress_out[2, slot] = wp.float32(sigma[2, 2])
+                stress_out[3, slot] = wp.float32(sigma[0, 1])
+                stress_out[4, slot] = wp.float32(sigma[1, 2])
+                stress_out[5, slot] = wp.float32(sigma[0, 2])
+                stress_out[6, slot] = wp.float32(p)
+
+    return element_stress
