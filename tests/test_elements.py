@@ -16,7 +16,7 @@ from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import cell_names, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
-from warp_mca.kernels.nodes.node import gather_function
+from warp_mca.kernels.nodes.gather import gather_function
 from warp_mca.model.build import build_model
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import gather_lists

@@ -314,6 +314,7 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
     """Against the same graphs whose kernels begin when the one before them has ended."""
     from benchmarks.blocks import FULL, Case, Held, assemble
     from warp_mca.kernels.nodes import node
+    from warp_mca.kernels.nodes.gather import Kind
     from warp_mca.step import replay
 
     monkeypatch.setattr("warp_mca.step.node_stage.EARLY_ROUNDS", 0)
@@ -323,7 +324,7 @@ def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkey
         monkeypatch.setattr(replay, "launch_early", change)
         held = Held(model, case, "cuda:0", precision)
         if name == "elastic":
-            early = node.integrate_kernel(precision, False, False, False, False, True, turned=False)
+            early = node.integrate_kernel(Kind(precision), early=True)
             assert held.solver.nodes.integrate_kernel is early
         for _ in range(10):
             held.advance(20)

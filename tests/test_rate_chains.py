@@ -17,7 +17,8 @@ from test_overlap import Driver
 import warp_mca as mca
 from warp_mca.kernels.elements import hex8, hex8_patch
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
-from warp_mca.kernels.nodes import rated_node
+from warp_mca.kernels.nodes import node
+from warp_mca.kernels.nodes.gather import Kind
 from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.step import early_launch
 from warp_mca.step.rate_chains import Chains, Task, tasks
@@ -122,8 +123,7 @@ def test_patches_of_a_chain_are_its_elements(monkeypatch: pytest.MonkeyPatch):
 
 def test_slow_nodes_do_not_begin_early_but_what_follows_them_does(monkeypatch: pytest.MonkeyPatch):
     """Their threads would wait on the device for elements that take several substeps."""
-    slow = rated_node.integrate_kernel("mixed", False, False, False, False, False, True)
-    fast = rated_node.integrate_kernel("mixed", False, False, False, False, False)
+    slow, fast = (node.integrate_kernel(Kind("mixed", rated=True), beside=beside) for beside in (True, False))
     patches = hex8_patch.force_kernel("mixed", "")
     assert slow.key not in EARLY and fast.key in EARLY
     names = [f"{kernel.key}_1a2b3c4d_cuda_kernel_forward" for kernel in (patches, slow, patches, fast)]

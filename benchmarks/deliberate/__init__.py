@@ -186,8 +186,8 @@ MUTATIONS: dict[str, Mutation] = {
     "joint_impulse_halved": Mutation(
         "the impulse of a joint is counted by half",
         "kernels/nodes/constraint.py",
-        "impulse_out[k] + mass[i] * (v - free)",
-        "impulse_out[k] + wp.float64(0.5) * mass[i] * (v - free)",
+        "impulse_out[k] + m * (v - free)",
+        "impulse_out[k] + wp.float64(0.5) * m * (v - free)",
     ),
     "shown_pressure_halved": Mutation(
         "the pressure in the stress that is shown is halved",
@@ -280,13 +280,13 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "slow_impulse_lost": Mutation(
         "an element with a step of its own gives its nodes the impulse of one of their steps only",
-        "kernels/nodes/node.py",
-        "wp.float64(1 << (entry >> wp.static(LEVEL_BIT))) * f",
-        "f",
+        "kernels/nodes/gather.py",
+        "scale * force_at(slot, force)",
+        "force_at(slot, force)",
     ),
     "gravity_reversed": Mutation(
         "gravity acts against its direction",
-        "kernels/nodes/node.py",
+        "kernels/nodes/gather.py",
         "inverse * total + of(gravity",
         "inverse * total - of(gravity",
     ),

@@ -6,11 +6,17 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
-from warp_mca.kernels.hardware.per_scene import kind, value_function
+from warp_mca.kernels.hardware.per_scene import kind
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.nodes.node import LEVEL_BIT, TOUCHABLE, hold, nodal_force_function, take_contact
-from warp_mca.kernels.records.extremes import keep_speed
+from warp_mca.kernels.nodes.gather import (
+    Kind,
+    NodeData,
+    NodeState,
+    acceleration_function,
+    move,
+    split_level,
+    total_force_function,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -47,39 +53,28 @@ def dampen(before: wp.vec3d, free: wp.vec3d, own: wp.vec3d, share: wp.mat33d):
 
 
 @cache
-def absorbing_kernel(
-    precision: str, contact: bool, springs: bool, each: bool = False, rated: bool = False, turned: bool = False
-) -> Any:
-    """Kernel: advance the nodes that dashpots act on; arguments as in `node.integrate_kernel`.
+def absorbing_kernel(own: Kind, springs: bool) -> Any:
+    """Kernel: a step of the nodes that dashpots act on; arguments as in `node.integrate_kernel`.
 
     impulse_out [N s] is what each node has given to what lies beyond the boundary up to t(n), absorbed_out [J] the
     energy that it gave in the frame of the body. As the force at t(n) acts for half a step on either side of
     it, the arrays with `after` hold the same half a step later. With `springs`, stretch_out [m] is u(n) less the way of
-    the body. `rated`, `turned` as in `nodal_force_function`; `rated` nodes are those of `item`, place among the
-    dashpots + (level << LEVEL_BIT), whose step is 2^level times `dt`.
+    the body. If `own.rated`, nodes are those of `item`, place among the dashpots + (level << LEVEL_BIT), and dt is the
+    step of level 0.
     """
-    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
-    vec3 = scalars(precision).vec3
-    nodal_force = nodal_force_function(precision, rated, turned)
+    vec3, Vector, Index = scalars(own.precision).vec3, kind(wp.vec3d, own.each), kind(wp.int32, own.each)
+    total_force, acceleration = total_force_function(own), acceleration_function(own.each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_absorbing(
         item: wp.array(dtype=wp.int32),
         dashpots: Dashpots,
-        inverse_mass: wp.array(dtype=wp.float64),
-        first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i),
-        role: wp.array(dtype=wp.uint8),
+        nodes: NodeData,
         force: wp.array(dtype=vec3),
-        frames: Frames,
         scene: Index,
         gravity: Vector,
         dt: wp.float64,
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        v_before_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         impulse_out: wp.array(dtype=wp.vec3d),
         impulse_after_out: wp.array(dtype=wp.vec3d),
         absorbed_out: wp.array(dtype=wp.float64),
@@ -90,35 +85,28 @@ def absorbing_kernel(
         let_next_begin()
         k = wp.tid()
         step = dt
-        if wp.static(rated):
-            step *= wp.float64(1 << (item[k] >> wp.static(LEVEL_BIT)))
-            k = item[k] & wp.static((1 << LEVEL_BIT) - 1)
+        if wp.static(own.rated):
+            k, scale = split_level(item[k])
+            step *= scale
         i = dashpots.node[k]
-        own = dashpots.velocity[k]
-        total = nodal_force(i, first_slots[i], more_slots, force, frames)
-        if wp.static(contact):
-            if int(role[i]) & wp.static(TOUCHABLE) != 0:
-                total += take_contact(i, contact_force_out)
+        v_body = dashpots.velocity[k]
+        total = total_force(i, nodes.first_slots[i], nodes, force, state_out.nodal_force)
         spring = wp.vec3d()
         if wp.static(springs):
             spring = dashpots.stiffness[k] * stretch_out[k]
             total -= spring
-        a = hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
-        before = v_out[i]
-        v, w = dampen(before, before + step * a, own, dashpots.share[k])
+        before = state_out.v[i]
+        free = before + step * acceleration(i, total, nodes.inverse_mass[i], nodes, scene, gravity)
+        v, w = dampen(before, free, v_body, dashpots.share[k])
         half = wp.float64(0.5) * step * (dashpots.damping[k] * w + spring)
         impulse = impulse_after_out[k] + half
-        absorbed = absorbed_after_out[k] + wp.dot(half, before - own)
+        absorbed = absorbed_after_out[k] + wp.dot(half, before - v_body)
         impulse_out[k] = impulse
         impulse_after_out[k] = impulse + half
         absorbed_out[k] = absorbed
-        absorbed_after_out[k] = absorbed + wp.dot(half, v - own)
+        absorbed_after_out[k] = absorbed + wp.dot(half, v - v_body)
         if wp.static(springs):
-            stretch_out[k] = stretch_out[k] + step * (v - own)
-        if v_before_out.shape[0] > 0:
-            v_before_out[i] = before
-        v_out[i] = v
-        u_out[i] = u_out[i] + step * v
-        keep_speed(i, v, speed_square_out)
+            stretch_out[k] = stretch_out[k] + step * (v - v_body)
+        move(i, state_out.u[i] + step * v, v, state_out)
 
     return begins_early(advance_absorbing)

@@ -6,11 +6,16 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
-from warp_mca.kernels.hardware.per_scene import kind, value_function
+from warp_mca.kernels.hardware.per_scene import kind
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.nodes.node import hold, nodal_force_function, take_contact
-from warp_mca.kernels.records.extremes import keep_speed
+from warp_mca.kernels.nodes.gather import (
+    Kind,
+    NodeData,
+    NodeState,
+    acceleration_function,
+    move,
+    total_force_function,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -109,74 +114,28 @@ def bound_node(k: int, bonds: Bonds):
     return i
 
 
-@wp.func
-def move(
-    i: int,
-    u: wp.vec3d,
-    v: wp.vec3d,
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    speed_square_out: wp.array(dtype=wp.float32),
-):
-    """Give a node its displacement [m] and velocity [m/s]."""
-    u_out[i] = u
-    v_out[i] = v
-    keep_speed(i, v, speed_square_out)
-
-
 @cache
-def bound_kernel(
-    precision: str,
-    contact: bool,
-    each: bool = False,
-    partial: bool = False,
-    skips: bool = False,
-    rated: bool = False,
-    turned: bool = False,
-) -> Any:
-    """Kernel: the nodes that `node.integrate_kernel` leaves out, pairs first; arguments as there.
+def bound_kernel(own: Kind, partial: bool = False, skips: bool = False) -> Any:
+    """Kernel: a step of tied pairs, then of driven nodes; arguments as in `node.integrate_kernel`.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
-    rigid bodies, which `rigid_body.advance_kernel` advances. `rated`, `turned` as in `nodal_force_function`.
+    rigid bodies, which `rigid_body.advance_kernel` advances.
     """
-    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
-    vec3 = scalars(precision).vec3
-    nodal_force = nodal_force_function(precision, rated, turned)
-
-    @wp.func
-    def total_force(
-        i: int,
-        first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i),
-        force: wp.array(dtype=vec3),
-        frames: Frames,
-        contact_force_out: wp.array(dtype=wp.vec3d),
-    ):
-        total = nodal_force(i, first_slots[i], more_slots, force, frames)
-        if wp.static(contact):
-            total += take_contact(i, contact_force_out)
-        return total
+    vec3, Vector, Index = scalars(own.precision).vec3, kind(wp.vec3d, own.each), kind(wp.int32, own.each)
+    total_force = total_force_function(own)
+    acceleration, unheld = acceleration_function(own.each), acceleration_function(own.each, False)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def advance_bound(
-        mass: wp.array(dtype=wp.float64),
-        inverse_mass: wp.array(dtype=wp.float64),
-        first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i),
-        role: wp.array(dtype=wp.uint8),
+        nodes: NodeData,
         force: wp.array(dtype=vec3),
-        frames: Frames,
         scene: Index,
         gravity: Vector,
         bonds: Bonds,
         dt: wp.float64,
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        v_before_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         impulse_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
@@ -188,37 +147,34 @@ def bound_kernel(
         i = bound_node(k, bonds)
         if wp.static(skips) and i < 0:
             return
-        total = total_force(i, first_slots, more_slots, force, frames, contact_force_out)
-        free = v_out[i] + dt * hold(int(role[i]), inverse_mass[i] * total + of(gravity, of(scene, i)))
-        u_free = u_out[i] + dt * free
-        if v_before_out.shape[0] > 0:
-            v_before_out[i] = v_out[i]
+        m = nodes.mass[i]
+        total = total_force(i, nodes.first_slots[i], nodes, force, state_out.nodal_force)
+        free = state_out.v[i] + dt * acceleration(i, total, nodes.inverse_mass[i], nodes, scene, gravity)
+        u_free = state_out.u[i] + dt * free
         u = wp.vec3d()
         v = wp.vec3d()
         if k < bonds.first.shape[0]:
             j = bonds.second[k]
             if j >= 0:
-                if v_before_out.shape[0] > 0:
-                    v_before_out[j] = v_out[j]
-                total = total_force(j, first_slots, more_slots, force, frames, contact_force_out)
-                v_j = v_out[j] + dt * (inverse_mass[j] * total + of(gravity, of(scene, j)))
-                u_j = u_out[j] + dt * v_j
-                u = weighted_mean(mass[i], u_free, mass[j], u_j)
-                v = weighted_mean(mass[i], free, mass[j], v_j)
+                total = total_force(j, nodes.first_slots[j], nodes, force, state_out.nodal_force)
+                v_j = state_out.v[j] + dt * unheld(j, total, nodes.inverse_mass[j], nodes, scene, gravity)
+                u_j = state_out.u[j] + dt * v_j
+                u = weighted_mean(m, u_free, nodes.mass[j], u_j)
+                v = weighted_mean(m, free, nodes.mass[j], v_j)
                 if wp.static(partial):
                     u_j += bonds.tied[k] * (u - u_j)
                     v_j += bonds.tied[k] * (v - v_j)
                 else:
                     u_j = u
                     v_j = v
-                move(j, u_j, v_j, u_out, v_out, speed_square_out)
+                move(j, u_j, v_j, state_out)
             if wp.static(partial):
                 u = u_free + bonds.tied[k] * (u - u_free)
                 v = free + bonds.tied[k] * (v - free)
-            impulse_out[k] = impulse_out[k] + mass[i] * (v - free)
+            impulse_out[k] = impulse_out[k] + m * (v - free)
         else:
-            v = drive(k - bonds.first.shape[0], mass[i], dt, bonds, free, work_out, work_after_out, clock_out)
+            v = drive(k - bonds.first.shape[0], m, dt, bonds, free, work_out, work_after_out, clock_out)
             u = u_free + dt * (v - free)
-        move(i, u, v, u_out, v_out, speed_square_out)
+        move(i, u, v, state_out)
 
     return begins_early(advance_bound)

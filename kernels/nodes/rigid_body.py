@@ -12,14 +12,12 @@ import warp as wp
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters, Mean, spin_after
 from warp_mca.kernels.nodes.coupling import turned
-from warp_mca.kernels.nodes.floating import Frames
+from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState, move, total_force_function
 from warp_mca.kernels.nodes.joint_torque import wait_for_block
-from warp_mca.kernels.nodes.node import nodal_force_function, take_contact
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
 from warp_mca.kernels.nodes.symmetric import factorise
-from warp_mca.kernels.records.extremes import keep_speed
 
 wp.set_module_options({"enable_backward": False})
 
@@ -27,10 +25,9 @@ Wrench = wp.types.vector(length=6, dtype=wp.float64)  # force and moment
 
 
 @cache
-def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any:
+def load_function(own: Kind) -> Any:
     """The function that lets the forces on its nodes act on a body."""
-    vec3 = scalars(precision).vec3
-    nodal_force = nodal_force_function(precision, rated, seen)
+    vec3, total_force = scalars(own.precision).vec3, total_force_function(own)
 
     @wp.func
     def load(
@@ -39,11 +36,9 @@ def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any
         kick: wp.float64,
         bodies: RigidBodies,
         rotation: wp.array(dtype=wp.quatd),
-        first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i),
+        nodes: NodeData,
         force: wp.array(dtype=vec3),
-        frames: Frames,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         momentum_out: wp.array(dtype=wp.vec3d),
         spin_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
@@ -52,9 +47,7 @@ def load_function(precision: str, contact: bool, rated: bool, seen: bool) -> Any
         total = Wrench()
         for e in range(bodies.begin[b] + lane, bodies.begin[b + 1], wp.block_dim()):
             i = bodies.node[e]
-            f = nodal_force(i, first_slots[i], more_slots, force, frames)
-            if wp.static(contact):
-                f += take_contact(i, contact_force_out)
+            f = total_force(i, nodes.first_slots[i], nodes, force, nodal_force_out)
             work_out[e] = f
             moment = wp.cross(wp.quat_rotate(q, bodies.arm[e]), f)
             for c in range(3):
@@ -113,25 +106,21 @@ def count_riders(
 
 
 @cache
-def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: bool = False) -> Any:
+def advance_kernel(own: Kind) -> Any:
     """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes a group's bodies in turn.
 
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. turned_out is
     Q - I after the step, the other outputs from force_out on are as in `find_motion`, `rigid_rows` and `rigid_pins`.
-    `rated` and, as `seen`, its `turned` as in `nodal_force_function`.
     """
-    vec3 = scalars(precision).vec3
-    load = load_function(precision, contact, rated, seen)
+    vec3, load = scalars(own.precision).vec3, load_function(own)
 
     # fmt: off
     @wp.kernel(enable_backward=False, module="unique")
     def advance_rigid(
         bodies: RigidBodies, rows: RigidRows, clusters: Clusters, X: wp.array(dtype=wp.vec3d),
-        mass: wp.array(dtype=wp.float64), first_slots: wp.array(dtype=wp.vec2i),
-        more_slots: wp.array(dtype=wp.vec4i), force: wp.array(dtype=vec3), frames: Frames, kick: wp.float64,
-        span: wp.float64, moves: bool, contact_force_out: wp.array(dtype=wp.vec3d), u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d), speed_square_out: wp.array(dtype=wp.float32),
+        nodes: NodeData, force: wp.array(dtype=vec3), kick: wp.float64, span: wp.float64, moves: bool,
+        state_out: NodeState,
         centre_out: wp.array(dtype=wp.vec3d), rotation_out: wp.array(dtype=wp.quatd),
         momentum_out: wp.array(dtype=wp.vec3d), spin_out: wp.array(dtype=wp.vec3d),
         orientation_out: wp.array(dtype=wp.quatd), impulse_out: wp.array(dtype=wp.vec3d),
@@ -149,13 +138,13 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: boo
         size = rows.begin[k + 1] - begin
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
-            load(b, lane, kick, bodies, rotation_out, first_slots, more_slots, force, frames,
-                 contact_force_out, momentum_out, spin_out, force_out)
+            load(b, lane, kick, bodies, rotation_out, nodes, force, state_out.nodal_force, momentum_out, spin_out,
+                 force_out)
             if lane == 0:
                 find_motion(b, bodies, span, rotation_out, momentum_out, spin_out, turn_out, velocity_out, rate_out)
         for p in range(rows.pins[k], rows.pins[k + 1]):
-            find_cluster(p, lane, rows.place[p], clusters, X, mass, span, orientation_out, u_out, v_out,
-                         mean_out, point_out, pin_impulse_out)
+            find_cluster(p, lane, rows.place[p], clusters, X, nodes.mass, span, orientation_out, state_out.u,
+                         state_out.v, mean_out, point_out, pin_impulse_out)
         if size > 0:
             for r in range(begin + lane, begin + size, wp.block_dim()):
                 place_row(r, rows, span, centre_out, rotation_out, normal_out, twist_out, lever_out, gap_out)
@@ -175,14 +164,15 @@ def advance_kernel(precision: str, contact: bool, rated: bool = False, seen: boo
         if moves:
             for p in range(rows.pins[k], rows.pins[k + 1]):
                 pull_cluster(p, lane, rows.place[p], clusters, X, span, mean_out, point_out, pin_impulse_out,
-                             u_out, v_out, speed_square_out)
+                             state_out.u, state_out.v, state_out.speed_square)
                 if lane == 0:
                     w = spin_after(mean_out[p], mean_out[p].spin, pin_impulse_out[p, 0], pin_impulse_out[p, 1])
                     orientation_out[p] = turned(orientation_out[p], span * w)
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
             if moves:
-                count_riders(b, lane, kick, bodies, mass, v_out, force_out, velocity_out, rate_out, impulse_out)
+                count_riders(b, lane, kick, bodies, nodes.mass, state_out.v, force_out, velocity_out, rate_out,
+                             impulse_out)
             if lane == 0:
                 move_on(b, span, moves, turn_out, velocity_out, centre_out, rotation_out, turned_out)
 
@@ -199,18 +189,10 @@ def follow(
     velocity: wp.array(dtype=wp.vec3d),
     rate: wp.array(dtype=wp.mat33d),
     turned: wp.array(dtype=wp.mat33d),
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    v_before_out: wp.array(dtype=wp.vec3d),
-    speed_square_out: wp.array(dtype=wp.float32),
+    state_out: NodeState,
 ):
-    """Give nodes of rigid bodies, riders included, displacement and velocity; v_before_out takes the old velocity."""
+    """Give the nodes of rigid bodies, riders included, their displacement and velocity."""
     k = wp.tid()
     i = node[k]
     b = body[k]
-    if v_before_out.shape[0] > 0:
-        v_before_out[i] = v_out[i]
-    v = velocity[b] + rate[b] * arm[k]
-    v_out[i] = v
-    u_out[i] = centre[b] + turned[b] * arm[k]
-    keep_speed(i, v, speed_square_out)
+    move(i, centre[b] + turned[b] * arm[k], velocity[b] + rate[b] * arm[k], state_out)

@@ -11,7 +11,7 @@ import warp as wp
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.nodes.node import TOUCHABLE, hold
+from warp_mca.kernels.nodes.gather import TOUCHABLE, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 

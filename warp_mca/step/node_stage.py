@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
-from warp_mca.kernels.nodes import constraint, node, rated_node, slide
+from warp_mca.kernels.nodes import constraint, node, slide
+from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.stage import per_scene
 from warp_mca.physics.elements.stage import BLOCK_DIM
@@ -32,9 +32,7 @@ class NodeStage(Actor):
     Attributes:
         dt: time step of bound nodes [s].
         base: time step of the fastest nodes [s].
-        each: whether gravity differs between nodes; then `gravity` and `scene` are arrays.
-        touched: whether there is contact.
-        turned: whether elements compute in floating frames.
+        kind: what the kernels of all nodes are compiled for; with `kind.each`, `gravity` and `scene` are arrays.
         rated: whether elements take steps of their own.
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
     """
@@ -55,21 +53,15 @@ class NodeStage(Actor):
         if (own := nodal_gravity(model)) is not None:  # each node is a scene of its own then
             each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
-        self.touched, fixed = len(work.contact_force) > 0, bool(model.fixed_axes.any())
-        self.turned = work.frame is not None
-        self.each, early = each, rounds >= EARLY_ROUNDS
-        self._choose(solver.precision, (self.touched, fixed, early))
+        turned = work.frame is not None
+        self.kind = Kind(solver.precision, len(work.contact_force) > 0, each, self.rated, turned)
+        self._choose(bool(model.fixed_axes.any()), rounds >= EARLY_ROUNDS)
 
-    def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
-        """The kernels of a `kind`: contact, fixed, early as `node.integrate_kernel` has them."""
-        (contact, fixed, early), own, each = kind, self.constraints, self.each
-        make = rated_node.integrate_kernel if self.rated else partial(node.integrate_kernel, turned=self.turned)
-        self.integrate_kernel = make(precision, contact, fixed, own.bound, each, early)
-        self.bound_kernel = (
-            constraint.bound_kernel(precision, contact, each, own.partial, own.skips, self.rated, self.turned)
-            if own.count
-            else None
-        )
+    def _choose(self, fixed: bool, early: bool) -> None:
+        """The kernels; `fixed` and `early` as `node.integrate_kernel` has them."""
+        own = self.constraints
+        self.integrate_kernel = node.integrate_kernel(self.kind, fixed, own.bound, early)
+        self.bound_kernel = constraint.bound_kernel(self.kind, own.partial, own.skips) if own.count else None
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -80,16 +72,30 @@ class NodeStage(Actor):
         yield Stage("free nodes", lambda s: self.advance_free(s, when.level, when.chain))
 
     def advance_free(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
-        """Free nodes, those up to a `level` of `Model.rates` or all; of one `chain` or all.
-
-        Where the step records, `work.v_before` takes the velocities before it.
-        """
-        before = self.work.v_before if step.records else None
-        self.integrate(step.state, self.base, self.base, self.constraints.role, step.split, before, level, chain)
+        """Free nodes, those up to a `level` of `Model.rates` or all; of one `chain` or all."""
+        self.integrate(step.state, self.base, self.base, self.constraints.role, step.split, step.records, level, chain)
 
     def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
         """`first_slots` and `more_slots` of elements up to a level, or of all."""
         return self.work.first_slots, self.work.more_slots
+
+    def given(self, state: State, level: int | None = None, role: wp.array | None = None) -> list[Any]:
+        """What kernels that move nodes read, with forces of elements up to a level, or of all; `role` by default that
+        of the model's constraints."""
+        work, found = self.work, NodeData()
+        found.mass, found.inverse_mass, found.frames = work.mass, work.inverse_mass, work.frames(state)
+        found.first_slots, found.more_slots = self.slots(level)
+        found.role = self.constraints.role if role is None else role
+        return [found, work.force]
+
+    def moved(self, state: State, records: bool = False) -> Any:
+        """What they write; where the step records, `Workspace.v_before` takes the velocities before it."""
+        found = NodeState()
+        found.nodal_force, found.u, found.v = self.work.contact_force, state.u, state.v
+        found.speed_square = state.speed_square
+        if records:
+            found.v_before = self.work.v_before
+        return found
 
     def at_record(self, state: State) -> tuple[wp.array, wp.array, float]:
         """After the step that recorded: displacements [m], velocities before these [m/s], and the time [s] by which the
@@ -98,11 +104,9 @@ class NodeStage(Actor):
 
     def advance_bound(self, step: Step, level: int | None = None) -> None:
         """Nodes in joints and driven ones, with forces of elements up to a level, or of all."""
-        work, state, own = self.work, step.state, step.state.constraints
-        inputs = [work.mass, work.inverse_mass, *self.slots(level), self.constraints.role, work.force]
-        inputs += [work.frames(state), self.scene, self.gravity, self.constraints.bonds, self.dt]
-        outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
-        outputs += [own.impulse, own.work, own.work_after, own.clock]
+        state, own = step.state, step.state.constraints
+        inputs = [*self.given(state, level), self.scene, self.gravity, self.constraints.bonds, self.dt]
+        outputs = [self.moved(state, step.records), own.impulse, own.work, own.work_after, own.clock]
         wp.launch(self.bound_kernel, self.constraints.count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def slide(self, step: Step) -> None:
@@ -119,23 +123,23 @@ class NodeStage(Actor):
         drift: float,
         role: wp.array,
         split: Split = whole,
-        before: wp.array | None = None,
+        records: bool = False,
         level: int | None = None,
         chain: int | None = None,
     ) -> None:
-        """v += kick a, u += drift v of nodes whose `role` leaves them free; `before` takes the old velocities."""
-        work, squares = self.work, state.speed_square
+        """v += kick a, u += drift v of nodes whose `role` leaves them free; a step that `records` keeps the old v."""
+        inputs = [None, *self.given(state, None, role), self.scene, self.gravity, kick, drift]
+        self._integrate(self.integrate_kernel, self.node_count, inputs, state, split, records, self.kind.pushed)
+
+    def _integrate(
+        self, kernel: Any, count: int, inputs: list[Any], state: State, split: Split, records: bool, pressed: bool
+    ) -> None:
+        """Launch a kernel for ranges of nodes; where these are `pressed`, it also keeps the greatest normal force."""
+        moved = self.moved(state, records)
 
         def launch(part: slice) -> None:
-            scene = 0 if isinstance(self.scene, int) else self.scene[part]
-            contact_force = work.contact_force[part] if self.touched else work.contact_force
-            inputs = [work.inverse_mass[part], work.first_slots[part], work.more_slots]
-            inputs += [role[part] if len(role) else role, work.force, work.frames(state, part)]
-            inputs += [scene, self.gravity, kick, drift]
-            outputs = [contact_force, state.u[part], state.v[part], None if before is None else before[part]]
-            keepers = node.KEEPERS if self.touched and part.start == 0 else 0
-            outputs += [squares[part] if len(squares) > 1 else squares, state.normal_force if keepers else None]
-            threads = part.stop - part.start + keepers
-            wp.launch(self.integrate_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
+            keepers = node.KEEPERS if pressed and part.start == 0 else 0
+            outputs, threads = [moved, state.normal_force if keepers else None], part.stop - part.start + keepers
+            wp.launch(kernel, threads, inputs=[part.start, part.stop, *inputs], outputs=outputs, block_dim=BLOCK_DIM)
 
-        split(self.node_count, launch, NODES)
+        split(count, launch, NODES)

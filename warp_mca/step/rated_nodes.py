@@ -11,12 +11,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.kernels.nodes import node, rated_node
+from warp_mca.kernels.nodes import node
+from warp_mca.kernels.nodes.gather import LEVEL_BIT
 from warp_mca.physics.actor import When
-from warp_mca.physics.elements.stage import BLOCK_DIM, list_slots
+from warp_mca.physics.elements.stage import list_slots
 from warp_mca.step.node_stage import NodeStage
 from warp_mca.step.stage import Stage
-from warp_mca.step.threads import NODES, Split, whole
+from warp_mca.step.threads import Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.model.rates import Rates
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Active:
-    """What a substep advances: `rated_node.integrate_kernel` says what the arrays hold."""
+    """What a substep advances: `node.integrate_kernel` and `NodeData` say what the arrays hold."""
 
     item: wp.array
     first_slots: wp.array
@@ -58,12 +59,10 @@ class RatedNodeStage(NodeStage):
         self.chains = [self._items(np.flatnonzero(self.rates.node_level == k)) for k in range(self.rates.top + 1)]
         self.v_record = wp.zeros(model.node_count, dtype=wp.vec3d)
 
-    def _choose(self, precision: str, kind: tuple[bool, bool, bool]) -> None:
+    def _choose(self, fixed: bool, early: bool) -> None:
         """As `NodeStage._choose`, and the kernel of chains beside that of the fastest nodes."""
-        super()._choose(precision, kind)
-        contact, fixed, early = kind
-        beside = rated_node.integrate_kernel(precision, contact, fixed, self.constraints.bound, self.each, early, True)
-        self.beside_kernel = beside
+        super()._choose(fixed, early)
+        self.beside_kernel = node.integrate_kernel(self.kind, fixed, self.constraints.bound, early, True)
 
     def kernels(self) -> list[Any]:
         """As `NodeStage.kernels`."""
@@ -72,18 +71,18 @@ class RatedNodeStage(NodeStage):
     def _items(self, nodes: NDArray[np.intp]) -> wp.array:
         """Nodes with their levels, as the kernel takes them."""
         level = self.rates.node_level[nodes].astype(np.int32)
-        return wp.array(nodes.astype(np.int32) + (level << node.LEVEL_BIT), dtype=wp.int32)
+        return wp.array(nodes.astype(np.int32) + (level << LEVEL_BIT), dtype=wp.int32)
 
     def _lists(self, elements: Sequence[ElementStage]) -> list[_Active]:
         """Nodes and slots of each level."""
         node_level = self.rates.node_level.astype(np.int32)
         node_of = np.concatenate([np.zeros(0, np.int32), *(stage.slot_node for stage in elements)])
         level = np.concatenate([np.zeros(0, np.int32), *(stage.slot_level for stage in elements)])
-        if max(len(node_of), len(node_level)) >= 1 << node.LEVEL_BIT:
-            remedy = f"steps of their own reach up to {(1 << node.LEVEL_BIT) - 1:,}; leave multi_rate out"
+        if max(len(node_of), len(node_level)) >= 1 << LEVEL_BIT:
+            remedy = f"steps of their own reach up to {(1 << LEVEL_BIT) - 1:,}; leave multi_rate out"
             raise bad_value("number of forces on nodes", len(node_of), remedy)
         entry = np.arange(len(node_of), dtype=np.int32)
-        entry += (level - node_level[node_of]) << node.LEVEL_BIT
+        entry += (level - node_level[node_of]) << LEVEL_BIT
         found = []
         for k in range(self.rates.top + 1):
             slots = level <= k
@@ -99,7 +98,7 @@ class RatedNodeStage(NodeStage):
         drift: float,
         role: wp.array,
         split: Split = whole,
-        before: wp.array | None = None,
+        records: bool = False,
         level: int | None = None,
         chain: int | None = None,
     ) -> None:
@@ -107,22 +106,13 @@ class RatedNodeStage(NodeStage):
 
         kick and drift are those of level 0.
         """
-        work, squares = self.work, state.speed_square
         level = self.rates.top if level is None else level
-        active, common = self.active[level], self.rates.common
-        items = active.item if chain is None else self.chains[chain]
-        pressed = self.touched and (level >= common if chain is None else chain == common)
+        common = self.rates.common
+        items = self.active[level].item if chain is None else self.chains[chain]
+        pressed = self.kind.pushed and (level >= common if chain is None else chain == common)
         kernel = self.beside_kernel if chain else self.integrate_kernel
-
-        def launch(part: slice) -> None:
-            item, keepers = items[part], node.KEEPERS if pressed and part.start == 0 else 0
-            inputs = [item, work.inverse_mass, active.first_slots, active.more_slots, role, work.force]
-            inputs += [self.scene, self.gravity, kick, drift]
-            outputs = [work.contact_force, state.u, state.v, before, squares, state.normal_force if keepers else None]
-            threads = part.stop - part.start + keepers
-            wp.launch(kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
-
-        split(len(items), launch, NODES)
+        inputs = [items, *self.given(state, level, role), self.scene, self.gravity, kick, drift]
+        self._integrate(kernel, len(items), inputs, state, split, records, pressed)
 
     def slots(self, level: int | None) -> tuple[wp.array, wp.array]:
         """As `NodeStage.slots`."""

@@ -112,7 +112,7 @@ class Resident:
         self.kernel = resident_kernel(
             solver.precision,
             block.law,
-            solver.nodes.turned,
+            solver.nodes.kind.turned,
             contact is not None,
             friction,
             stress_free,

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
-from warp_mca.kernels.nodes.node import LEVEL_BIT
+from warp_mca.kernels.nodes.gather import LEVEL_BIT
 from warp_mca.kernels.records.absorbing import sum_absorbed
 from warp_mca.kernels.records.columns import absorbing_column
 from warp_mca.physics.actor import Actor, When
@@ -72,9 +72,7 @@ class AbsorbingStage(Actor):
         self.dashpots.stiffness = wp.array(stiffness, dtype=wp.mat33d)
         self.dashpots.share = wp.array(np.linalg.inv(np.eye(3) + decay), dtype=wp.mat33d)
         self.dashpots.velocity = wp.array(own.velocity, dtype=wp.vec3d)
-        self.kernel = absorbing_kernel(
-            solver.precision, nodes.touched, own.sprung, nodes.each, nodes.rated, nodes.turned
-        )
+        self.kernel = absorbing_kernel(nodes.kind, own.sprung)
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
         self.column = absorbing_column(len(model.passes) // layout.count)
@@ -115,10 +113,9 @@ class AbsorbingStage(Actor):
 
     def _advance(self, step: Step, item: wp.array, level: int | None) -> None:
         """Some of its nodes, with forces of elements up to a level, or of all."""
-        work, state, own = self.nodes.work, step.state, step.state.absorbing
-        inputs = [item, self.dashpots, work.inverse_mass, *self.nodes.slots(level), self.nodes.constraints.role]
-        inputs += [work.force, work.frames(state), self.nodes.scene, self.nodes.gravity, self.nodes.base]
-        outputs = [work.contact_force, state.u, state.v, work.v_before if step.records else None, state.speed_square]
+        nodes, own = self.nodes, step.state.absorbing
+        inputs = [item, self.dashpots, *nodes.given(step.state, level), nodes.scene, nodes.gravity, nodes.base]
+        outputs = [nodes.moved(step.state, step.records)]
         outputs += [own.impulse, own.impulse_after, own.absorbed, own.absorbed_after, own.stretch]
         wp.launch(self.kernel, len(item), inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 

@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.nodes.constraint import Bonds
-from warp_mca.kernels.nodes.node import BOUND, TOUCHABLE
+from warp_mca.kernels.nodes.gather import BOUND, TOUCHABLE
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.rigid.bodies import rigid_nodes
 from warp_mca.step.stage import BESIDE, Stage
@@ -38,7 +38,7 @@ class ConstraintState:
 
 
 class ConstraintStage(Actor):
-    """What `kernels.nodes.node` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
+    """What `kernels.nodes.gather` and `kernels.nodes.constraint` read to advance bound nodes, and what they count.
 
     Attributes:
         count: tied pairs and driven nodes; 0 where all pairs hold nodes of rigid bodies.

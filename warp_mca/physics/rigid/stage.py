@@ -75,7 +75,7 @@ class RigidStage(Actor):
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
-        self.kernel = rigid_body.advance_kernel(solver.precision, nodes.touched, nodes.rated, nodes.turned)
+        self.kernel = rigid_body.advance_kernel(nodes.kind)
         self.own = own = model.rigid_bodies
         self._make_bodies(model, own)
         self._make_rows(own, model.rigid_rows)
@@ -181,7 +181,7 @@ class RigidStage(Actor):
         state.rigid.momentum.assign(np.array([momentum for _, _, momentum, _ in poses]))
         state.rigid.spin.assign(np.array([spin for _, _, _, spin in poses]))
         self._advance(state, -0.5 * self.dt, -self.dt, False)
-        self._follow(state, whole, None)
+        self._follow(state, whole)
 
     def advance(self, when: When) -> Iterable[Stage]:
         """Rigid bodies and their nodes."""
@@ -189,28 +189,25 @@ class RigidStage(Actor):
             yield Stage("rigid bodies", lambda s: self._step(s, when.level), BESIDE)
 
     def _step(self, step: Step, level: int | None) -> None:
-        """All rigid bodies and their nodes, with forces of elements up to a level, or of all.
-
-        Where the step records, `work.v_before` takes the velocities before it.
-        """
+        """All rigid bodies and their nodes, with forces of elements up to a level, or of all."""
         self._advance(step.state, self.dt, self.dt, True, level)
-        self._follow(step.state, step.split, self.work.v_before if step.records else None)
+        self._follow(step.state, step.split, step.records)
 
     def _advance(self, state: State, kick: float, span: float, moves: bool, level: int | None = None) -> None:
-        work, own = self.work, state.rigid
-        inputs = [self.bodies, self.rows, self.clusters, work.X, work.mass]
-        inputs += [*self.nodes.slots(level), work.force, work.frames(state), kick, span, moves]
-        outputs = [work.contact_force, state.u, state.v, state.speed_square]
-        outputs += [own.centre, own.rotation, own.momentum, own.spin, own.orientation, state.constraints.impulse]
+        own = state.rigid
+        inputs = [self.bodies, self.rows, self.clusters, self.work.X]
+        inputs += [*self.nodes.given(state, level), kick, span, moves]
+        outputs = [self.nodes.moved(state), own.centre, own.rotation, own.momentum, own.spin, own.orientation]
+        outputs.append(state.constraints.impulse)
         threads = (self.groups, self.lanes)
         wp.launch(self.kernel, threads, inputs=inputs, outputs=[*outputs, *self.found], block_dim=BLOCK)
 
-    def _follow(self, state: State, split: Split, before: wp.array | None) -> None:
+    def _follow(self, state: State, split: Split, records: bool = False) -> None:
         _, _, velocity, rate, turned, *_ = self.found
 
         def launch(part: slice) -> None:
             inputs = [self.node[part], self.body[part], self.arm[part], state.rigid.centre, velocity, rate, turned]
-            outputs = [state.u, state.v, before, state.speed_square]
+            outputs = [self.nodes.moved(state, records)]
             wp.launch(rigid_body.follow, part.stop - part.start, inputs=inputs, outputs=outputs)
 
         split(len(self.node), launch, NODES)

@@ -33,9 +33,8 @@ class TieStage(Actor):
         if not self.count:
             return
         ties, self.lanes = model.ties, tied.LANES if wp.get_device().is_cuda else 1
-        kind = (nodes.touched, nodes.each, nodes.rated, self.lanes, nodes.turned)
-        self.masters_kernel = tied.masters_kernel(solver.precision, *kind)
-        self.follow_kernel = tied.follow_kernel(nodes.touched)
+        self.masters_kernel = tied.masters_kernel(nodes.kind, self.lanes)
+        self.follow_kernel = tied.follow_kernel(nodes.kind.pushed)
         entry, corner = np.nonzero(ties.weight)
         master = ties.master[entry, corner]
         order = np.argsort(master, kind="stable")
@@ -66,17 +65,12 @@ class TieStage(Actor):
 
     def _advance(self, step: Step, level: int | None) -> None:
         """Masters, with the forces on their slaves of elements up to a level, or of all."""
-        nodes, work, state = self.nodes, self.nodes.work, step.state
-        inputs = [work.inverse_mass, *nodes.slots(level), nodes.constraints.role, work.force]
-        inputs += [work.frames(state), nodes.scene, nodes.gravity, self.tied, nodes.dt]
-        before = work.v_before if step.records else None
-        outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
-        threads = self.lanes * len(self.tied.master)
+        nodes, threads = self.nodes, self.lanes * len(self.tied.master)
+        inputs = [*nodes.given(step.state, level), nodes.scene, nodes.gravity, self.tied, nodes.dt]
+        outputs = [nodes.moved(step.state, step.records)]
         wp.launch(self.masters_kernel, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
     def _follow(self, step: Step) -> None:
         """Slaves, once their masters have moved."""
-        work, state = self.nodes.work, step.state
-        before = work.v_before if step.records else None
-        outputs = [work.contact_force, state.u, state.v, before, state.speed_square]
+        outputs = [self.nodes.moved(step.state, step.records)]
         wp.launch(self.follow_kernel, self.count, inputs=[self.tied], outputs=outputs, block_dim=BLOCK_DIM)
