@@ -164,7 +164,7 @@ def test_what_is_not_registered_is_refused():
     class Softer(Voce):
         pass
 
-    with pytest.raises(RequestError, match=r"give an Elastic or a J2Bilinear or a Voce, or one .* listed in MATERIALS"):
+    with pytest.raises(RequestError, match=r"give an Elastic or a J2Bilinear or a Voce, or .* by warp_mca.register"):
         bars(own=Softer(**vars(VOCE)))
 
 
@@ -175,8 +175,11 @@ def test_a_law_that_is_none_is_refused(law: str, words: str, monkeypatch: pytest
         mca.run(bars(own=VOCE))
 
 
-def test_a_model_file_holds_no_material_of_the_users_own(tmp_path):
+def test_a_model_file_holds_the_material_while_it_is_registered(tmp_path):
     scene = bars(own=VOCE)
+    scene_file.save(tmp_path / "bars.mca", scene, mca.mesh(scene))
+    assert scene_file.load(tmp_path / "bars.mca").scene.bodies[-1].material == VOCE
+    del MATERIALS["Voce"]
     with pytest.raises(RequestError, match="scene = 'Voce': a model file holds warp_mca's own classes"):
-        scene_file.save(tmp_path / "bars.mca", scene, mca.mesh(scene))
-    assert not list(tmp_path.iterdir())
+        scene_file.save(tmp_path / "other.mca", scene, mca.mesh(scene))
+    assert not (tmp_path / "other.mca").exists()

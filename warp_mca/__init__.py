@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
     from warp_mca.phases.quality import quality_table
     from warp_mca.phases.simulation import mesh, run
+    from warp_mca.registration import register
     from warp_mca.results.cfc import cfc_filter
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
@@ -70,6 +71,7 @@ _LAZY = {
     "Param": "warp_mca.scene.parameters",
     "Accuracy": "warp_mca.accuracy.request",
     "make_scene": "warp_mca.scene.catalogue",
+    "register": "warp_mca.registration",
     "Result": "warp_mca.results.result",
     "cfc_filter": "warp_mca.results.cfc",
     "load": "warp_mca.results.storage",
@@ -127,6 +129,7 @@ __all__ = [
     "make_scene",
     "mesh",
     "quality_table",
+    "register",
     "run",
     "run_batch",
     "sweep",

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
 from warp_mca.scene import catalogue
+from warp_mca.scene.elements import ELEMENTS
 
 ASKED = "_ARGCOMPLETE"  # in the environment when a shell asks
 
@@ -28,6 +29,8 @@ def _add_completers(parser: argparse.ArgumentParser, files: Callable[..., Iterab
     for action in _actions(parser):
         if action.dest == "scene":
             _set(action, lambda prefix, **more: [*catalogue.scene_names(), *files(prefix, **more)])
+        elif action.dest == "element":
+            _set(action, lambda **more: list(ELEMENTS))
         elif action.dest == "preset":
             _set(action, lambda parsed_args, **more: _of_scene(parsed_args, "presets", ""))
         elif action.dest == "settings":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
@@ -143,6 +143,7 @@ def _resume(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="where the scene file is now, if it was moved or lies in DIR"
     )
+    _add_import(parser)
     parser.set_defaults(command=resume.resume, parse=lambda words: make_parser().parse_args(words))
 
 
@@ -206,10 +207,21 @@ def _groups(text: str) -> int | str:
     return int(text) if text.isdigit() else text
 
 
-def _add_element(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
+def _add_element(
+    parser: argparse.ArgumentParser | argparse._ArgumentGroup, choices: Iterable[str] | None = ELEMENTS
+) -> None:
     names = ", ".join(ELEMENTS)
+    parser.add_argument("--element", metavar="NAME", choices=choices, help=f"formulation of every body: {names}")
+
+
+def _add_import(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     parser.add_argument(
-        "--element", metavar="NAME", choices=tuple(ELEMENTS), help=f"formulation of every body: {names}"
+        "--import",
+        dest="imports",
+        action="append",
+        default=[],
+        metavar="MODULE",
+        help="import a module that registers kinds of your own before the scene is read; once for each",
     )
 
 
@@ -227,7 +239,8 @@ def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
         "--refine", type=float, metavar="R", help="cells R times smaller than the recipes say; below 1 larger ones"
     )
     help_text = "change a parameter; once for each"
-    _add_element(group)
+    _add_element(group, choices=None)  # `--import` may bring more
+    _add_import(group)
     group.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
 
 
@@ -242,6 +255,14 @@ def _add_recorders(parser: argparse.ArgumentParser) -> None:
     )
     for option, kind in FILES.items():
         group.add_argument(f"--{option}", metavar="FILE", type=Path, action="append", default=[], help=kind.help)
+    group.add_argument(
+        "--recorder",
+        dest="recorders",
+        action="append",
+        default=[],
+        metavar="MODULE:NAME[,KEY=VALUE…]",
+        help="a recorder of your own, the class NAME of a module here; may be given several times",
+    )
     group.add_argument(
         "--frames",
         type=int,

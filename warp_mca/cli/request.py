@@ -10,8 +10,10 @@ from pathlib import Path
 
 import warp_mca as mca
 from warp_mca.base.errors import bad_value
+from warp_mca.base.outside import import_named
 from warp_mca.cli import part_script
 from warp_mca.scene import Scene, catalogue, model_file
+from warp_mca.scene.elements import ELEMENTS
 from warp_mca.scene.model_file import SUFFIX, Origin
 from warp_mca.scene.options import with_options
 
@@ -47,6 +49,8 @@ def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]
     """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
     if part_script.is_part(args.scene):
         raise part_script.no_scene(args.scene)
+    for name in args.imports:
+        import_named("--import", name)
     if Path(args.scene).suffix != SUFFIX:
         source = catalogue.load_source(args.scene)
         return [_of_source(args, source, more) for more in settings]
@@ -108,6 +112,8 @@ def _with(scene: Scene, args: argparse.Namespace, scale: float | None) -> Scene:
     """The scene with what the options ask for: size of cells, element formulation, time step, mass scaling."""
     scene = with_options(scene, args.refine, getattr(args, "mass_scaling", None), None)
     if (element := args.element) is not None:
+        if element not in ELEMENTS:
+            raise bad_value("--element", element, f"choose among {', '.join(ELEMENTS)}")
         scene = dataclasses.replace(scene, bodies=tuple(dataclasses.replace(b, element=element) for b in scene.bodies))
     if scale is not None:
         scene = dataclasses.replace(scene, impact=dataclasses.replace(scene.impact, time_step_scale=scale))

@@ -1,7 +1,8 @@
 """Owns the command `resume`: a run that was stopped goes on from what its folder holds.
 
 A folder may come from anybody, so that its file decides nothing but a scene and the options below, checked as if they
-were typed: no other command, no file outside of the folder, no scene file but the one that the run was started with.
+were typed: no other command, no file outside of the folder, no scene file but the one that the run was started with, no
+module but those that the user names again by `--import`.
 """
 
 from __future__ import annotations
@@ -9,11 +10,12 @@ from __future__ import annotations
 import argparse
 import hashlib
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.outside import file_of, import_named
 from warp_mca.phases.checkpoint import FILE, stored_command
 from warp_mca.scene.catalogue import SUFFIX as PYTHON
 from warp_mca.scene.catalogue import scene_names
@@ -45,10 +47,17 @@ def command_of(args: argparse.Namespace) -> dict[str, Any]:
     """
     given = {name: getattr(args, "settings" if name == "set" else name) for name in OPTIONS}
     options = {name: value for name, value in given.items() if value not in (None, [])}
+    more = {"options": options, "imports": _imports(args.imports)}
     if not _is_file(args.scene):
-        return {"scene": args.scene, "digest": None, "options": options}
+        return {"scene": args.scene, "digest": None, **more}
     path = Path(args.scene).resolve()
-    return {"scene": str(path), "digest": _digest(path), "options": options}
+    return {"scene": str(path), "digest": _digest(path), **more}
+
+
+def _imports(names: Sequence[str]) -> dict[str, str]:
+    """Digest of the file of each module that the command imports, by its name."""
+    files = {name: file_of(import_named("--import", name)) for name in names}
+    return {name: _digest(file) if file else "" for name, file in files.items()}
 
 
 def resume(args: argparse.Namespace) -> None:
@@ -60,7 +69,7 @@ def resume(args: argparse.Namespace) -> None:
     folder = args.folder.absolute()
     stored = stored_command(args.folder)
     scene = _scene(stored, folder, args.scene)
-    words = _words(stored, folder)
+    words = [*_imported_again(stored, folder, args.imports), *_words(stored, folder)]
     print("going on with:", shlex.join(["warp-mca", "run", scene, *words]), flush=True)
     again = args.parse(["run", scene, *words, f"--out={folder}"])
     again.command(again)
@@ -92,6 +101,25 @@ def _scene(stored: Mapping[str, Any], folder: Path, given: Path | None) -> str:
     if _digest(path) != digest:
         raise bad_value("scene", str(path), "it was changed since the run was started; restore it, or start a new run")
     return str(path)
+
+
+def _imported_again(stored: Mapping[str, Any], folder: Path, given: Sequence[str]) -> list[str]:
+    """The options `--import` of the run, whose modules the user must name again: the folder may name any code.
+
+    Raises:
+        RequestError: the user names others, or one was changed.
+    """
+    modules = stored.get("imports", {})
+    if not (isinstance(modules, dict) and all(isinstance(name, str) for name in modules)):
+        raise _strange(folder, "imports")
+    if set(modules) != set(given):
+        asked = " ".join(f"--import {name}" for name in modules if name.isprintable()) or "no --import"
+        raise bad_value("--import", ",".join(given) or None, f"the run was started with {asked}; give the same")
+    for name, digest in _imports(given).items():
+        if digest != modules[name]:
+            remedy = "the module was changed since the run was started; restore it, or start a new run"
+            raise bad_value("--import", name, remedy)
+    return [f"--import={name}" for name in given]
 
 
 def _words(stored: Mapping[str, Any], folder: Path) -> list[str]:

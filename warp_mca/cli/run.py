@@ -14,6 +14,7 @@ from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.log import LOGGER
 from warp_mca.cli import part_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
+from warp_mca.cli.own_recorder import own_recorder
 from warp_mca.cli.request import read_request
 from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
@@ -87,6 +88,7 @@ def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
     for option, kind in FILES.items():
         more = {**({"cadence": cadence} if kind.frames else {}), **(drawn if kind.pictures else {})}
         found += [kind.make(file, **more) for file in files[option]]
+    found += [own_recorder(text, cadence) for text in args.recorders]
     other = "" if args.field == "von_mises" else f"-{args.field}"
     return found + [
         SnapshotFile(out / f"snapshot-{_time_words(t)}{other}.png", time=t, **drawn) for t in args.snapshots
@@ -103,7 +105,7 @@ def _check_drawing(args: argparse.Namespace) -> None:
 
     kinds = [kind for option, kind in FILES.items() if getattr(args, option)]
     takers = {
-        "frames": args.viewer != "none" or any(kind.frames for kind in kinds),
+        "frames": args.viewer != "none" or bool(args.recorders) or any(kind.frames for kind in kinds),
         "field": bool(args.snapshots) or any(kind.pictures for kind in kinds),
     }
     for option, default in DRAWING.items():

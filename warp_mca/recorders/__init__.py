@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from warp_mca.recorders.recorder import Cadence, Recorder
 
@@ -33,6 +33,9 @@ class Kind(NamedTuple):
         """The recorder; its module is imported only now."""
         return getattr(import_module(self.module), self.name)(*args, **options)
 
+
+# Classes from outside the package, by the name that `--recorder NAME` gives; `warp_mca.register` fills it.
+RECORDERS: dict[str, Any] = {}
 
 # By option of the command line: --rrd FILE, and so on.
 FILES = {

@@ -66,7 +66,7 @@ class Body:
         materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
         if not all(type(material) in MATERIALS.values() for material in materials):  # others have no kernels
             known = " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in MATERIALS)
-            remedy = f"give {known}, or one for each cell set; other classes must be listed in MATERIALS"
+            remedy = f"give {known}, or one for each cell set; register other classes by warp_mca.register"
             raise bad_value(f"Body {self.name}.material", self.material, remedy)
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")

@@ -92,7 +92,7 @@ class Contact:
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
         if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
-            remedy = f"give a {' or a '.join(CONTACT_LAWS)}; other classes must be listed in CONTACT_LAWS"
+            remedy = f"give a {' or a '.join(CONTACT_LAWS)}; register other classes by warp_mca.register"
             raise bad_value("Contact.law", validate.brief(self.law), remedy)
         if isinstance(self.penalty, str):
             if self.penalty != "auto":

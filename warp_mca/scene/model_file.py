@@ -1,7 +1,8 @@
 """Owns the model file (.mca): a scene with the meshes of its bodies, made where gmsh is and run where the GPU is.
 
 It is an npz archive: the entry `header` is JSON, every other entry an array that the header refers to. The scene is
-written as nested objects whose `$type` names a class of `warp_mca.scene` or `warp_mca.geometry`.
+written as nested objects whose `$type` names a class of `warp_mca.scene` or `warp_mca.geometry`, or one from outside
+that was registered; `$module` says where that was defined, and nothing is imported because a file says so.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ from numpy.typing import NDArray
 
 import warp_mca.geometry
 import warp_mca.scene
-import warp_mca.scene.materials
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.files import check_folder, write_atomically
 from warp_mca.base.validate import DAMAGE
 from warp_mca.geometry import Mesh
 from warp_mca.scene import Scene
 from warp_mca.scene.catalogue import load_source
+from warp_mca.scene.contact_laws import CONTACT_LAWS
+from warp_mca.scene.joints import JOINTS
+from warp_mca.scene.materials import MATERIALS
 
 SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
@@ -195,9 +198,23 @@ def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel
 
 
 def _vocabulary() -> dict[str, type]:
-    """The classes that a file may name: the dataclasses of scenes, materials and geometry recipes."""
-    members = {**vars(warp_mca.geometry), **vars(warp_mca.scene.materials), **vars(warp_mca.scene)}
+    """The classes that a file may name: the dataclasses of scenes and geometry recipes, and what was registered."""
+    members = {**vars(warp_mca.geometry), **vars(warp_mca.scene), **MATERIALS, **CONTACT_LAWS, **JOINTS}
     return {name: item for name, item in members.items() if isinstance(item, type) and dataclasses.is_dataclass(item)}
+
+
+def _named(kind: str, module: str | None) -> type:
+    """The class of that name; `module` is where it was registered, of one from outside the package.
+
+    Raises:
+        RequestError: it is from outside, and is not registered.
+        KeyError: there is none.
+    """
+    known = _vocabulary()
+    if kind not in known and module is not None:
+        remedy = f"it is registered by the module {module}; import that first, as by --import {module}"
+        raise bad_value("model file", kind, remedy)
+    return known[kind]
 
 
 def _record(parameters: Mapping[str, object]) -> dict[str, object]:
@@ -209,9 +226,12 @@ def _encoded(value: object, arrays: list[NDArray]) -> object:
     """`value` as JSON; arrays are put into `arrays`, the same one once, and referred to by their place there."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         if type(value) not in _vocabulary().values():
-            raise bad_value("scene", type(value).__name__, "a model file holds warp_mca's own classes; use these")
+            remedy = "a model file holds warp_mca's own classes and what warp_mca.register was given; use these"
+            raise bad_value("scene", type(value).__name__, remedy)
         members = {f.name: _encoded(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
-        return {"$type": type(value).__name__, **members}
+        module = type(value).__module__
+        outside = {} if module.startswith("warp_mca.") else {"$module": module}
+        return {"$type": type(value).__name__, **outside, **members}
     if isinstance(value, np.ndarray):
         place = next((i for i, array in enumerate(arrays) if array is value), len(arrays))
         if place == len(arrays):
@@ -234,8 +254,8 @@ def _decoded(value: object, arrays: Mapping[str, NDArray]) -> Any:
         return value
     if "$array" in value:
         return arrays[f"array{value['$array']}"]
-    members = {key: _decoded(item, arrays) for key, item in value.items() if key != "$type"}
-    return _vocabulary()[value["$type"]](**members) if "$type" in value else members
+    members = {key: _decoded(item, arrays) for key, item in value.items() if key not in ("$type", "$module")}
+    return _named(value["$type"], value.get("$module"))(**members) if "$type" in value else members
 
 
 def _same(one: object, other: object) -> bool:

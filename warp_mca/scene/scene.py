@@ -88,7 +88,7 @@ class Scene:
         validate.kind_of("Scene.joints", self.joints, (tuple, list), "give a tuple of joints")
         for k, joint in enumerate(self.joints):
             if type(joint) not in JOINTS.values():  # others are not registered
-                remedy = f"give a {' or a '.join(JOINTS)}; other classes must be listed in JOINTS"
+                remedy = f"give a {' or a '.join(JOINTS)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.joints[{k}]", validate.brief(joint), remedy)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)

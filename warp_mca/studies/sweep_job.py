@@ -17,6 +17,7 @@ import numpy as np
 
 from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.log import LOGGER
+from warp_mca.base.outside import import_named, imported
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.simulation import run
 from warp_mca.results.result import Result
@@ -61,12 +62,17 @@ class Job:
         return replace(self, options=replace(self.options, device=device))
 
     def __reduce__(self) -> tuple[Callable[..., Job], tuple[object, ...]]:
-        """Scenes travel as bytes, which can be read once the scene files with their classes have been."""
+        """Scenes travel as bytes, read once the modules and the scene files with their classes have been."""
         scenes = pickle.dumps(self.scenes)
-        return _received, (catalogue.files_of(scenes), self.numbers, scenes, self.folders, self.options, self.model)
+        needed = imported(), catalogue.files_of(scenes)
+        return _received, (*needed, self.numbers, scenes, self.folders, self.options, self.model)
 
 
-def _received(files: Iterable[Path], numbers: tuple[int, ...], scenes: bytes, *rest: Any) -> Job:
+def _received(
+    modules: Mapping[str, str], files: Iterable[Path], numbers: tuple[int, ...], scenes: bytes, *rest: Any
+) -> Job:
+    for name, folder in modules.items():
+        import_named("--import", name, folder)
     for file in files:
         catalogue.load_source(file)
     return Job(numbers, pickle.loads(scenes), *rest)
