@@ -13,7 +13,7 @@ class ElementState:
 
     Attributes:
         yielded: not 0 where an element has yielded [-], shape (element_count,), int32; empty where elastic.
-        history: history that the law keeps at each integration point, as `kernels.materials.laws.Law.history` says,
+        history: history that the law keeps at each integration point [-], as `kernels.materials.laws.Law.history` says,
             point by point, then what the element keeps besides, shape (row_count, element_count), float32 or float64;
             empty where elastic.
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on,
