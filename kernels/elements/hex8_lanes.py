@@ -1,6 +1,6 @@
-"""Owns how four lanes of a GPU compute an element of `hex8` that yields, two Gauss points apiece.
+"""Owns how four lanes of a GPU compute an element of `hex8` that yields, two Gauss points each.
 
-They exchange what the points of an element share.
+They exchange the values that the points of an element share.
 """
 
 from functools import cache
@@ -28,9 +28,9 @@ HISTORY_SIZE = row_count(FLOW_HISTORY)
 def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
     """Functions over the four lanes of an element, whose bits 0 and 1 are xi and eta of corners and Gauss points.
 
-    A lane has the lower and the upper of both. (Corner values -> edge vectors on the Gauss lines through the lane's
-    points, as `line_functions` has them, along zeta one for both; edge forces at the points -> corner forces, the
-    transpose; sum and greatest of a scalar.)
+    A lane has the lower and the upper of both. The functions take corner values to edge vectors on the Gauss lines
+    through the lane's points (see `line_functions`; along zeta both points share one), edge forces at the points to
+    corner forces by the transpose, and a scalar to its sum and its maximum over the lanes.
     """
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
@@ -49,7 +49,7 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
         y1 = other(upper, 2)
         z0 = other(x0, 2)  # across both
         z1 = other(x1, 2)
-        # first the differences of corners, which lose nothing to rounding, then their means
+        # differences of corners first, which are exact, then their means
         a0 = xi * ((lower - x0) + r * (y0 - z0))
         a1 = xi * ((upper - x1) + r * (y1 - z1))
         b0 = eta * ((lower - y0) + r * (x0 - z0))
@@ -65,7 +65,7 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
         y0 = eta * (Fy0 + r * other(Fy0, 1))
         y1 = eta * (Fy1 + r * other(Fy1, 1))
         z = Fz + r * other(Fz, 1)
-        # each lane sends what its partner, on the other side, adds
+        # each lane sends what its partner on the other side adds
         s0 = (x0 - y0) + other(r * x0 + y0, 2)
         s1 = (x1 - y1) + other(r * x1 + y1, 2)
         z = z + r * other(z, 2)
@@ -88,9 +88,9 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
     """Functions of one Gauss point.
 
-    (Edge vectors of position and of local displacement -> cofactors, determinant, six sums of products; deviatoric
-    stress and plastic strain of a point, and J2 of the stress that it would have without; the history of two points;
-    forces of the edges.)
+    They take edge vectors of position and local displacement to cofactors, determinant and six sums of products; give
+    the deviatoric stress and plastic strain of a point, and J2 of its stress without plastic flow; read the history of
+    two points; and give the forces of the edges.
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -152,9 +152,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
     """The functions (list the element of a thread; compute the listed elements of a patch; compute one of a patch).
 
-    Four lanes compute each.
-
-    A list has its length first, shape (PATCH + 1,).
+    Four lanes compute an element. A list of shape (PATCH + 1,) begins with its length.
     """
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
@@ -184,7 +182,7 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Four lanes, q = 0 to 3, compute the element of a thread, whose rotation W stands where its forces will.
+        """Four lanes, q = 0 to 3, compute the element of a thread; its rotation W is stored in the place of its forces.
 
         Returns whether a lane's points flow.
         """
@@ -231,7 +229,7 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
 
     @wp.func
     def list_element(W: mat33, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
-        """List the element of a thread, and keep its rotation where its forces will be."""
+        """List the element of a thread, and store its rotation in the place of its forces."""
         listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
         for i in range(9):
             force_out[i * wp.static(ROW) + thread] = W[i // 3, i % 3]

@@ -22,10 +22,10 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
-    """Functions of symmetric tensors.
+    """Four functions of symmetric tensors.
 
-    (S b + c; six sums of products l b, as strains xx, yy, zz, xy, yz, xz; the deviatoric stress of strains, whose shear
-    components are doubled; the invariant J2 = S : S / 2 of a traceless S, which needs no zz.)
+    They give S b + c; six sums of products l b, as strains xx, yy, zz, xy, yz, xz; the deviatoric stress of strains,
+    whose shear components are doubled; and the invariant J2 = S : S / 2 of a traceless S, which needs no zz.
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -73,8 +73,8 @@ def small_strain_function(precision: str, law_name: str) -> Any:
     """The function that gives the corner forces of an element, and the greatest S : S / 2 of a point.
 
     It takes corners, local displacements and frame W; the material m and its K and G; where there is a law, the history
-    of element e. Jacobians lack LINE_SCALE^3, which strains do not feel and forces take from the moduli: K, G and
-    stresses are those of the material times that.
+    of element e. Jacobians lack the factor LINE_SCALE^3. Strains do not depend on it, and K, G and stresses are those
+    of the material times this factor, so that forces are right.
     """
     t = scalars(precision)
     R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83

@@ -33,9 +33,9 @@ __all__ = ["KEPT", "element_functions", "energy_kernel", "force_kernel", "stress
 def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
     """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
 
-    The first also gives the ratio of volumes J, the second keeps the greatest strain.
+    The first also gives the volume ratio J, the second keeps the greatest strain.
 
-    A larger one, or a matrix that changes within a branch, keeps a CPU from computing elements side by side.
+    A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
     """
     t = scalars(precision)
     R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
@@ -103,7 +103,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         if wp.static(plastic):
             if kept < R(1.0):
                 row = wp.static(lost)
-                # relaxed force times plastic amplitude, as for the mean stress: the balance of energy asks for it
+                # the balance of energy asks for relaxed force times plastic amplitude, as for the mean stress
                 history_out[row, e] = history_out[row, e] + R(2.0) * kept * (R(1.0) - kept) * stored
             Q = kept * Q
         return P, Q
@@ -111,7 +111,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     @wp.func
     def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
         share = R(-1.0) / volume
-        for n in range(4):  # amplitudes feel the mean gradient too
+        for n in range(4):  # amplitudes depend on the mean gradient, too
             P = P + wp.outer(Q[n], share * x[3 + n])
         P = -R(VOLUME_SCALE) * add_matrices(P, W, P)
         f = mat73()
@@ -137,7 +137,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     store_force = store_function(precision)
     _, keep_volume, _ = keep_functions(R)
 
-    # ln(1 + x) of small x needs the rounding that fast math gives away
+    # fast math would lose the digits of ln(1 + x) of small x
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
     def hex8r_force(
         X: wp.array(dtype=wp.vec3d),

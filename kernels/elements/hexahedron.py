@@ -142,15 +142,15 @@ def lines_of_point(g: int):
 
 @wp.func
 def history_place(g: int):
-    """Place of Gauss point g in the history: g and g + 4 side by side, for a lane of `kernels.elements.hex8_patch`."""
+    """Place of Gauss point g in the history: g and g + 4 are neighbours, for lanes of `hex8_patch`."""
     return 2 * (g & 3) + (g >> 2)
 
 
 @cache
 def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
-    """Functions that take an element to its rotated frame.
+    """Two functions that take an element to its rotated frame.
 
-    (Its rotation as W = Q - I and the ratio of volumes J at its centre; local displacements.)
+    They give its rotation W = Q - I with the volume ratio J at its centre, and its local displacements.
     """
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
@@ -180,7 +180,7 @@ def frame_functions(precision: str, finite: bool = False) -> tuple[Any, Any]:
     def local_displacement(X: mat83, u: mat83, W: mat33):
         local = mat83()
         for a in range(1, 8):  # the first node is the origin of both
-            local[a] = add_transposed(u[a], W, X[a] + u[a])  # Q^T (X + u) - X, without the digits that would cancel
+            local[a] = add_transposed(u[a], W, X[a] + u[a])  # Q^T (X + u) - X, without cancellation
         return local
 
     return element_rotation, local_displacement
@@ -233,7 +233,7 @@ def node_force_function(precision: str) -> Any:
 def store_function(precision: str) -> Any:
     """The function (force_out, n, f, a) that stores the force on corner a in entry n.
 
-    Component by component: as a whole, a vector of three would keep the CPU from computing elements side by side.
+    It stores components one by one: storing a whole vector would prevent vectorisation on a CPU.
     """
     t = scalars(precision)
     vec3, mat83 = t.vec3, t.mat83

@@ -28,7 +28,7 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
 
     @wp.func
     def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
-        """What the mean displacement gradient H leaves of the sums over patterns, one row for each, in frame W.
+        """Sums over the patterns less the part of the mean displacement gradient H, one row for each, in frame W.
 
         Eight times the amplitudes of docs/theory.md; forces are conjugate to these.
         """
@@ -60,7 +60,7 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
         for k in range(3):  # strains that vary along edge k, in the plane of the two others
             i = (k + 1) % 3
             j = (k + 2) % 3
-            # pattern number m varies along the two edges other than m
+            # pattern m varies along the two edges other than edge m
             ei = wp.dot(q[j], y[i])
             ej = wp.dot(q[i], y[j])
             ij = length[i] * inverse[j]

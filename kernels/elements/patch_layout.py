@@ -1,9 +1,9 @@
 """Owns the size of a patch, the elements of one block of threads, and how words of its corners are packed."""
 
 PATCH = 128  # elements of a patch, and threads of its block
-SLOTS = {"mixed": 384, "float64": 304}  # that a patch may have, as far as shared memory holds them
-NOWHERE = PATCH  # behind the forces of all elements on their corners of one number, where shared memory holds a zero
-# A word of an element's corners holds a slot from its first bit on, another up to its last, in the first two words half
-# of the material's number between them.
+SLOTS = {"mixed": 384, "float64": 304}  # slots of a patch at most, as shared memory allows
+NOWHERE = PATCH  # the entry behind the forces of all elements at one corner, which is a zero in shared memory
+# A word holds the slots of two corners, in its lowest and its highest bits; between them, the first two words hold one
+# half each of the material's number.
 SLOT_BITS, MATERIAL_BITS = 9, 14
 SECOND_SLOT = SLOT_BITS + MATERIAL_BITS

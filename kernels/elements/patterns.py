@@ -142,6 +142,6 @@ def mean_frame(precision: str, finite: bool = False) -> Any:
     def rotated(H: mat33):
         F = wp.identity(n=3, dtype=R) + H
         W = polar_rotation(F)
-        return W, add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without the digits that would cancel
+        return W, add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without cancellation
 
     return rotated

@@ -1,8 +1,8 @@
 """Owns the 4-node tetrahedron with averaged nodal pressure.
 
-The volume change is averaged over the elements of one material around each node, so that neither nearly
-incompressible elasticity nor plastic flow locks: Bonet and Burton, Commun. Numer. Meth. Engng 14 (1998) 437. Three
-kernels follow each other: volume changes of elements, their means at nodes, forces.
+The volume change is averaged over the elements of one material around each node, so that neither nearly incompressible
+elasticity nor plastic flow locks: Bonet and Burton, Commun. Numer. Meth. Engng 14 (1998) 437. Three kernels run in
+turn: volume changes of elements, their means at nodes, forces.
 """
 
 from functools import cache, partial
@@ -118,7 +118,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     k = kinematics(precision, finite)
     deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
 
-    # ln(1 + x) of small x needs the rounding that fast math gives away
+    # fast math would lose the digits of ln(1 + x) of small x
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
     def tet4_force(
         X: wp.array(dtype=wp.vec3d),
@@ -158,7 +158,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         f0 = P * c[0]
         f1 = P * c[1]
         f2 = P * c[2]
-        for i in range(3):  # by components, as in `hexahedron.store_function`
+        for i in range(3):  # by components, see `hexahedron.store_function`
             force_out[slot + e][i] = -f0[i] - f1[i] - f2[i]
             force_out[slot + count + e][i] = f0[i]
             force_out[slot + 2 * count + e][i] = f1[i]

@@ -47,7 +47,7 @@ def return_map(precision: str) -> Any:
         radius = sigma_y + beta * H * p
         xi_eq = wp.sqrt(xi_eq2)
         p_new = p + wp.max(xi_eq - radius, R(0.0)) / (R(3.0) * G + H)
-        dp = p_new - p  # what p takes of it: the next step then finds what rounding left, and nothing adds up
+        dp = p_new - p  # the increment after rounding of p: the next step corrects the rest, and errors do not add up
         eps_p = eps_p + wp.where(dp > R(0.0), R(1.5) * dp / xi_eq, R(0.0)) * xi
         return elastic - R(2.0) * G * eps_p, eps_p, p_new
 

@@ -25,8 +25,8 @@ SWEEPS = 4  # of Jacobi's method: quadratic, so that the fourth works on roundin
 def eigen_function(precision: str) -> Any:
     """The function C -> (N, d): directions as columns and eigenvalues of a symmetric matrix, by Jacobi's method.
 
-    Without a branch, so that a CPU computes several at once.
-    Warp's eig3 leaves errors of up to 1e-3 of the largest entry in float32; this one 1e-6.
+    It has no branches, so that a CPU computes several elements at once. Warp's eig3 leaves errors of up to 1e-3 of the
+    largest entry in float32, this function 1e-6.
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -37,7 +37,7 @@ def eigen_function(precision: str) -> Any:
         one = R(1.0)
         twice = R(2.0) * pq
         size = wp.abs(q - p) + wp.sqrt((q - p) * (q - p) + twice * twice)
-        resolved = size > wp.abs(pq)  # not where squares underflow, and a tiny q - p would make the tangent huge
+        resolved = size > wp.abs(pq)  # if squares underflow, a tiny q - p would make the tangent huge
         tangent = wp.where(resolved, wp.where(q < p, -twice, twice), R(0.0)) / wp.where(resolved, size, one)
         cosine = one / wp.sqrt(one + tangent * tangent)
         return cosine, cosine * tangent, tangent

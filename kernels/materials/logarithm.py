@@ -1,4 +1,4 @@
-"""Owns the natural logarithm of positive numbers: on a CPU without a call, so that elements lie side by side."""
+"""Owns the natural logarithm of positive numbers, on a CPU without a function call, so that elements vectorise."""
 
 import math
 from functools import cache

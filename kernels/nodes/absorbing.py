@@ -56,10 +56,10 @@ def dampen(before: wp.vec3d, free: wp.vec3d, own: wp.vec3d, share: wp.mat33d):
 def absorbing_kernel(own: Kind, springs: bool) -> Any:
     """Kernel: a step of the nodes that dashpots act on; arguments as in `node.integrate_kernel`.
 
-    impulse_out [N s] is what each node has given to what lies beyond the boundary up to t(n), absorbed_out [J] the
-    energy that it gave in the frame of the body. As the force at t(n) acts for half a step on either side of
-    it, the arrays with `after` hold the same half a step later. With `springs`, stretch_out [m] is u(n) less the way of
-    the body. If `own.rated`, nodes are those of `item`, place among the dashpots + (level << LEVEL_BIT), and dt is the
+    impulse_out [N s] is the impulse of each node on the surroundings up to t(n), absorbed_out [J] the energy given to
+    them in the frame of the body. Since the force at t(n) acts for half a step on either side of t(n), the arrays with
+    `after` hold both half a step later. With `springs`, stretch_out [m] is u(n) less the travel of the body. If
+    `own.rated`, nodes are those of `item`, place among the dashpots + (level << LEVEL_BIT), and dt is the
     step of level 0.
     """
     vec3, Vector, Index = scalars(own.precision).vec3, kind(wp.vec3d, own.each), kind(wp.int32, own.each)

@@ -76,11 +76,11 @@ def drive(
     work_after_out: wp.array(dtype=wp.vec3d),
     clock_out: wp.array(dtype=wp.int32),
 ):
-    """v(n+1/2) of a node whose driven axes take theirs from a table at its own time; sums the work that this puts in.
+    """v(n+1/2) of a node whose driven axes follow tables at its own time; sums the work of the drive.
 
     The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
     v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each node counts its own steps in
-    clock_out, so that none waits for a common clock.
+    clock_out, so that no thread waits for a common clock.
     """
     t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
     clock_out[k] = clock_out[k] + 1

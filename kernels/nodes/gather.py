@@ -1,4 +1,4 @@
-"""Owns what every kernel that moves nodes has in common: how it gathers forces, kicks a node with them and moves it.
+"""Owns what all kernels that move nodes share: gathering the forces on a node, kicking it with them and moving it.
 
 A step is that of central differences with lumped mass,
 
@@ -113,7 +113,7 @@ def force_function(precision: str, rated: bool) -> Any:
 def gather_function(precision: str, rated: bool = False) -> Any:
     """The function that sums the forces of elements on a node.
 
-    Most nodes have one or two slots, whose forces a thread has under way at once.
+    Most nodes have one or two slots, whose forces a thread loads at the same time.
     """
     vec3, force_at = scalars(precision).vec3, force_function(precision, rated)
 
@@ -158,7 +158,7 @@ def element_force_function(own: Kind) -> Any:
 
 @cache
 def nodal_force_function(pushed: bool) -> Any:
-    """The function that adds the nodal force to what acts on node i, and takes it away, so that it is given once."""
+    """The function that adds the nodal force of node i to the other forces, and clears it."""
 
     @wp.func
     def with_nodal_force(i: int, total: wp.vec3d, nodes: NodeData, nodal_force_out: wp.array(dtype=wp.vec3d)):

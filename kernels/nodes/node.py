@@ -1,4 +1,4 @@
-"""Owns how free nodes are advanced: those that nothing ties, drives or absorbs, all of them or those of some levels.
+"""Owns how free nodes are advanced, which nothing ties, drives or absorbs: all of them, or those of some levels.
 
 Levels are those of asynchronous variational integrators, see `warp_mca.model.rates`. A node of level k takes the step
 2^k dt; an element of level l that acts on it, l >= k, gives the impulse 2^l dt f, which is 2^(l - k) times the force in

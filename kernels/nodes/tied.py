@@ -50,8 +50,8 @@ class Tied:
 def masters_kernel(own: Kind, lanes: int = 1) -> Any:
     """Kernel: a step of the nodes that carry slaves; arguments as in `node.integrate_kernel`.
 
-    M_k a_k = f_k + sum_s N_sk f_s, where M_k holds the slaves' share of mass. Slaves are summed in a fixed order, by so
-    many `lanes` side by side. Nodal forces on slaves are read here and reset by `follow`.
+    M_k a_k = f_k + sum_s N_sk f_s, where M_k holds the slaves' share of mass. `lanes` threads share the slaves of a
+    master, and sum them in a fixed order. Nodal forces on slaves are read here and cleared by `follow`.
     """
     vec3, Vector, Index = scalars(own.precision).vec3, kind(wp.vec3d, own.each), kind(wp.int32, own.each)
     element_force, with_nodal_force = element_force_function(own), nodal_force_function(own.pushed)
