@@ -34,7 +34,6 @@ UPWARD = {
     ("phases", "accuracy"),  # `run(accuracy=...)` chooses a variant of the scene before it runs
     ("physics", "model"),  # Model, Block and Layout, for their types and for joining scenes
     ("physics", "step"),  # State, Workspace and Stage, for their types; `threads.py`, which cuts launches
-    ("watch", "phases"),  # Prepared and SceneRun, for their types
 }
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
 

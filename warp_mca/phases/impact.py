@@ -203,7 +203,7 @@ class _Loop:
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
-        self.looks = Looks(self.solver, self.state, impact.scene_runs)
+        self.looks = Looks(self.solver, self.state, [item.looks for item in impact.scene_runs])
         self.written = 0
         if ended:  # each part of the ring is waited for
             self.solver.replay.note_ahead(self.state)

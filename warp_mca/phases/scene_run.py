@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,12 +24,10 @@ from warp_mca.step.state_figures import (
     max_speed,
     rigid_bodies,
 )
-from warp_mca.watch.bending import samples_of, seen
-from warp_mca.watch.bent_cells import Cells
 from warp_mca.watch.energy import peak_losses, spring_shares
 from warp_mca.watch.ledger import Ledger
+from warp_mca.watch.looks import SceneLooks
 from warp_mca.watch.mass_report import body_report, mass_report
-from warp_mca.watch.passing import Watch
 from warp_mca.watch.row import Finished
 from warp_mca.watch.table import told_at_the_end
 
@@ -40,6 +36,7 @@ if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
     from warp_mca.step.steps import Steps
+    from warp_mca.watch.passing import Watch
 
 Array = NDArray[np.float64]
 
@@ -49,7 +46,7 @@ class SceneRun:
 
     Attributes:
         ledger: rows of its history, energy balance and guards.
-        watch: what may go into each other.
+        looks: what is looked at of the shape of its bodies.
     """
 
     def __init__(
@@ -76,12 +73,12 @@ class SceneRun:
             first_channel: number of the first channel of its probes and sections among the solver's.
         """
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
-        self.watch = watch
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         self.channels = slice(first_channel, first_channel + ready.sensors.channels)
         tolerance = ready.scene.impact.energy_tolerance
         framed = solver.floating.count > 0
         self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
+        self.looks = SceneLooks(solver, self.ledger, watch, index)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of the solver's records, and hold them to the guards.
@@ -97,33 +94,6 @@ class SceneRun:
                 kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
             if self.ready.sensors.channels:
                 kept.sensors.extend(records["sensors"][rows[: kept.count - first], self.channels])
-
-    @cached_property
-    def samples(self) -> list[Cells]:
-        """Cells that `runs.bending` looks at."""
-        return samples_of(self.ready.model)
-
-    def bent(self, u: Array) -> Array:
-        """What `runs.bending` has seen, with these displacements of all scenes [m] too: `SceneRecords.stiffened`."""
-        first, end = self.solver.layout.nodes[self.index : self.index + 2]
-        before = self.ledger.kept.stiffened
-        return seen(self.ready.model, self.samples, u[first:end], before) if self.samples else before
-
-    def look_for_passing(self, steps: int, u: Array, found: Mapping[str, NDArray]) -> None:
-        """Keep what `runs.passing` sees after so many steps.
-
-        Args:
-            steps: since the start of the phase.
-            u: displacements of the nodes that it looks at [m], shape (node_count, 3), float64.
-            found: `speed_square` of the state, and the greatest depths of the springs of each contact pass.
-        """
-        kept, first, end = self.ledger.kept, *self.solver.layout.nodes[self.index : self.index + 2]
-        squares = found["speed_square"]
-        speed = math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
-        springs = [stage.springs[self.index : self.index + 2] for stage in self.solver.contacts]
-        pressed = np.array([found[str(k)][a:b].max(initial=0.0) for k, (a, b) in enumerate(springs)])
-        x = self.ready.model.X[self.watch.nodes] + u
-        kept.passed, kept.apart = self.watch.look(x, speed, pressed, steps * self.solver.dt, kept.passed)
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
@@ -235,7 +205,7 @@ class SceneRun:
 
     def _told(self, stopped: bool, **found: Any) -> tuple[str, ...]:
         """What the run says of itself; arguments are fields of `Finished`."""
-        ready, nodes = self.ready, slice(*self.solver.layout.nodes[self.index : self.index + 2])
+        ready, nodes = self.ready, self.looks.nodes
         u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
         finished = Finished(
             scene=ready.scene,
@@ -247,8 +217,8 @@ class SceneRun:
             u=u[nodes],
             v=v[nodes],
             depths=[stage.depths(self.state, self.index) for stage in self.solver.contacts],
-            bent=self.ledger.kept.stiffened if stopped else self.bent(u),
-            watch=self.watch,
+            bent=self.ledger.kept.stiffened if stopped else self.looks.bent(u),
+            watch=self.looks.watch,
             stopped=stopped,
             **found,
         )

@@ -7,6 +7,7 @@ its shape and that of a cell that bends right. Under given loads, deflections ar
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -39,9 +40,9 @@ LOOKS = 8  # in a run, besides that at its end
 # What finds the energies, and what prepares it, by element and whether cells are wedges.
 _ENERGIES: dict[tuple[str, bool], tuple[Callable[[Array, Cells], Array], Callable[[Cells], object]]] = {
     ("hex8", False): (bent_hexahedra.full_hexahedra, bent_hexahedra.bricks_of),
-    ("hex8", True): (strain_jumps.full_wedges, strain_jumps.wedges_of),
+    ("hex8", True): (partial(strain_jumps.wedges, one_point=False), strain_jumps.wedges_of),
     ("hex8r", False): (bent_hexahedra.one_point_hexahedra, bent_hexahedra.bricks_of),
-    ("hex8r", True): (strain_jumps.one_point_wedges, strain_jumps.one_point_wedges_of),
+    ("hex8r", True): (partial(strain_jumps.wedges, one_point=True), strain_jumps.one_point_wedges_of),
     ("tet4", False): (strain_jumps.tetrahedra, strain_jumps.slopes_of),
 }
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from warp_mca.base.chunks import CHUNK, chunks
+from warp_mca.base.rotation import mean_pose
 from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.geometry.hexahedron import CORNERS, determinants, shape_functions
 from warp_mca.geometry.quality import volumes
@@ -20,6 +21,7 @@ from warp_mca.geometry.shape_volume import of_cells
 from warp_mca.geometry.tetrahedron import volumes as tetrahedron_volumes
 from warp_mca.model.assembly import GROUND
 from warp_mca.physics.elements.cells import densities
+from warp_mca.rigid.body_motion import held_axes
 from warp_mca.watch.row import Array, Finished, Values, row
 
 if TYPE_CHECKING:
@@ -147,7 +149,7 @@ def _excess(body: Body, mesh: Mesh, model: Model, own: slice, motion: Motion, x:
     A body that joints hold turns about the nearest of them.
     """
     volume, nodes = inertias(body, mesh)
-    axis = _turn(x[own], mesh.points, model.mass[own]).T @ motion.rate
+    axis = mean_pose(mesh.points, x[own], model.mass[own])[2].T @ motion.rate
     axis /= np.linalg.norm(axis)
     away = np.cross(motion.velocity, motion.rate) / (motion.rate @ motion.rate)  # of the centre from a fixed axis
     bound = [(model.joint_first[j.start : j.end], model.joint_second[j.start : j.end]) for j in model.joints]
@@ -178,12 +180,8 @@ def _allowed(c: Finished, body: str, x: Array, motion: Motion) -> Motion:
 
     Its velocity is the least with which the body can turn at that rate: that of a fixed axis away from the centre.
     """
-    scene, model, own = c.scene, c.model, c.nodes(body)
-    held = np.zeros((own.stop - own.start, 3, 3))
-    drives = [(item.body, item.nodes, item.axes) for item in scene.fixed]
-    for name, nodes, axes in (*drives, *((item.body, item.nodes, item.axis) for item in scene.prescribed)):
-        for k in ("xyz".index(axis) for axis in axes if name == body):
-            held[c.meshes[name].nodes(nodes), k, k] = 1.0
+    model, own = c.model, c.nodes(body)
+    held = held_axes(c.scene, c.meshes)[body][:, :, None] * np.eye(3)
     tied = (model.joint_second == GROUND) & (model.joint_first >= own.start) & (model.joint_first < own.stop)
     np.add.at(held, model.joint_first[tied] - own.start, model.joint_tied[tied])
     some = np.flatnonzero(held.any(axis=(1, 2)))
@@ -200,14 +198,6 @@ def _allowed(c: Finished, body: str, x: Array, motion: Motion) -> Motion:
     shift = free[:3] @ turned[(share > HELD).sum() :].T  # motions of the centre without rotation
     velocity = part[:3] - shift @ np.linalg.lstsq(shift, part[:3], rcond=None)[0] if shift.size else part[:3]
     return motion._replace(velocity=velocity, rate=part[3:] / size)
-
-
-def _turn(x: Array, points: Array, mass: Array) -> Array:
-    """Rotation matrix from a body's own frame to nodes at x [m] that nearly moved as a rigid body."""
-    total = mass.sum()
-    here, there = x - mass @ x / total, points - mass @ points / total
-    left, _, right = np.linalg.svd(np.einsum("n,ni,nj->ij", mass, here, there))
-    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
 def _inertia(square: Array) -> Array:

@@ -2,31 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.step.transfer import Transfer
-from warp_mca.watch.bending import LOOKS
+from warp_mca.watch.bending import LOOKS, samples_of, seen
+from warp_mca.watch.bent_cells import Array, Cells
 
 if TYPE_CHECKING:
-    from warp_mca.phases.scene_run import SceneRun
     from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
+    from warp_mca.watch.ledger import Ledger
+    from warp_mca.watch.passing import Watch
+
+
+class SceneLooks:
+    """What is looked at of the bodies of one scene; what was seen is kept in the records of its ledger.
+
+    Attributes:
+        ledger: of the scene.
+        watch: what may go into each other.
+        index: number of the scene in the solver's layout.
+    """
+
+    def __init__(self, solver: Solver, ledger: Ledger, watch: Watch, index: int) -> None:
+        self.ledger, self.watch, self.index, self._solver = ledger, watch, index, solver
+        self.nodes = slice(*solver.layout.nodes[index : index + 2].tolist())
+
+    @cached_property
+    def samples(self) -> list[Cells]:
+        """Cells whose bending is looked at."""
+        return samples_of(self.ledger.model)
+
+    def bent(self, u: Array) -> Array:
+        """`SceneRecords.stiffened` with these displacements of all scenes [m], too."""
+        before = self.ledger.kept.stiffened
+        return seen(self.ledger.model, self.samples, u[self.nodes], before) if self.samples else before
+
+    def look_for_passing(self, steps: int, u: Array, found: Mapping[str, NDArray]) -> None:
+        """Keep what is seen after so many steps.
+
+        Args:
+            steps: since the start of the phase.
+            u: displacements of the nodes that are watched [m], shape (node_count, 3), float64.
+            found: `speed_square` of the state, and the greatest depths of the springs of each contact pass.
+        """
+        kept, squares = self.ledger.kept, found["speed_square"]
+        speed = math.sqrt(squares[self.nodes].max() if len(squares) > 1 else squares[0])
+        springs = [stage.springs[self.index : self.index + 2] for stage in self._solver.contacts]
+        pressed = np.array([found[str(k)][a:b].max(initial=0.0) for k, (a, b) in enumerate(springs)])
+        x = self.ledger.model.X[self.watch.nodes] + u
+        kept.passed, kept.apart = self.watch.look(x, speed, pressed, steps * self._solver.dt, kept.passed)
 
 
 class Looks:
     """Looks of one call of `Impact.advance`; the device goes on meanwhile."""
 
-    def __init__(self, solver: Solver, state: State, scene_runs: Sequence[SceneRun]) -> None:
+    def __init__(self, solver: Solver, state: State, scenes: Sequence[SceneLooks]) -> None:
         """Prepare the way of what is looked at."""
-        self.state, self.scene_runs = state, scene_runs
-        looked_at = any(item.samples for item in scene_runs)
+        self.state, self.scenes = state, scenes
+        looked_at = any(item.samples for item in scenes)
         self._shape = Transfer({"u": state.u}, solver.device) if looked_at else None
         self._watch, self._watched, self._due = None, [], []
-        watched = [(item, int(solver.layout.nodes[item.index])) for item in scene_runs if item.watch.cases]
+        watched = [(item, item.nodes.start) for item in scenes if item.watch.cases]
         if not watched:
             return
         self._ends = np.cumsum([len(item.watch.nodes) for item, _ in watched])
@@ -82,7 +126,7 @@ class Looks:
     def _see_shape(self) -> None:
         while self._shape and self._shape.pending:
             _, shape = self._shape.receive()
-            for item in self.scene_runs:
+            for item in self.scenes:
                 item.ledger.kept.stiffened = item.bent(shape["u"])
 
     def _see_skins(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,27 +45,28 @@ class When(StrEnum):
     END = "at the end"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Row:
     """A guard, a warning or a piece of advice.
 
     Attributes:
-        found: the condition: of a `Context` (of `Finished` at the end, of `Reading` at records) and the limit, the
-            values for the places of the sentence, once for each time that it is to be told.
         sentence: what was found, with places as of `str.format`.
         remedy: what to change, likewise; it follows the sentence.
         limit: threshold of the condition, in `unit`; not used where the unit is empty.
         unit: of the limit, and further numbers of the condition.
         kind, when: as these say.
+        found: the condition: of a `Context` (of `Finished` at the end, of `Reading` at records) and the limit, the
+            values for the places of the sentence, once for each time that it is to be told. Its docstring says what it
+            looks at.
     """
 
-    found: Condition
     sentence: str
     remedy: str
     limit: float
     unit: str
     kind: Kind
     when: When
+    found: Condition
 
     @property
     def name(self) -> str:
@@ -85,10 +87,8 @@ def row(
     kind: Kind = Kind.WARNING,
     when: When = When.END,
 ) -> Callable[[Condition], Row]:
-    """Makes a row of the condition that follows, whose docstring says what it looks at."""
-    return lambda found: Row(
-        found=found, sentence=sentence, remedy=remedy, limit=limit, unit=unit, kind=kind, when=when
-    )
+    """Makes a row of the condition that follows."""
+    return partial(Row, sentence, remedy, limit, unit, kind, when)
 
 
 @dataclass(frozen=True, kw_only=True)

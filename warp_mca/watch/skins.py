@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.rotation import best_rotation
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.contact import crossing
@@ -119,15 +120,11 @@ class Skin:
         return np.array([[f(column) for column in columns] for f in (np.min, np.max)])
 
     def bent(self) -> float:
-        """Greatest distance of a node from its place in the undeformed body, moved rigidly as fits best [m].
-
-        The best rotation by Kabsch, Acta Cryst. A 32 (1976) 922.
-        """
+        """Greatest distance of a node from its place in the undeformed body, moved rigidly as fits best [m]."""
         some = slice(None, None, -(-len(self.X) // SHAPE_NODES))
         X, x = (points[some] - points[some].mean(axis=0) for points in (self.X, self.x))
-        left, _, right = np.linalg.svd(X.T @ x)
-        left[:, 2] *= np.sign(np.linalg.det(left @ right))
-        return float(np.sqrt(((x - X @ (left @ right)) ** 2).sum(axis=1).max()))
+        R = best_rotation(X, x, np.ones(len(X)))
+        return float(np.sqrt(((x - X @ R.T) ** 2).sum(axis=1).max()))
 
     def settle(self, origin: Array) -> None:
         """Make the mesh ready for `edges_in`, with coordinates from an origin near the body [m], shape (3,)."""

@@ -122,7 +122,8 @@ def _wedge_strains(u: Array, cells: Cells) -> tuple[Array, Array, Array, Array]:
     return R, strain, B, r
 
 
-def _wedges(u: Array, cells: Cells, one_point: bool) -> Array:
+def wedges(u: Array, cells: Cells, one_point: bool) -> Array:
+    """What `bent_cells` names of wedges of `hex8`, or `hex8r`, that are looked at, shape (COLUMNS,)."""
     w, own = cast(Wedges, cells.shape), slice(cells.looked_at)
     R, strain, B, r = _wedge_strains(u, cells)
     flat = np.eye(3)[:, :, None] - np.einsum("in,jn->ijn", w.normal, w.normal)
@@ -184,13 +185,3 @@ def _one_point_energy(u: Array, R: Array, w: Wedges, cells: Cells) -> Array:
     turned = np.einsum("jin,naj->nai", R, shape - shape[:, :1]) - (X - X[:, :1])
     flat = turned.reshape(len(X), 24)
     return 0.5 * np.einsum("ni,nij,nj->n", flat, w.stiffness, flat, optimize=True)
-
-
-def full_wedges(u: Array, cells: Cells) -> Array:
-    """What `bent_cells` names of wedges of `hex8` that are looked at, shape (COLUMNS,)."""
-    return _wedges(u, cells, one_point=False)
-
-
-def one_point_wedges(u: Array, cells: Cells) -> Array:
-    """What `bent_cells` names of wedges of `hex8r` that are looked at, shape (COLUMNS,)."""
-    return _wedges(u, cells, one_point=True)
