@@ -1,16 +1,21 @@
 """Owns the table of cell types: corners, faces, edges and the codes of file formats, for all that reads meshes.
 
-Corners are numbered as in VTK, meshio and gmsh, which agree for linear cells. A mesh stores two types: hexahedra and
-tetrahedra. Wedges and pyramids are stored as hexahedra whose corners coincide.
+Corners are numbered as in VTK, meshio and gmsh, which agree for linear cells. A mesh stores two types, hexahedra and
+tetrahedra, and those from outside the package. Wedges and pyramids are stored as hexahedra whose corners coincide.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
 
 Index = NDArray[np.int32]
 
@@ -27,12 +32,17 @@ class CellType:
         vtk: code of VTK and VTKHDF.
         meshio: name in meshio.
         gmsh: code of gmsh.
-        field: attribute of `Mesh` that holds such cells; it and the following are empty for types stored as another.
+        field: attribute of `Mesh` that holds such cells, empty where `Mesh.others` does; it and the following are empty
+            for types stored as another.
         natural: natural coordinates of the corners [-], from -1 to 1 for hexahedra and 0 to 1 for tetrahedra.
-        faces: corners of each face, counter-clockwise seen from outside.
+        faces: corners of each face, three or four, counter-clockwise seen from outside. Faces with nodes within their
+            edges are given in parts.
         edges: pairs of corners.
         neighbours: the three corners that edges lead to from each corner, ordered so that these edges are right-handed.
         cut_from: stored types that `degenerate.cut_to` cuts into cells of this type.
+        linear: name of the stored type of the first corners, which volumes are taken of and points searched in, for
+            cells with further nodes.
+        made: mesh -> mesh with cells of this type in place of those of `cut_from`, which `degenerate.cut_to` calls.
     """
 
     name: str
@@ -48,6 +58,8 @@ class CellType:
     edges: tuple[tuple[int, int], ...] = ()
     neighbours: tuple[tuple[int, int, int], ...] = ()
     cut_from: tuple[str, ...] = ()
+    linear: str = ""
+    made: Callable[[Mesh], Mesh] | None = None
 
     @property
     def corners(self) -> int:
@@ -115,8 +127,18 @@ TETRAHEDRON = CellType(
 
 # In the order in which a mesh counts its cells.
 CELL_TYPES = {cell.name: cell for cell in (HEXAHEDRON, WEDGE, PYRAMID, TETRAHEDRON)}
-STORED_TYPES = {name: cell for name, cell in CELL_TYPES.items() if cell.stored_as == name}
-MAX_CORNERS = max(cell.corners for cell in CELL_TYPES.values())
+MAX_CORNERS = max(cell.corners for cell in CELL_TYPES.values())  # of linear cells
+
+
+def stored_types() -> dict[str, CellType]:
+    """Types that meshes store, by name, in the order in which cells are counted."""
+    return {name: cell for name, cell in CELL_TYPES.items() if cell.stored_as == name}
+
+
+def linear_type(name: str) -> CellType:
+    """The type that the first corners of such cells make, by themselves or within the cell."""
+    return CELL_TYPES[CELL_TYPES[name].linear or name]
+
 
 # Cells with nodes within their edges, whose first nodes are the corners: meshio's name and gmsh's code of each, with
 # meshio's name of the linear cell and its number of corners.

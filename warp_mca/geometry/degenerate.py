@@ -53,8 +53,11 @@ def cell_names(nodes: NDArray[np.integer]) -> NDArray[np.str_]:
 
 
 def cut_to(mesh: Mesh, name: str) -> Mesh:
-    """The mesh with cells that can be cut to those of the type `name` cut so; others stay."""
-    return tetrahedral(mesh) if name == TETRAHEDRON.name else mesh
+    """The mesh with cells that can be cut to those of the type `name`, or made into them, cut so; others stay."""
+    if name == TETRAHEDRON.name:
+        return tetrahedral(mesh)
+    cell = CELL_TYPES[name]
+    return cell.made(mesh) if cell.made and any(len(mesh.cells[other]) for other in cell.cut_from) else mesh
 
 
 def tetrahedral(mesh: Mesh) -> Mesh:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boundary import boundary_faces
-from warp_mca.geometry.cell_types import STORED_TYPES
+from warp_mca.geometry.cell_types import stored_types
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Mesh:
         notes: what the reader of its file left out, a sentence each; a run has them among its warnings.
         volume_ratio: volume of the shape that the mesh stands for over that of its cells [-], shape (cell_count,), or
             (1,) where it is one for all cells, float64; empty where nothing is known of a shape but its cells.
+        others: node indices of cells of types from outside the package, by the type's name, each shape (cell_count,
+            corners), int32.
     """
 
     points: NDArray[np.float64]
@@ -36,11 +38,14 @@ class Mesh:
     tetrahedra: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
     notes: tuple[str, ...] = ()
     volume_ratio: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    others: dict[str, NDArray[np.int32]] = field(default_factory=dict)
 
     @property
     def cells(self) -> dict[str, NDArray[np.int32]]:
         """Nodes of the cells of each stored type, by its name, in the order in which cells are counted."""
-        return {name: getattr(self, cell.field) for name, cell in STORED_TYPES.items()}
+        none = {name: np.zeros((0, cell.corners), np.int32) for name, cell in stored_types().items()}
+        own = {name: getattr(self, cell.field) for name, cell in stored_types().items() if cell.field}
+        return none | own | self.others
 
     @property
     def cell_count(self) -> int:

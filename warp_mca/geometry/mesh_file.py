@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.abaqus_file import ABAQUS_SUFFIXES, read_abaqus
-from warp_mca.geometry.cell_types import CELL_TYPES, STORED_TYPES
+from warp_mca.geometry.cell_types import CELL_TYPES, stored_types
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
@@ -96,7 +96,8 @@ class MeshFile:
             kept.field: np.concatenate(
                 [stored(points, cells[name], name) for name, cell in CELL_TYPES.items() if cell.stored_as == kept.name]
             )
-            for kept in STORED_TYPES.values()
+            for kept in stored_types().values()
+            if kept.field
         }
         for note in notes:
             logging.getLogger("warp_mca").warning("%s", note)

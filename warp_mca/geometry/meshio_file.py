@@ -92,7 +92,7 @@ def linear(read: meshio.Mesh) -> dict[str, int]:
 
 def stray_notes(path: Path, read: meshio.Mesh) -> list[str]:
     """A sentence about surfaces and curves that do not lie on solid cells, so that they mark nothing; none without."""
-    solids = {cell.meshio for cell in CELL_TYPES.values()}
+    solids = _KNOWN - set(QUADRATIC)
     blocks = [block.data for block in read.cells if block.type in solids]
     left: Counter[tuple[str, str]] = Counter()
     for block in read.cells:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.cell_types import CELL_TYPES
+from warp_mca.geometry.cell_types import CELL_TYPES, linear_type
 from warp_mca.geometry.integrals import INTEGRALS
 from warp_mca.geometry.mesh import Mesh
 
@@ -23,7 +23,8 @@ def _corner_volumes(mesh: Mesh) -> list[NDArray[np.float64]]:
     """
     found = []
     for name, cells in mesh.cells.items():
-        neighbours = np.array(CELL_TYPES[name].neighbours)
+        linear = linear_type(name)
+        neighbours, cells = np.array(linear.neighbours), cells[:, : linear.corners]
         corners = mesh.points[cells]
         edges = corners[:, neighbours] - corners[:, :, None, :]
         length = np.linalg.norm(edges, axis=-1, keepdims=True)
@@ -48,8 +49,10 @@ def gauss_jacobians(mesh: Mesh) -> list[NDArray[np.float64]]:
     Hexahedra have 2 x 2 x 2 Gauss points, tetrahedra one point.
     """
     found = []
-    for name, cells in mesh.cells.items():
-        parts = [INTEGRALS[name].determinants(mesh.points[cells[part]]) for part in chunks(len(cells), CHUNK)]
+    for name, nodes in mesh.cells.items():
+        linear = linear_type(name)
+        cells = nodes[:, : linear.corners]
+        parts = [INTEGRALS[linear.name].determinants(mesh.points[cells[part]]) for part in chunks(len(cells), CHUNK)]
         found.append(np.concatenate(parts) if parts else np.zeros((0, 1)))
     return found
 
@@ -136,7 +139,7 @@ def check_whole(mesh: Mesh, name: str) -> None:
         raise bad_value(f"body {name}: Mesh.points", _what(points), remedy)
     used = np.zeros(len(points), dtype=bool)
     for cell, nodes in mesh.cells.items():
-        owner, corners = f"body {name}: Mesh.{CELL_TYPES[cell].field}", CELL_TYPES[cell].corners
+        owner, corners = f"body {name}: Mesh.{CELL_TYPES[cell].field or cell}", CELL_TYPES[cell].corners
         if not _is_array(nodes, "iu", 2) or nodes.shape[1] != corners:
             raise bad_value(owner, _what(nodes), f"give the {corners} nodes of each cell, as int32")
         _check_indices(owner, nodes, len(points), "nodes")

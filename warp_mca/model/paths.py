@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
 from warp_mca.geometry.boxes import Boxes, cell_boxes
-from warp_mca.geometry.cell_types import MAX_CORNERS
+from warp_mca.geometry.cell_types import MAX_CORNERS, linear_type
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
 from warp_mca.scene import Line, Path, Scene
@@ -87,7 +87,11 @@ def _elements_around(at: Array, mesh: Mesh, boxes: Mapping[str, Boxes], path: Pa
     Raises:
         RequestError: a point lies outside the mesh.
     """
-    found = [LOCATE[name](at, mesh.points, cells, boxes[name]) for name, cells in mesh.cells.items() if len(cells)]
+    found = []
+    for name, cells in mesh.cells.items():
+        if len(cells):
+            linear = linear_type(name)
+            found.append(LOCATE[linear.name](at, mesh.points, cells[:, : linear.corners], boxes[name]))
     corners, weights, apart, allowed = (np.stack(parts) for parts in zip(*found, strict=True))
     rows = np.arange(len(at))
     best = (apart - allowed).argmin(axis=0)

@@ -21,7 +21,7 @@ MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem
 # Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring alone
 # holds the node, up to SUPPORT more where the element does; see docs/measurements/methods.md.
 BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9
-KEY = np.random.default_rng(0).integers(1, 2**62, 25) | 1  # weights that make one number of an element's shape
+KEY = np.random.default_rng(0).integers(1, 2**62, 82) | 1  # weights that make one number of an element's shape
 
 
 Part = NDArray[np.intp]  # indices of some elements

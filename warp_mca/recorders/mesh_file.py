@@ -16,15 +16,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warp_mca.base.errors import McaError, RequestError, bad_value
-from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, MAX_CORNERS, CellType
+from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, CellType
 from warp_mca.geometry.degenerate import cell_names
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file, file_path
+from warp_mca.scene.elements import ELEMENTS
 
 if TYPE_CHECKING:
     import meshio
 
     from warp_mca.model.model import Model
-    from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.scene.elements import ELEMENTS
+from warp_mca.recorders.recorder import Frame, RunInfo
 
 USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"
 # Formats whose readers take six components as xx, yy, zz, xy, yz, xz; XDMF's take yy as the fourth, gmsh takes none.
@@ -98,13 +100,15 @@ def cells(model: Model) -> tuple[list[tuple[CellType, NDArray[np.int64]]], NDArr
     Cells come in the order of the concatenated meshes, which is not the model's.
     """
     count = len(model.element_of)
-    nodes = np.full((count, MAX_CORNERS), -1, dtype=np.int64)
+    most = max((len(block.conn) for block in (*model.blocks, *model.rigid_blocks)), default=0)
+    nodes, names = np.full((count, most), -1, dtype=np.int64), np.full(count, "", dtype=object)
     material = np.empty(count, dtype=np.int32)
     for block in (*model.blocks, *model.rigid_blocks):
         index = model.element_of[block.first : block.first + block.conn.shape[1]]
         nodes[index, : len(block.conn)] = block.conn.T
         material[index] = block.material
-    names = cell_names(nodes)
+        cell = ELEMENTS[block.element].cell
+        names[index] = cell_names(block.conn.T) if cell == HEXAHEDRON.name else cell
     ends = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), len(names)]
     runs = []
     for first, end in itertools.pairwise(ends):

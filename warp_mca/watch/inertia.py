@@ -14,7 +14,7 @@ import numpy as np
 
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.rotation import mean_pose
-from warp_mca.geometry.cell_types import HEXAHEDRON
+from warp_mca.geometry.cell_types import HEXAHEDRON, linear_type
 from warp_mca.geometry.hexahedron import CORNERS, determinants, shape_functions
 from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.shape_volume import of_cells
@@ -98,11 +98,12 @@ def inertias(body: Body, mesh: Mesh) -> tuple[Array, Array]:
     mass, first, exact, lumped, start = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 0
     middle = mesh.points.mean(axis=0)
     for name, conn in mesh.cells.items():
+        linear = linear_type(name)
         for part in chunks(len(conn), CHUNK):
-            x, density = mesh.points[conn[part]] - middle, rho[start : start + len(conn)][part]
-            place, weight = _points(x, name == HEXAHEDRON.name)
+            x, density = mesh.points[conn[part, : linear.corners]] - middle, rho[start : start + len(conn)][part]
+            place, weight = _points(x, linear is HEXAHEDRON)
             weight = weight * density[:, None]
-            nodal = weight @ (_AT_GAUSS if name == HEXAHEDRON.name else np.full((4, 4), 0.25))
+            nodal = weight @ (_AT_GAUSS if linear is HEXAHEDRON else np.full((4, 4), 0.25))
             mass += weight.sum()
             first += np.einsum("ep,epi->i", weight, place)
             exact += np.einsum("ep,epi,epj->ij", weight, place, place)

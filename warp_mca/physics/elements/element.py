@@ -22,7 +22,7 @@ class Element(Protocol):
 
     Attributes:
         name: in `Body.element` and on the command line.
-        cell: name of the cell type that it computes, out of `geometry.cell_types.STORED_TYPES`.
+        cell: name of the cell type that it computes, out of `geometry.cell_types.stored_types`.
         patches: whether its stage may compute compact patches of elements, so that the model orders them that way.
         one_rate: may be left out; True where forces depend on neighbouring elements too, so that all of a block take
             the same step.
