@@ -164,7 +164,7 @@ react_kernel(False, 1)  # this variant belongs to the module, so it must exist b
 def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR) -> Any:
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
     press = spring_function(friction, law)
-    open_contact = open_function(friction)
+    open_contact = open_function(friction, law)
     gap_from_rest = rest_function(stress_free)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
@@ -202,7 +202,7 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str
         if gap < -of(deepest, k):
             flag_out[k, TOO_DEEP] = 1
         if gap < wp.float64(0.0):
-            force, F_n = press(s, gap, normal, du, stiffness[s], stiffness[s], of(mu, k), spring)
+            force, F_n = press(s, gap, normal, du, stiffness[s], stiffness[s], of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
             contact_force_out[i] = contact_force_out[i] + force

@@ -1,10 +1,11 @@
 """Owns what the kernels ask of a contact law along the normal; `kernels.contact.penalty` is one.
 
 The kernels are made for elastic springs: the force is a function of the depth alone, and what the spring stores comes
-back as it is released. Friction keeps to Coulomb's law with the same stiffness k along the surface.
+back as it is released. A law may add a dashpot, which dissipates (`kernels.contact.dashpot`). Friction keeps to
+Coulomb's law with the same stiffness k along the surface.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -24,10 +25,14 @@ class LawFunctions:
     Attributes:
         force: along the normal [N]; 0 at depth 0, and never negative.
         energy: that the spring stores [J], the integral of the force from 0 to the depth.
+        dashpot: what a dashpot adds to the force [N], (depth, rate, k, parameters, s) -> number, with the rate of
+            approach [m/s], below 0 as the bodies part; None where the module has none. With it the force may depend on
+            the rate but never pulls.
     """
 
     force: Any
     energy: Any
+    dashpot: Any = None
 
 
 @cache
@@ -37,10 +42,10 @@ def law_functions(law_name: str) -> LawFunctions:
     Raises:
         RequestError: there is no such module, or it lacks one of them.
     """
-    names = [field.name for field in fields(LawFunctions)]
+    names = ("force", "energy")
     try:
         module = import_module(law_name)
-        return LawFunctions(*(getattr(module, name) for name in names))
+        return LawFunctions(*(getattr(module, name) for name in names), getattr(module, "dashpot", None))
     except (ImportError, AttributeError) as error:
         remedy = f"name a module that has {' and '.join(names)}: {error}"
         raise bad_value("law of a contact", law_name, remedy) from error

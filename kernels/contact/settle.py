@@ -29,6 +29,7 @@ class Touch:
         own: penalty stiffness of the node [N/m].
         limit: penalty stiffness of the face [N/m].
         begins: greatest compression with which the spring begins, FAR without a limit [m].
+        dt: time step [s].
     """
 
     touches: wp.bool
@@ -39,6 +40,7 @@ class Touch:
     own: wp.float64
     limit: wp.float64
     begins: wp.float64
+    dt: wp.float64
 
 
 @wp.func
@@ -58,6 +60,7 @@ def meet(
     touch.held = held
     touch.along = along
     touch.begins = wp.float64(FAR)
+    touch.dt = dt
     return touch
 
 
@@ -65,7 +68,7 @@ def meet(
 def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
     press = spring_function(friction, law)
-    open_contact = open_function(friction)
+    open_contact = open_function(friction, law)
     gap_from_rest = rest_function(stress_free)
 
     @wp.func
@@ -90,7 +93,7 @@ def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, 
         gap_pressed = gap_from_rest(s, gap_kept, spring)
         k_old = wp.where(spring.face[s] < 0, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)
-        force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, spring)
+        force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, touch.dt, spring)
         spring.stiffness[s] = stiffness
         add_normal_force(scene, F_n, per_newton, normal_force_out)
         spring.face[s] = wp.where(touch.touches, near.face, -1)

@@ -1,35 +1,18 @@
-"""Owns the springs between slave nodes and what they touch: their state, forces, bookkeeping and sums."""
+"""Owns the springs between slave nodes and what they touch: their state, forces and bookkeeping."""
 
 from functools import cache
 from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.contact.dashpot import dashpot_function
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.laws import LINEAR, law_functions
-from warp_mca.kernels.records.columns import (
-    FRICTION,
-    IMPULSE,
-    LOST,
-    MADE,
-    NORMAL_ENERGY,
-    NORMAL_FORCE,
-    NORMAL_IMPULSE,
-    PASS_COLUMNS,
-    PLANE_WORK,
-    PRESSURE,
-    SPRING_ENERGY,
-    SQUARES,
-    STICK_IMPULSE,
-)
-from warp_mca.kernels.records.ledger import run_of
 
 wp.set_module_options({"enable_backward": False})
 
 FAR = 1e30  # larger than any distance [m]
 ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
-
-Columns = wp.types.vector(length=PASS_COLUMNS, dtype=wp.float64)
 
 
 @wp.struct
@@ -50,7 +33,8 @@ class Spring:
     side pressed the node last, until it is in front of that side, below it without being pressed, or pressed by another
     [m]. support, share: the slave's edge that the spring presses in place of its node, or -1, and the node's share of
     the force [-]; see `edge_rest`. bears: 1 where the side was the last to press the node itself, else 0 [-]. These
-    four are only of masters with several sides.
+    four are only of masters with several sides. dashpot: force of the law's dashpot in the last step [N], and energy
+    that it dissipated so far [J]; only of laws that have one.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -75,6 +59,7 @@ class Spring:
     support: wp.array(dtype=wp.int32)
     share: wp.array(dtype=wp.float64)
     bears: wp.array(dtype=wp.int32)
+    dashpot: wp.array(dtype=wp.vec2d)
 
 
 @wp.func
@@ -125,6 +110,8 @@ def spring_function(friction: bool, law: str) -> Any:
     """
     functions, linear = law_functions(law), law == LINEAR
     law_force, law_energy = functions.force, functions.energy
+    damped = functions.dashpot is not None
+    damp = dashpot_function(law) if damped else None
 
     @wp.func
     def soften(
@@ -150,6 +137,36 @@ def spring_function(friction: bool, law: str) -> Any:
         return share
 
     @wp.func
+    def push(
+        s: int,
+        gap: wp.float64,
+        normal: wp.vec3d,
+        du: wp.vec3d,
+        k_old: wp.float64,
+        k: wp.float64,
+        closed: bool,
+        dt: wp.float64,
+        spring: Spring,
+    ):
+        """Normal force of spring and dashpot [N]; books what a spring makes that closes or opens in this step."""
+        F = law_force(-gap, k, spring.parameters, s)
+        Fn = F
+        before = wp.vec3d()
+        if wp.static(damped):
+            pressed = spring.force[s]
+            if wp.static(friction):
+                pressed -= spring.tangential[s]
+            Fn, before = damp(s, F, -gap, normal, du, k, pressed, dt, spring)
+        if closed != (F > wp.float64(0.0)):
+            if wp.static(not damped):
+                before = spring.force[s]
+                if wp.static(friction):
+                    before -= spring.tangential[s]
+            kept = law_energy(-gap, k, spring.parameters, s)
+            switch(s, before, normal_energy(s, before, k_old, spring), F * normal, kept, du, spring)
+        return Fn
+
+    @wp.func
     def press(
         s: int,
         gap: wp.float64,
@@ -158,6 +175,7 @@ def spring_function(friction: bool, law: str) -> Any:
         k_old: wp.float64,
         k: wp.float64,
         mu: wp.float64,
+        dt: wp.float64,
         spring: Spring,
     ):
         """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force."""
@@ -166,14 +184,8 @@ def spring_function(friction: bool, law: str) -> Any:
         normal_impulse = spring.normal_impulse[s]
         depth = spring.depth[s]
         closed = spring.face[s] >= 0
-        Fn = law_force(-gap, k, spring.parameters, s)
+        Fn = push(s, gap, normal, du, k_old, k, closed, dt, spring)
         force = Fn * normal
-        if closed != (Fn > wp.float64(0.0)):
-            before = spring.force[s]
-            if wp.static(friction):
-                before -= spring.tangential[s]
-            kept = law_energy(-gap, k, spring.parameters, s)
-            switch(s, before, normal_energy(s, before, k_old, spring), force, kept, du, spring)
         squares = wp.float64(0.0)
         if wp.static(linear):
             squares = Fn * Fn
@@ -209,8 +221,10 @@ def spring_function(friction: bool, law: str) -> Any:
 
 
 @cache
-def open_function(friction: bool) -> Any:
+def open_function(friction: bool, law: str = LINEAR) -> Any:
     """The function that clears the springs of a node that lost its contact."""
+    damped = law_functions(law).dashpot is not None
+    damp = dashpot_function(law) if damped else None
 
     @wp.func
     def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):
@@ -219,66 +233,12 @@ def open_function(friction: bool) -> Any:
             pressed -= spring.tangential[s]
             spring.friction[s] = spring.friction[s] + release(spring.tangential[s], du, k)
             spring.tangential[s] = wp.vec3d()
+        if wp.static(damped):
+            zero = wp.float64(0.0)
+            _, pressed = damp(s, zero, zero, wp.vec3d(), du, k, pressed, wp.float64(1.0), spring)
         switch(s, pressed, normal_energy(s, pressed, k, spring), wp.vec3d(), wp.float64(0.0), du, spring)
         spring.energy[s] = wp.float64(0.0)
         spring.force[s] = wp.vec3d()
         spring.face[s] = -1
 
     return open_contact
-
-
-@wp.kernel(enable_backward=False)
-def sum_springs(
-    row: wp.array(dtype=wp.int32),
-    column: int,
-    first: wp.array(dtype=wp.int32),
-    afresh: bool,
-    spring: Spring,
-    partial_out: wp.array4d(dtype=wp.float64),
-):
-    """Sums over the slaves of each scene, which begin at `first`, into the columns of a pass, from `column` on.
-
-    `records.columns` names them; they are summed as in `records.ledger`. With `afresh`, what is summed over an output
-    interval then starts again from zero.
-    """
-    scene, k, lane = wp.tid()
-    sums = Columns()
-    impulse = wp.vec3d()
-    pressed = wp.vec3d()
-    pressed_energy = wp.float64(0.0)  # kept apart from `sums`, so that a GPU fuses product and sum
-    begin, end = run_of(first[scene], first[scene + 1], k)
-    for s in range(begin + lane, end, wp.block_dim()):
-        held = spring.energy[s]
-        sums[wp.static(SPRING_ENERGY)] += held
-        if held > wp.float64(0.0):
-            Ft = spring.tangential[s]
-            Fn = spring.force[s] - Ft
-            square = wp.dot(Fn, Fn)
-            pressed += Fn
-            sums[wp.static(PRESSURE)] += wp.sqrt(square)
-            if spring.normal_energy.shape[0] > 0:
-                pressed_energy += spring.normal_energy[s]
-            else:
-                pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
-            sums[wp.static(SQUARES)] += square
-        sums[wp.static(FRICTION)] += spring.friction[s]
-        sums[wp.static(PLANE_WORK)] += spring.drive[s]
-        impulse += spring.impulse[s]
-        sums[wp.static(NORMAL_IMPULSE)] += spring.normal_impulse[s]
-        sums[wp.static(STICK_IMPULSE)] += spring.stick_impulse[s]
-        sums[wp.static(LOST)] += spring.lost[s]
-        sums[wp.static(MADE)] += spring.made[s]
-        if afresh:
-            spring.impulse[s] = wp.vec3d()
-            spring.normal_impulse[s] = wp.float64(0.0)
-            spring.stick_impulse[s] = wp.float64(0.0)
-    sums[wp.static(NORMAL_ENERGY)] = pressed_energy
-    for c in range(3):
-        sums[wp.static(IMPULSE.start) + c] = impulse[c]
-        sums[wp.static(NORMAL_FORCE.start) + c] = pressed[c]
-    r = row[0]
-    for c in range(wp.static(PASS_COLUMNS)):
-        total = wp.tile_sum(wp.tile(sums[c]))
-        value = total[0]  # executed by all threads, because reading a tile synchronises them
-        if lane == 0:
-            partial_out[r, scene, column + c, k] = value

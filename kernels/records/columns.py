@@ -5,14 +5,16 @@
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK = range(8)
 LOAD_WORK, JOINT_HEAT, CARRIAGE, PASS = range(8, 12)
 
-# Of a pass, as `kernels.contact.spring.sum_springs` sums them. Since the last row of the history: the whole force, the
-# normal forces and those of sticking nodes, each summed over the steps [N]. At the record: vector sum of the normal
-# forces [N], their sum [N], energy of the normal springs [J], energy that springs lost as they became softer [J], sum
-# of the squares of the normal forces [N^2], and energy that springs made as they closed or opened in a step [J].
+# Of a pass, as `kernels.contact.spring_sums.sum_springs` sums them. Since the last row of the history: the whole
+# force, the normal forces and those of sticking nodes, each summed over the steps [N]. At the record: vector sum of
+# the normal forces [N], their sum [N], energy of the normal springs [J], energy that springs lost as they became
+# softer [J], sum of the squares of the normal forces [N^2], energy that springs made as they closed or opened in a
+# step, and energy that dashpots of contact laws dissipated [J].
 SPRING_ENERGY, FRICTION, PLANE_WORK = 0, 1, 2
 IMPULSE, NORMAL_IMPULSE, STICK_IMPULSE = slice(3, 6), 6, 7
 NORMAL_FORCE, PRESSURE, NORMAL_ENERGY, LOST, SQUARES, MADE = slice(8, 11), 11, 12, 13, 14, 15
-PASS_COLUMNS = 16
+DAMPED = 16
+PASS_COLUMNS = 17
 
 # Behind the passes, where a scene has absorbing boundaries: energy that bodies gave to what lies beyond them, in
 # the frame of the body, and work that this does on the bodies as it moves along [J].

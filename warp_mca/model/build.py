@@ -14,6 +14,7 @@ from warp_mca.model.assembly import Assembly
 from warp_mca.model.mass_scaling import check_masses, scale_masses
 from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
+from warp_mca.model.stable_step import with_dashpots
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
 from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
@@ -54,7 +55,8 @@ def _contacts(
             assert sides[0] is not None
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
-            passes.append(replace(item, penalty_given=given))
+            decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
+            passes.append(replace(item, penalty_given=given, decay=decay))
         axes[index] = contact_axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added, tuple(penalties)
 
@@ -98,7 +100,7 @@ def build_model(
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
-    found: dict[str, Any] = {**bodies, **_steps(parts, rigid.bodies, added, velocity), **held, **pairs}
+    found: dict[str, Any] = {**bodies, **_steps(parts, rigid.bodies, added, velocity, passes), **held, **pairs}
     model = Model(
         V=velocity,
         **found,
@@ -138,9 +140,12 @@ def _bodies(parts: Assembly, watched: Sequence[tuple[str, int]]) -> dict[str, An
     }
 
 
-def _steps(parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array) -> dict[str, Any]:
+def _steps(
+    parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array, passes: Sequence[ContactPass]
+) -> dict[str, Any]:
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
     plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
+    stable = with_dashpots(stable, sum(item.decay for item in passes))
     check_masses(parts, scaling)
     return {"stable": stable, "scaling": scaling}

@@ -99,6 +99,11 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
     most = MOST if multi_rate == "auto" else int(multi_rate)
 
     def choose(model: Model, own: OwnSteps) -> Model:
+        if any(item.damping for item in model.passes):
+            if multi_rate == "auto":
+                return model
+            remedy = "contact laws with a dashpot take steps of one rate; leave it out"
+            raise bad_value("multi_rate", multi_rate, remedy)
         if not model.element_count or (multi_rate == "auto" and model.element_count < cost_of(device).least):
             return model
         choices = list(_choices(scene, span, model, own, most))

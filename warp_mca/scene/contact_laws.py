@@ -30,6 +30,11 @@ class ContactLaw(ABC):
     def stiffening(self, depth: float) -> float:
         """Greatest slope dF/dg up to a depth [m], as a multiple of the stiffness k [-]: it bounds the time step."""
 
+    def damping(self, depth: float) -> float:
+        """Greatest slope of the dashpot's force over the rate of approach up to a depth [m], over k [s]: it bounds the
+        time step; 0 for a law without `dashpot`."""
+        return 0.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Penalty(ContactLaw):

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warp_mca.kernels.contact import contact, spring
+from warp_mca.kernels.contact import contact
+from warp_mca.kernels.contact.spring_sums import sum_springs
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.extremes import NormalForce
 from warp_mca.physics.contact.stage import ContactStage, ContactState
@@ -54,7 +55,7 @@ class Contacts(list[ContactStage], Actor):
 
     def record_kernels(self) -> list[Any]:
         """Those of a search and of a record."""
-        return [kernel for stage in self for kernel in (spring.sum_springs, *stage.search_kernels())]
+        return [kernel for stage in self for kernel in (sum_springs, *stage.search_kernels())]
 
     def search_all(self, state: State) -> None:
         """Broad phase of every pass."""
@@ -96,4 +97,4 @@ class Contacts(list[ContactStage], Actor):
     def _sum(self, step: Step, own: ContactStage) -> None:
         """Sums of a pass. In a check between rows, what is summed over an output interval goes on."""
         inputs = [own.column, own.first, step.is_row, step.state.contacts[own.index].spring]
-        self.solver.records.sum_runs(spring.sum_springs, int(np.diff(own.springs).max()), inputs)
+        self.solver.records.sum_runs(sum_springs, int(np.diff(own.springs).max()), inputs)

@@ -12,6 +12,7 @@ from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.step.threads import RANGES
 
 _BITS = 60  # of the whole numbers, below their sign, that springs as deep as their faces are long would fill
+_DASHPOTS = 12  # of these bits that are left to forces of dashpots
 _LARGEST = 1000  # exponent of a scale that a float64 holds, whatever the springs
 _LINE = 8  # numbers in a line of a CPU's cache: two threads that write to one wait for each other
 
@@ -47,4 +48,5 @@ def _scale(passes: Sequence[ContactPass]) -> float:
     stiffness = [item.stiffening * item.sides * float(item.stiffness.sum()) for item in passes]
     reach = [k * max(item.longest, item.deepest) for k, item in zip(stiffness, passes, strict=True)]
     _, exponent = math.frexp(sum(reach))
-    return 2.0 ** min(max(_BITS - exponent, -_LARGEST), _LARGEST)
+    bits = _BITS - (_DASHPOTS if any(item.damping for item in passes) else 0)
+    return 2.0 ** min(max(bits - exponent, -_LARGEST), _LARGEST)

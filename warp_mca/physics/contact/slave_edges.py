@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.contact import contact, edge_shares, edges, spring
-from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.kernels.contact.laws import LINEAR, law_functions
 from warp_mca.step.threads import CONTACT, Split
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def new_springs(stage: ContactStage) -> Any:
     for name in numbers.split():
         setattr(found, name, wp.zeros(count, dtype=wp.float64))
     found.normal_energy = wp.zeros(0 if stage.law == LINEAR else count, dtype=wp.float64)
+    found.dashpot = wp.zeros(0 if law_functions(stage.law).dashpot is None else count, dtype=wp.vec2d)
     found.parameters = stage.parameters
     found.rest = wp.zeros(count if stage.stress_free else sided, dtype=wp.float64)
     found.left = wp.zeros(sided, dtype=wp.float64)

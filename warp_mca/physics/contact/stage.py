@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.contact import contact, nearest, search, sides
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
+from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
 from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.step.threads import CONTACT, Split, whole
@@ -96,6 +97,7 @@ class ContactStage:
         self.mu = _numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
         self.law = items[0].law
+        check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
         self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
         friction = any(item.mu > 0.0 for item in items)

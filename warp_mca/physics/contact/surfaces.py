@@ -64,6 +64,8 @@ class ContactPass:
         mu: coefficient of friction [-].
         law, parameters: module of the contact law, and what its functions read.
         stiffening: greatest slope of the law down to the penetration that stops the run, over the stiffness [-].
+        damping: greatest slope of its dashpot over the rate, over the stiffness [s]; 0 without a dashpot.
+        decay: greatest of what dashpots add to the diagonal of M^-1 C, by the bound of `contact_eigenvalues` [1/s].
         slave_face, slave_offset, face_of_slave: the slave's faces, and those around each slave node, compressed rows,
             int32.
         sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact.
@@ -91,6 +93,8 @@ class ContactPass:
     law: str = field(metadata=AS_IS)
     parameters: tuple[float, ...] = field(metadata=AS_IS)
     stiffening: float = field(metadata=AS_IS)
+    damping: float = field(default=0.0, metadata=AS_IS)
+    decay: float = field(default=0.0, metadata=AS_IS)
     plane: RigidPlane | None = field(default=None, metadata=AS_IS)
     face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32), metadata=of("nodes"))
     face_stiffness: Array = field(default_factory=lambda: np.zeros(0), metadata=AS_IS)
@@ -208,6 +212,7 @@ def _surface_pass(
         law=contact.law.law,
         parameters=contact.law.parameters,
         stiffening=contact.law.stiffening(0.5 * longest),
+        damping=contact.law.damping(0.5 * longest),
         slave_face=slave.node,
         slave_offset=slave_offset,
         face_of_slave=around_slave,
@@ -251,6 +256,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
                 law=contact.law.law,
                 parameters=contact.law.parameters,
                 stiffening=contact.law.stiffening(deepest),
+                damping=contact.law.damping(deepest),
                 sign=1.0,
                 contact=index,
                 plane=contact.master,
