@@ -9,11 +9,11 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum, wait_for_block
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters, Mean, spin_after
 from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState, move, total_force_function
-from warp_mca.kernels.nodes.joint_torque import wait_for_block
 from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
@@ -53,8 +53,7 @@ def load_function(own: Kind) -> Any:
             for c in range(3):
                 total[c] += f[c]
                 total[3 + c] += moment[c]
-        found = wp.tile_sum(wp.tile(total, preserve_type=True))
-        total = found[0]
+        total = block_sum(total)
         sum_F = wp.vec3d(total[0], total[1], total[2])
         sum_T = wp.vec3d(total[3], total[4], total[5])
         if lane == 0:

@@ -40,6 +40,7 @@ from warp_mca.kernels.resident.pin_joint import (
     momentum_row,
     pinned_node,
     pulled,
+    put_pinned,
 )
 
 wp.set_module_options({"enable_backward": False})
@@ -152,18 +153,6 @@ def solve_joint(
         if lane < 2:
             find_impulses(lane, rate, sides, inverse, ahead_out, shared_out)
     barrier()
-
-
-@wp.func
-def put_pinned(
-    one: Pinned,
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-):
-    """Give a node its displacement and velocity."""
-    if one.node >= 0:
-        u_out[one.node] = one.u
-        v_out[one.node] = one.v
 
 
 @cache
