@@ -19,11 +19,10 @@ from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.side_choice import (
     choice_functions,
     first_choice,
-    pressure_function,
     springs_function,
 )
 from warp_mca.kernels.contact.side_reach import front_functions
-from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function

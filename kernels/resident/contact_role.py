@@ -9,10 +9,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of
 from warp_mca.kernels.contact.search import STALE, moved_too_far
-from warp_mca.kernels.contact.settle import meet, settle_functions
-from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.settle import meet_side, settle_functions
+from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
@@ -85,19 +85,11 @@ def nearest_of_lanes(
     return near, holds
 
 
-@wp.func
-def last_pressure(s: int, friction: bool, spring: Spring):
-    """Contact force of a spring along the normal of its last face [N]."""
-    pressed = spring.force[s]
-    if friction:
-        pressed -= spring.tangential[s]
-    return wp.vec3f(pressed)
-
-
 @cache
 def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
     """The function that gives slave nodes their contact forces in each of the kernel's steps."""
     settle, let_go = settle_functions(friction, stress_free, law)
+    pressure = pressure_function(friction)
 
     @wp.func
     def touch_nearest(
@@ -117,13 +109,7 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
     ):
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
-            touch = meet(v, master.face, i, near, dt, held, along)
-            edge = wp.float64(2.0) * wp.sqrt(near.area)
-            touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
-            if passes_by(near.beside, held, near.front, edge):
-                touch.touches = bool(False)
-            touch.own = slaves.stiffness[s]
-            touch.limit = master.stiffness[near.face]
+            touch = meet_side(v, master, i, near, slaves.stiffness[s], dt, held, along)
             contact_force_out[i] = contact_force_out[i] + settle(
                 s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out
             )
@@ -158,7 +144,7 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         x = X[i]
         searched = slaves.u_search[i]
         for n in range(steps):
-            along = last_pressure(s, wp.static(friction), spring)
+            along = wp.vec3f(pressure(s, spring))
             held = spring.held[s]
             if n > 0:
                 wait_for(wp.static(NODES), n * movers, count_out)
