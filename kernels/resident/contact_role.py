@@ -15,6 +15,7 @@ from warp_mca.kernels.contact.settle import meet_side, settle_functions
 from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.shared_memory import shared_functions
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 
 wp.set_module_options({"enable_backward": False})
@@ -95,7 +96,6 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
     def touch_nearest(
         s: int,
         i: int,
-        v: wp.array(dtype=wp.vec3d),
         near: Nearest,
         along: wp.vec3f,
         held: wp.float64,
@@ -103,18 +103,18 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         master: Master,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        state_out: NodeState,
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
-            touch = meet_side(v, master, i, near, slaves.stiffness[s], dt, held, along)
-            contact_force_out[i] = contact_force_out[i] + settle(
+            touch = meet_side(state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
+            state_out.nodal_force[i] = state_out.nodal_force[i] + settle(
                 s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out
             )
         else:
-            let_go(s, i, v, master.face, dt, near.front, held, spring)
+            let_go(s, i, state_out.v, master.face, dt, near.front, held, spring)
 
     @wp.func
     def touch_slaves(
@@ -123,14 +123,12 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         steps: int,
         movers: int,
         X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        v: wp.array(dtype=wp.vec3d),
         slaves: Slaves,
         master: Master,
         dt: wp.float64,
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        state_out: NodeState,
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -149,13 +147,12 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
             if n > 0:
                 wait_for(wp.static(NODES), n * movers, count_out)
             if lane < wp.static(PATCH):
-                near, holds = nearest_of_lanes(X, u, master, s, x + u[i], along, q)
+                near, holds = nearest_of_lanes(X, state_out.u, master, s, x + state_out.u[i], along, q)
                 if exists and holds:
                     touch_nearest(
-                        s, i, v, near, along, held, slaves, master, dt, spring,
-                        contact_force_out, normal_force_out, flag_out,
+                        s, i, near, along, held, slaves, master, dt, spring, state_out, normal_force_out, flag_out
                     )  # fmt: skip
-                if q == 0 and moved_too_far(u[i], searched, slaves.margin):
+                if q == 0 and moved_too_far(state_out.u[i], searched, slaves.margin):
                     flag_out[0, wp.static(STALE)] = 1
             arrive(wp.static(FORCES), count_out)
 
