@@ -58,7 +58,7 @@ def surface_kernel(
         per_newton: Real,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
         recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
@@ -74,7 +74,7 @@ def surface_kernel(
         if near.face >= 0:
             touch = meet_side(v, master, i, near, stiffness[s], dt, held, along)
             force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
-            contact_force_out[i] = contact_force_out[i] + force
+            nodal_force_out[i] = nodal_force_out[i] + force
             if wp.static(noted):
                 recent_out[i] = recent(recent_out[i], force)
         else:
@@ -109,7 +109,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
         scene: Index,
         margin: Real,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -140,7 +140,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
                     total[c] += exchange(total[c], 1 << step)
         if lane == 0:
             if touched > wp.float64(0.0):
-                contact_force_out[i] = contact_force_out[i] + total
+                nodal_force_out[i] = nodal_force_out[i] + total
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], total)
             if moved_too_far(u[i], u_search[i], of(margin, k)):
@@ -177,7 +177,7 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str
         per_newton: Real,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -197,7 +197,7 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str
             force, F_n = press(s, gap, normal, du, stiffness[s], stiffness[s], of(mu, k), spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
-            contact_force_out[i] = contact_force_out[i] + force
+            nodal_force_out[i] = nodal_force_out[i] + force
         elif spring.face[s] >= 0:
             open_contact(s, du, stiffness[s], spring)
         if wp.static(friction):  # work of the plane's own motion, trapezoidal as for slip

@@ -29,7 +29,7 @@ def carry_kernel(sides: int) -> Any:
         first: int,
         slaves: SlaveFaces,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
     ):
         wait_for_previous()
         let_next_begin()
@@ -50,7 +50,7 @@ def carry_kernel(sides: int) -> Any:
                     if spring.support[e] == 2 * g + back:
                         total += (wp.float64(1.0) - spring.share[e]) * spring.force[e]
         if wp.length_sq(total) > wp.float64(0.0):
-            contact_force_out[i] = contact_force_out[i] + total
+            nodal_force_out[i] = nodal_force_out[i] + total
 
     return begins_early(carry)
 

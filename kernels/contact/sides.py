@@ -61,7 +61,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
         per_newton: Real,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
         recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
@@ -103,7 +103,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
                         of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
                     )  # fmt: skip
         if node.active:
-            contact_force_out[i] = contact_force_out[i] + total
+            nodal_force_out[i] = nodal_force_out[i] + total
             recent_out[i] = recent(recent_out[i], total)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
