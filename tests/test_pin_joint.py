@@ -88,7 +88,7 @@ def test_one_block_joins_clusters_as_the_stages_of_a_step_do(scene):
     v_free, turn = wp.clone(state.v), wp.array(before.couplings.orientation.numpy()[0].copy(), dtype=wp.quatd)
     solver.couplings.couple(Step(state))
     nodes = Nodes()
-    nodes.mass = solver.work.mass
+    nodes.data = solver.nodes.given(state)[0]
     pool, inverse = wp.zeros(pin_joint.SIDES, dtype=wp.float64), wp.zeros(1, dtype=Inverse)
     sides, ahead = wp.zeros(2, dtype=Side), wp.zeros(2, dtype=Ahead)
     shared = wp.zeros(pin_joint.VECTORS, dtype=wp.vec3d)

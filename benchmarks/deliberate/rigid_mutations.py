@@ -14,13 +14,13 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
     "rigid_gravity_halved": Mutation(
         "a rigid body feels half of gravity",
         "kernels/nodes/rigid_body.py",
-        "sum_F + bodies.mass[b] * bodies.gravity[b]",
-        "sum_F + wp.float64(0.5) * bodies.mass[b] * bodies.gravity[b]",
+        "kick * (sum_F + weight)",
+        "kick * (sum_F + wp.float64(0.5) * weight)",
     ),
     "row_forgets_second": Mutation(
         "joints between rigid bodies give the second one no moment",
         "kernels/nodes/rigid_rows.py",
-        "spin_out[b] = spin_out[b] - value[r]",
-        "spin_out[b] = spin_out[b] - wp.float64(0.0) * value[r]",
+        "poses_out.spin[b] - size *",
+        "poses_out.spin[b] - wp.float64(0.0) * size *",
     ),
 }

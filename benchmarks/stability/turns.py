@@ -17,6 +17,7 @@ from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.floating import follow_bodies
 from warp_mca.kernels.nodes.hinge import quickly_turned
 from warp_mca.kernels.nodes.rigid_body import move_on
+from warp_mca.kernels.nodes.rigid_motion import Poses, RigidStep
 
 REVOLUTIONS = 1_000_000
 AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
@@ -30,16 +31,13 @@ Found = tuple[list[Figure], int]  # figures, and number of increments
 def turn_body(
     revolutions: int,
     parts: int,
-    turn: wp.array(dtype=wp.vec3d),
-    velocity: wp.array(dtype=wp.vec3d),
-    centre_out: wp.array(dtype=wp.vec3d),
-    rotation_out: wp.array(dtype=wp.quatd),
-    turned_out: wp.array(dtype=wp.mat33d),
+    poses_out: Poses,
+    step_out: RigidStep,
 ):
     """Apply so many equal steps to the pose of a rigid body."""
     for _ in range(revolutions):
         for _ in range(parts):
-            move_on(0, wp.float64(0.0), True, turn, velocity, centre_out, rotation_out, turned_out)
+            move_on(0, wp.float64(0.0), True, poses_out, step_out)
 
 
 @cache
@@ -102,11 +100,12 @@ def _of_quaternion(q: np.ndarray, turned_by: float, angle_allowed: float = 1e-6)
 def rigid_body(precision: str, device: str) -> Found:
     """`move_on`, by Cayley's form of the rotation of a step."""
     angle = 2.0 * math.pi / (COARSE - LESS)
-    turn = wp.array([AXIS * math.tan(0.5 * angle)], dtype=wp.vec3d, device=device)
-    zero, rotation = wp.zeros(1, dtype=wp.vec3d, device=device), _rotation(device)
-    Q = wp.zeros(1, dtype=wp.mat33d, device=device)
-    wp.launch(turn_body, 1, [REVOLUTIONS, COARSE, turn, zero], [wp.zeros_like(zero), rotation, Q], device=device)
-    return _of_quaternion(rotation.numpy()[0], REVOLUTIONS * COARSE * angle), REVOLUTIONS * COARSE
+    poses, step = Poses(), RigidStep()
+    step.turn = wp.array([AXIS * math.tan(0.5 * angle)], dtype=wp.vec3d, device=device)
+    step.velocity, poses.centre = (wp.zeros(1, dtype=wp.vec3d, device=device) for _ in range(2))
+    step.turned, poses.rotation = wp.zeros(1, dtype=wp.mat33d, device=device), _rotation(device)
+    wp.launch(turn_body, 1, [REVOLUTIONS, COARSE], [poses, step], device=device)
+    return _of_quaternion(poses.rotation.numpy()[0], REVOLUTIONS * COARSE * angle), REVOLUTIONS * COARSE
 
 
 def _pin(quick: bool) -> Callable[[str, str], Found]:

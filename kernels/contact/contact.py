@@ -6,10 +6,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.laws import LINEAR
-from warp_mca.kernels.contact.nearest import Master, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, nearest_face
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
-from warp_mca.kernels.contact.settle import meet, settle_functions
-from warp_mca.kernels.contact.spring import Spring, open_function, rest_function, spring_function
+from warp_mca.kernels.contact.settle import meet_side, settle_functions
+from warp_mca.kernels.contact.spring import Spring, open_function, pressure_function, rest_function, spring_function
 from warp_mca.kernels.contact.way_back import recent
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
@@ -39,6 +39,7 @@ def surface_kernel(
     contact law. `noted`: keep the recent force on each node, which masters with several sides need.
     """
     settle, let_go = settle_functions(friction, stress_free, law)
+    pressure = pressure_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
@@ -57,7 +58,7 @@ def surface_kernel(
         per_newton: Real,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
         recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
@@ -67,22 +68,13 @@ def surface_kernel(
         s = first + wp.tid()
         i = slave[s]
         k = of(scene, s)
-        pressed = spring.force[s]
-        if wp.static(friction):
-            pressed -= spring.tangential[s]
-        along = wp.vec3f(pressed)
+        along = wp.vec3f(pressure(s, spring))
         near = nearest_face(X, u, master, s, X[i] + u[i], along)
         held = spring.held[s]
         if near.face >= 0:
-            touch = meet(v, master.face, i, near, dt, held, along)
-            edge = wp.float64(2.0) * wp.sqrt(near.area)
-            touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
-            if passes_by(near.beside, held, near.front, edge):
-                touch.touches = bool(False)
-            touch.own = stiffness[s]
-            touch.limit = master.stiffness[near.face]
+            touch = meet_side(v, master, i, near, stiffness[s], dt, held, along)
             force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
-            contact_force_out[i] = contact_force_out[i] + force
+            nodal_force_out[i] = nodal_force_out[i] + force
             if wp.static(noted):
                 recent_out[i] = recent(recent_out[i], force)
         else:
@@ -117,7 +109,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
         scene: Index,
         margin: Real,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -148,7 +140,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
                     total[c] += exchange(total[c], 1 << step)
         if lane == 0:
             if touched > wp.float64(0.0):
-                contact_force_out[i] = contact_force_out[i] + total
+                nodal_force_out[i] = nodal_force_out[i] + total
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], total)
             if moved_too_far(u[i], u_search[i], of(margin, k)):
@@ -185,7 +177,7 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str
         per_newton: Real,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -205,7 +197,7 @@ def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str
             force, F_n = press(s, gap, normal, du, stiffness[s], stiffness[s], of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
-            contact_force_out[i] = contact_force_out[i] + force
+            nodal_force_out[i] = nodal_force_out[i] + force
         elif spring.face[s] >= 0:
             open_contact(s, du, stiffness[s], spring)
         if wp.static(friction):  # work of the plane's own motion, trapezoidal as for slip

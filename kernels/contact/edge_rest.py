@@ -12,10 +12,10 @@ import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
 from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, lies_below, middle, neighbour
-from warp_mca.kernels.contact.nearest import ABOVE, Master, Nearest, nearest_face, reachable
+from warp_mca.kernels.contact.nearest import ABOVE, Master, Nearest, edge_of, nearest_face, reachable
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
-from warp_mca.kernels.contact.side_choice import NodeSprings, pressure_function
-from warp_mca.kernels.contact.spring import FAR, Spring
+from warp_mca.kernels.contact.side_choice import NodeSprings
+from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, slides_at, usual_depth
 
 wp.set_module_options({"enable_backward": False})
@@ -99,7 +99,7 @@ def meet_edge(
     touch.own = slaves.stiffness[s]
     touch.limit = master.stiffness[near.face]
     touch.begins = wp.float64(0.0)
-    edge = wp.float64(2.0) * wp.sqrt(near.area)
+    edge = edge_of(near)
     approach = wp.dot(touch.du, near.normal)
     if spring.support[e] >= 0:
         touch.touches = reachable(-near.gap, touch.held, wp.float64(FAR), approach, edge)

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces, neighbour
-from warp_mca.kernels.contact.search import OVERFLOW
+from warp_mca.kernels.contact.search import list_slave, root_function, sort_row
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
@@ -29,7 +29,7 @@ def carry_kernel(sides: int) -> Any:
         first: int,
         slaves: SlaveFaces,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
     ):
         wait_for_previous()
         let_next_begin()
@@ -50,27 +50,16 @@ def carry_kernel(sides: int) -> Any:
                     if spring.support[e] == 2 * g + back:
                         total += (wp.float64(1.0) - spring.share[e]) * spring.force[e]
         if wp.length_sq(total) > wp.float64(0.0):
-            contact_force_out[i] = contact_force_out[i] + total
+            nodal_force_out[i] = nodal_force_out[i] + total
 
     return begins_early(carry)
-
-
-@wp.func
-def sort_row(row: int, count: wp.array(dtype=wp.int32), candidate_out: wp.array2d(dtype=wp.int32)):
-    """Sort a list of faces, so that ties between equally near faces at a seam do not depend on the search."""
-    for a in range(1, count[row]):
-        value = candidate_out[row, a]
-        b = a - 1
-        while b >= 0 and candidate_out[row, wp.max(b, 0)] > value:
-            candidate_out[row, b + 1] = candidate_out[row, b]
-            b = b - 1
-        candidate_out[row, b + 1] = value
 
 
 @cache
 def along_edges_kernel(each: bool, sides: int) -> Any:
     """Kernel: add the faces along the slave's edges to the lists of nodes that slid off, or may; sort all lists."""
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
+    root_of = root_function(each)
 
     @wp.kernel(enable_backward=False, module="unique")
     def list_along_edges(
@@ -91,9 +80,7 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
         s = wp.tid()
         i = slaves.node[s]
         k = of(scene, s)
-        root = int(-1)  # of all faces
-        if wp.static(each):
-            root = wp.bvh_get_group_root(bvh, k)
+        root = root_of(bvh, k)
         slid = bool(False)
         listed = int(0)
         for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
@@ -116,12 +103,8 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
                         if not known:
                             candidate_out[row, found] = f
                             count_out[row] = found + 1
-                            place = wp.atomic_add(face_count_out, f, 1)
-                            if place < face_slave_out.shape[1]:
-                                face_slave_out[f, place] = row
-                            else:
-                                flag_out[k, OVERFLOW] = 1
-        for p in range(wp.static(sides)):
-            sort_row(wp.static(sides) * s + p, count_out, candidate_out)
+                            list_slave(f, row, k, face_count_out, face_slave_out, flag_out)
+        for p in range(wp.static(sides)):  # crossings lie on seams, where the first of equally near faces is taken
+            sort_row(wp.static(sides) * s + p, count_out[wp.static(sides) * s + p], candidate_out)
 
     return list_along_edges

@@ -59,6 +59,12 @@ class Nearest:
 
 
 @wp.func
+def edge_of(near: Nearest) -> wp.float64:
+    """Edge of a square face as large as the nearest one [m]."""
+    return wp.float64(2.0) * wp.sqrt(near.area)
+
+
+@wp.func
 def master_velocity(
     v: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int, weight: wp.vec4d
 ) -> wp.vec3d:

@@ -17,6 +17,49 @@ _EQUAL = 1e-6  # relative difference of distances up to which faces share the ne
 
 
 @cache
+def root_function(each: bool) -> Any:
+    """The function that gives the root of the faces to search: those of scene k of a batch, or all."""
+
+    @wp.func
+    def root_of(bvh: wp.uint64, k: int):
+        root = int(-1)
+        if wp.static(each):
+            root = wp.bvh_get_group_root(bvh, k)
+        return root
+
+    return root_of
+
+
+@wp.func
+def list_slave(
+    f: int,
+    row: int,
+    k: int,
+    face_count_out: wp.array(dtype=wp.int32),
+    face_slave_out: wp.array2d(dtype=wp.int32),
+    flag_out: wp.array2d(dtype=wp.int32),
+):
+    """Add a slave's list to those of face f, in any order; a full list raises the flag of scene k."""
+    place = wp.atomic_add(face_count_out, f, 1)
+    if place < face_slave_out.shape[1]:
+        face_slave_out[f, place] = row
+    else:
+        flag_out[k, OVERFLOW] = 1
+
+
+@wp.func
+def sort_row(row: int, count: int, list_out: wp.array2d(dtype=wp.int32)):
+    """Sort the first `count` entries of a row."""
+    for a in range(1, count):
+        value = list_out[row, a]
+        b = a - 1
+        while b >= 0 and list_out[row, wp.max(b, 0)] > value:  # Warp evaluates both sides of `and`
+            list_out[row, b + 1] = list_out[row, b]
+            b = b - 1
+        list_out[row, b + 1] = value
+
+
+@cache
 def bounds_kernel(each: bool) -> Any:
     """Kernel: bounding box of each face, extended inwards by the size of the face and by the margin on all sides.
 
@@ -66,7 +109,7 @@ def candidates_kernel(each: bool, sides: int) -> Any:
     number of that list in place of the slave.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
-    of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
+    of_face, Side, root_of = value_function(sides > 1), kind(wp.int32, sides > 1), root_function(each)
 
     @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
     def find_candidates(
@@ -90,10 +133,7 @@ def candidates_kernel(each: bool, sides: int) -> Any:
         k = of(scene, s)
         x = X[i] + u[i] - of(origin, k)
         point = wp.vec3f(wp.float32(x[0]), wp.float32(x[1]), wp.float32(x[2]))
-        root = int(-1)  # of all faces
-        if wp.static(each):
-            root = wp.bvh_get_group_root(bvh, k)
-        query = wp.bvh_query_aabb(bvh, point, point, root)
+        query = wp.bvh_query_aabb(bvh, point, point, root_of(bvh, k))
         f = int(0)
         found = int(0)
         if wp.static(sides > 1):
@@ -105,11 +145,7 @@ def candidates_kernel(each: bool, sides: int) -> Any:
                 found = count_out[row]
             if found < candidate_out.shape[1]:
                 candidate_out[row, found] = f
-                place = wp.atomic_add(face_count_out, f, 1)
-                if place < face_slave_out.shape[1]:
-                    face_slave_out[f, place] = row
-                else:
-                    flag_out[k, OVERFLOW] = 1
+                list_slave(f, row, k, face_count_out, face_slave_out, flag_out)
             else:
                 flag_out[k, OVERFLOW] = 1
             found += 1
@@ -157,7 +193,7 @@ def clear_kernel(each: bool, sides: int) -> Any:
     a node in the plane of one face but beyond its edge, the other face tells inside from outside.
     """
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
-    of_face, Side = value_function(sides > 1), kind(wp.int32, sides > 1)
+    of_face, Side, root_of = value_function(sides > 1), kind(wp.int32, sides > 1), root_function(each)
 
     @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
     def find_clear(
@@ -180,10 +216,7 @@ def clear_kernel(each: bool, sides: int) -> Any:
         reach = of(longest, k)
         lower = wp.vec3f(wp.float32(point[0] - reach), wp.float32(point[1] - reach), wp.float32(point[2] - reach))
         upper = wp.vec3f(wp.float32(point[0] + reach), wp.float32(point[1] + reach), wp.float32(point[2] + reach))
-        root = int(-1)  # of all faces
-        if wp.static(each):
-            root = wp.bvh_get_group_root(bvh, k)
-        query = wp.bvh_query_aabb(bvh, lower, upper, root)
+        query = wp.bvh_query_aabb(bvh, lower, upper, root_of(bvh, k))
         f = int(0)
         nearest = wp.float64(wp.inf)
         plane = wp.float64(-1.0)  # distance to the plane of the nearest face
@@ -225,14 +258,7 @@ def sort_lists(
 ):
     """Sort each face's slaves: threads filled the lists in any order, and sums must repeat bit for bit."""
     f = wp.tid()
-    n = wp.min(face_count[f], face_slave_out.shape[1])
-    for a in range(1, n):
-        value = face_slave_out[f, a]
-        b = a - 1
-        while b >= 0 and face_slave_out[f, b] > value:
-            face_slave_out[f, b + 1] = face_slave_out[f, b]
-            b = b - 1
-        face_slave_out[f, b + 1] = value
+    sort_row(f, wp.min(face_count[f], face_slave_out.shape[1]), face_slave_out)
 
 
 @wp.kernel(enable_backward=False)

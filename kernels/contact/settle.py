@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.nearest import Nearest, master_velocity
+from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, master_velocity, passes_by, reachable
 from warp_mca.kernels.contact.projection import weights_at
 from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, open_function, rest_function, spring_function
@@ -61,6 +61,28 @@ def meet(
     touch.along = along
     touch.begins = wp.float64(FAR)
     touch.dt = dt
+    return touch
+
+
+@wp.func
+def meet_side(
+    v: wp.array(dtype=wp.vec3d),
+    master: Master,
+    i: int,
+    near: Nearest,
+    own: wp.float64,
+    dt: wp.float64,
+    held: wp.float64,
+    along: wp.vec3f,
+) -> Touch:
+    """How node i, whose penalty stiffness is `own`, meets the nearest face of a master that has a single side."""
+    touch = meet(v, master.face, i, near, dt, held, along)
+    edge = edge_of(near)
+    touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
+    if passes_by(near.beside, held, near.front, edge):
+        touch.touches = bool(False)
+    touch.own = own
+    touch.limit = master.stiffness[near.face]
     return touch
 
 

@@ -6,9 +6,9 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
-from warp_mca.kernels.contact.nearest import Master, Nearest
+from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of
 from warp_mca.kernels.contact.settle import Touch
-from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
+from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function
 
 wp.set_module_options({"enable_backward": False})
@@ -76,20 +76,6 @@ def first_choice(node: NodeSprings) -> Choice:
     choice.depth = wp.float64(FAR)
     choice.begins = wp.float64(FAR)
     return choice
-
-
-@cache
-def pressure_function(friction: bool) -> Any:
-    """The function that gives the normal force of a spring on its node [N]."""
-
-    @wp.func
-    def pressure(e: int, spring: Spring):
-        force = spring.force[e]
-        if wp.static(friction):
-            force -= spring.tangential[e]
-        return force
-
-    return pressure
 
 
 @cache
@@ -185,7 +171,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
                 other = keeper(X, u, master, near.face, node.begin, spring)
             if touches and other < 0:
                 way = way_back(X, u, master, slave_faces, s, node.begin, e, near, along, spring, recent_force)
-        edge = wp.float64(2.0) * wp.sqrt(near.area)
+        edge = edge_of(near)
         approach = -wp.dot(touch.du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
         if other >= 0 or way.spring >= 0:

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, lies_below, opposition
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, nearest_face, passes_by, reachable
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.contact.way_back import OPPOSES, slides_at, usual_depth
@@ -35,7 +35,7 @@ def belongs_to_other_side(
         if mine < wp.float64(OPPOSES) or (near.beside and mine < its + wp.float64(OPPOSES)):
             found = bool(True)
         elif its >= wp.float64(OPPOSES):
-            edge = wp.float64(2.0) * wp.sqrt(near.area)
+            edge = edge_of(near)
             usual = usual_depth(master, slave_faces, s, other, wp.normalize(across), recent_force)
             found = slides_at(gap, usual, edge)
     return found
@@ -48,7 +48,7 @@ def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float6
     `fold` is the distance to the nearest face that has the node in front of it, or 0 if the side did not press it
     before.
     """
-    edge = wp.float64(2.0) * wp.sqrt(near.area)
+    edge = edge_of(near)
     found = reachable(-near.gap, held, fold, approach, edge)
     if node.released > wp.float64(0.0) and not node.holding:  # it may have slid over an edge
         found = found or reachable(-near.gap, node.released, wp.float64(0.0), approach, edge)
@@ -103,7 +103,7 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         front_face: Faces,
         recent_force: wp.array(dtype=wp.vec3d),
     ) -> bool:
-        edge = wp.float64(2.0) * wp.sqrt(near.area)
+        edge = edge_of(near)
         fold = wp.where(pressed, near.front, wp.float64(0.0))
         found = in_reach(near, node, held, fold, -wp.dot(du, near.normal))
         for p in range(wp.static(sides)):

@@ -19,11 +19,10 @@ from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.side_choice import (
     choice_functions,
     first_choice,
-    pressure_function,
     springs_function,
 )
 from warp_mca.kernels.contact.side_reach import front_functions
-from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
@@ -62,7 +61,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
         per_newton: Real,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array(dtype=wp.int64),
         recent_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
@@ -104,7 +103,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
                         of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
                     )  # fmt: skip
         if node.active:
-            contact_force_out[i] = contact_force_out[i] + total
+            nodal_force_out[i] = nodal_force_out[i] + total
             recent_out[i] = recent(recent_out[i], total)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1

@@ -84,6 +84,20 @@ def normal_energy(s: int, pressed: wp.vec3d, k: wp.float64, spring: Spring):
 
 
 @cache
+def pressure_function(friction: bool) -> Any:
+    """The function that gives the normal force of a spring on its node [N]."""
+
+    @wp.func
+    def pressure(e: int, spring: Spring):
+        force = spring.force[e]
+        if wp.static(friction):
+            force -= spring.tangential[e]
+        return force
+
+    return pressure
+
+
+@cache
 def rest_function(stress_free: bool) -> Any:
     """The function that measures a gap from the depth at which a spring is free: 0, or the overlap at the start.
 

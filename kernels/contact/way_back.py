@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces, is_on_rim, lies_below, opposition
-from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Master, Nearest, nearest_face
+from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Master, Nearest, edge_of, nearest_face
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
 wp.set_module_options({"enable_backward": False})
@@ -124,7 +124,7 @@ def way_back_function(sides: int) -> Any:
         way = WayBack()
         way.spring = -1
         shallowest = wp.float64(FAR)
-        edge = wp.float64(2.0) * wp.sqrt(near.area)
+        edge = edge_of(near)
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
                 home = nearest_face(X, u, master, q, X[i] + u[i], along)

@@ -17,6 +17,7 @@ from warp_mca.kernels.nodes.gather import (
     split_level,
     total_force_function,
 )
+from warp_mca.kernels.records.half_steps import add_half_steps
 
 wp.set_module_options({"enable_backward": False})
 
@@ -99,12 +100,8 @@ def absorbing_kernel(own: Kind, springs: bool) -> Any:
         free = before + step * acceleration(i, total, nodes.inverse_mass[i], nodes, scene, gravity)
         v, w = dampen(before, free, v_body, dashpots.share[k])
         half = wp.float64(0.5) * step * (dashpots.damping[k] * w + spring)
-        impulse = impulse_after_out[k] + half
-        absorbed = absorbed_after_out[k] + wp.dot(half, before - v_body)
-        impulse_out[k] = impulse
-        impulse_after_out[k] = impulse + half
-        absorbed_out[k] = absorbed
-        absorbed_after_out[k] = absorbed + wp.dot(half, v - v_body)
+        add_half_steps(k, half, half, impulse_out, impulse_after_out)
+        add_half_steps(k, wp.dot(half, before - v_body), wp.dot(half, v - v_body), absorbed_out, absorbed_after_out)
         if wp.static(springs):
             stretch_out[k] = stretch_out[k] + step * (v - v_body)
         move(i, state_out.u[i] + step * v, v, state_out)

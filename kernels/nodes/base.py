@@ -12,6 +12,7 @@ import warp as wp
 
 from warp_mca.kernels.nodes.constraint import table_value
 from warp_mca.kernels.records.extremes import keep_speed
+from warp_mca.kernels.records.half_steps import add_half_steps
 
 wp.set_module_options({"enable_backward": False})
 
@@ -97,10 +98,10 @@ def move_bases(
     b = base_velocity(bases, k, t - dt)
     across_before = b - wp.dot(e, b) * e
     impulse = total * v - momentum
-    work = work_after_out[k] + wp.float64(0.5) * wp.dot(impulse, across_before)
-    work_out[k] = work
+    half = wp.float64(0.5)
+    add_half_steps(k, half * wp.dot(impulse, across_before), half * wp.dot(impulse, across), work_out, work_after_out)
     weight = bases.mass[k] * bases.gravity[k]
-    work_after_out[k] = work + wp.float64(0.5) * wp.dot(impulse, across) + dt * wp.dot(weight, v)
+    work_after_out[k] = work_after_out[k] + dt * wp.dot(weight, v)
     kinetic_out[k] = wp.float64(0.5) * bases.mass[k] * wp.dot(v_carriage, v)
     for pair in range(bases.begin[k], bases.end[k]):
         i = node[pair]

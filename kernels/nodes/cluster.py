@@ -18,6 +18,7 @@ in `kernels.nodes.slide`. What one linear solve leaves of order (dt w)^2 is made
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.nodes.coupling import Response, inertia_about
 from warp_mca.kernels.records.extremes import keep_speed
 
@@ -147,8 +148,7 @@ def cluster_sums(
         for c in range(3):
             total[wp.static(SUM_COUNT) + c] += p[c]
             total[wp.static(SUM_COUNT + 3) + c] += L[c]
-    found = wp.tile_sum(wp.tile(total, preserve_type=True))
-    return found[0]
+    return block_sum(total)
 
 
 @wp.func

@@ -16,6 +16,7 @@ from warp_mca.kernels.nodes.gather import (
     move,
     total_force_function,
 )
+from warp_mca.kernels.records.half_steps import add_half_steps
 
 wp.set_module_options({"enable_backward": False})
 
@@ -87,18 +88,17 @@ def drive(
     begin = bonds.begin[k]
     end = bonds.end[k]
     v = free
-    work = work_after_out[k]
-    after = work
+    work = wp.vec3d()
+    work_after = wp.vec3d()
     for c in range(3):
         if begin[c] >= 0:
             target = table_value(bonds.times, bonds.values, begin[c], end[c], t)
             before = table_value(bonds.times, bonds.values, begin[c], end[c], t - dt)
             half_impulse = wp.float64(0.5) * m * (target - free[c])
             v[c] = target
-            work[c] = work[c] + half_impulse * before
-            after[c] = work[c] + half_impulse * target
-    work_out[k] = work
-    work_after_out[k] = after
+            work[c] = half_impulse * before
+            work_after[c] = half_impulse * target
+    add_half_steps(k, work, work_after, work_out, work_after_out)
     return v
 
 

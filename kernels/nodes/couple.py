@@ -6,6 +6,7 @@ block then solves for the impulses of its coupling by itself, so that no block w
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum, wait_for_block
 from warp_mca.kernels.nodes.base import Bases, base_velocity
 from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, arm_before, cluster_sums, pull, spin_after
 from warp_mca.kernels.nodes.coupling import Inverse
@@ -19,7 +20,6 @@ from warp_mca.kernels.nodes.hinge import (
     quickly_turned,
     side_of,
 )
-from warp_mca.kernels.nodes.joint_torque import wait_for_block
 
 wp.set_module_options({"enable_backward": False})
 
@@ -73,8 +73,7 @@ def sum_of_parts(first: int, end: int, lane: int, sums: wp.array(dtype=Sums)) ->
     total = Sums()
     for k in range(first + lane, end, wp.block_dim()):
         total += sums[k]
-    found = wp.tile_sum(wp.tile(total, preserve_type=True))
-    return found[0]
+    return block_sum(total)
 
 
 @wp.func
@@ -143,8 +142,7 @@ def sum_momenta(
         for c in range(3):
             total[c] += p[c]
             total[3 + c] += L[c]
-    found = wp.tile_sum(wp.tile(total, preserve_type=True))
-    total = found[0]
+    total = block_sum(total)
     if lane == 0:
         if where[1] == 1:
             for c in range(6):
@@ -184,8 +182,7 @@ def couple_parts(
     total = Momenta()
     for k in range(first[0] + lane, first[2], wp.block_dim()):
         total += momenta[k]
-    found = wp.tile_sum(wp.tile(total, preserve_type=True))
-    total = found[0]
+    total = block_sum(total)
     one = side[j, 0]
     other = side[j, 1]
     P = point[j]

@@ -13,8 +13,10 @@ theta grows clockwise.
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum, wait_for_block
 from warp_mca.kernels.nodes.constraint import table_value
 from warp_mca.kernels.records.extremes import keep_speed
+from warp_mca.kernels.records.half_steps import add_half_steps
 
 wp.set_module_options({"enable_backward": False})
 
@@ -43,26 +45,6 @@ class HingeLoads:
     table: wp.array(dtype=wp.int32)
     times: wp.array(dtype=wp.float64)
     torques: wp.array(dtype=wp.float64)
-
-
-_BARRIER = """
-#if defined(__CUDA_ARCH__)
-__syncthreads();
-#endif
-"""
-
-
-@wp.func_native(_BARRIER)
-def wait_for_block():
-    """Wait for all threads of the block, which on a CPU has one."""
-    ...
-
-
-@wp.func
-def block_sum(value: wp.float64) -> wp.float64:
-    """Sum over the threads of a block, in a fixed order."""
-    total = wp.tile_sum(wp.tile(value))
-    return total[0]
 
 
 @wp.func
@@ -219,9 +201,7 @@ def joint_torques(
             rate_after = free + kick * lightness * couple
             half = wp.float64(0.5) * drift
             torques = wp.vec2d(drive, friction)
-            work = work_after_out[j] + half * rate_before * torques
-            work_out[j] = work
-            work_after_out[j] = work + half * rate_after * torques
+            add_half_steps(j, half * rate_before * torques, half * rate_after * torques, work_out, work_after_out)
             spin_out[j] = wp.vec2d(inner[2] + kick * couple, outer[2] - kick * couple)
             if drift > wp.float64(0.0):
                 clock_out[j] = n + 1

@@ -18,6 +18,8 @@ The scheme is symplectic, so that the energy of a free body does not drift.
 
 import warp as wp
 
+from warp_mca.kernels.nodes.cluster import Mean
+
 wp.set_module_options({"enable_backward": False})
 
 SOLVES = 50  # steps of Newton's method at most
@@ -52,6 +54,65 @@ class RigidBodies:
     sign: wp.array(dtype=wp.float64)
 
 
+@wp.struct
+class Poses:
+    """State of the rigid bodies, see `physics.rigid.stage.RigidState`.
+
+    Attributes:
+        centre: displacement of each mass centre [m], shape (body_count,), vec3d.
+        rotation: Q of each body, a unit quaternion [-], shape (body_count,), quatd.
+        momentum: P at the latest half step [kg m/s], shape (body_count,), vec3d.
+        spin: L at the latest half step [kg m^2/s], shape (body_count,), vec3d.
+        orientation: rotation of the cluster of each pin [-], shape (pin_count,), quatd.
+    """
+
+    centre: wp.array(dtype=wp.vec3d)
+    rotation: wp.array(dtype=wp.quatd)
+    momentum: wp.array(dtype=wp.vec3d)
+    spin: wp.array(dtype=wp.vec3d)
+    orientation: wp.array(dtype=wp.quatd)
+
+
+@wp.struct
+class RigidStep:
+    """What a step of the rigid bodies computes and forgets.
+
+    Attributes:
+        force: on each node that forces may act on [N], shape (loaded_count,), vec3d.
+        turn: f of each body [-], shape (body_count,), vec3d.
+        velocity: V of each mass centre [m/s], shape (body_count,), vec3d.
+        rate: D = (Q(n+1) - Q(n)) / span of each body [1/s], shape (body_count,), mat33d: nodes move by v_i = V + D R_i.
+        turned: Q - I after the step [-], shape (body_count,), mat33d.
+        normal: n of each row at t(n) [-], shape (row_count,), vec3d.
+        twist: of each row at t(n) [-], shape (row_count,), vec3d.
+        lever: moments of a unit impulse of each row in the frames of its two bodies [m], shape (row_count, 2), vec3d.
+        gap: speed that closes the opening of each row in the step [m/s], shape (row_count,), float64.
+        value: speeds at which rows open, then their impulses [m/s], [N s], shape (row_count,), float64.
+        matrix: opening speeds due to unit impulses, group by group, then factorised [1/kg], float64.
+        mean: motion of each pin's cluster after the free step, shape (pin_count,), Mean.
+        point: P of each pin at t(n), from the place at the start [m], shape (pin_count,), vec3d.
+        impulse: J and T of each pin on its cluster [N s], [N m s], shape (pin_count, 2), vec3d.
+        place, axis: of each pin on its cluster at t(n+1) [m], [-], shape (pin_count,), vec3d.
+    """
+
+    force: wp.array(dtype=wp.vec3d)
+    turn: wp.array(dtype=wp.vec3d)
+    velocity: wp.array(dtype=wp.vec3d)
+    rate: wp.array(dtype=wp.mat33d)
+    turned: wp.array(dtype=wp.mat33d)
+    normal: wp.array(dtype=wp.vec3d)
+    twist: wp.array(dtype=wp.vec3d)
+    lever: wp.array2d(dtype=wp.vec3d)
+    gap: wp.array(dtype=wp.float64)
+    value: wp.array(dtype=wp.float64)
+    matrix: wp.array(dtype=wp.float64)
+    mean: wp.array(dtype=Mean)
+    point: wp.array(dtype=wp.vec3d)
+    impulse: wp.array2d(dtype=wp.vec3d)
+    place: wp.array(dtype=wp.vec3d)
+    axis: wp.array(dtype=wp.vec3d)
+
+
 @wp.func
 def turned_by(q: wp.quatd) -> wp.mat33d:
     """Q - I of a unit quaternion, without the difference of large numbers."""
@@ -77,22 +138,12 @@ def step_rotation(J: wp.mat33d, inverse_J: wp.mat33d, m: wp.vec3d, span: wp.floa
 
 
 @wp.func
-def find_motion(
-    b: int,
-    bodies: RigidBodies,
-    span: wp.float64,
-    rotation: wp.array(dtype=wp.quatd),
-    momentum: wp.array(dtype=wp.vec3d),
-    spin: wp.array(dtype=wp.vec3d),
-    turn_out: wp.array(dtype=wp.vec3d),
-    velocity_out: wp.array(dtype=wp.vec3d),
-    rate_out: wp.array(dtype=wp.mat33d),
-):
-    """Motion of a body in the step: f, velocity V of its centre and D = (Q(n+1) - Q(n)) / span: v_i = V + D R_i."""
-    q = rotation[b]
-    f = step_rotation(bodies.inertia[b], bodies.inverse_inertia[b], wp.quat_rotate_inv(q, spin[b]), span)
-    turn_out[b] = f
-    velocity_out[b] = momentum[b] / bodies.mass[b]
+def find_motion(b: int, bodies: RigidBodies, span: wp.float64, poses: Poses, step_out: RigidStep):
+    """Motion of a body in the step: f, the velocity V of its centre, and D."""
+    q = poses.rotation[b]
+    f = step_rotation(bodies.inertia[b], bodies.inverse_inertia[b], wp.quat_rotate_inv(q, poses.spin[b]), span)
+    step_out.turn[b] = f
+    step_out.velocity[b] = poses.momentum[b] / bodies.mass[b]
     cross = wp.skew(f)
     scale = wp.float64(2.0) / (span * (wp.float64(1.0) + wp.dot(f, f)))
-    rate_out[b] = scale * (wp.quat_to_matrix(q) * (cross + cross * cross))
+    step_out.rate[b] = scale * (wp.quat_to_matrix(q) * (cross + cross * cross))

@@ -8,6 +8,8 @@ import warp as wp
 
 from warp_mca.kernels.nodes.cluster import Clusters, Mean, cluster_sums, mean_motion, pull, spin_after
 from warp_mca.kernels.nodes.coupling import turned
+from warp_mca.kernels.nodes.gather import NodeState
+from warp_mca.kernels.nodes.rigid_motion import Poses, RigidStep
 
 wp.set_module_options({"enable_backward": False})
 
@@ -21,46 +23,33 @@ def find_cluster(
     X: wp.array(dtype=wp.vec3d),
     mass: wp.array(dtype=wp.float64),
     dt: wp.float64,
-    orientation: wp.array(dtype=wp.quatd),
-    u: wp.array(dtype=wp.vec3d),
-    v: wp.array(dtype=wp.vec3d),
-    mean_out: wp.array(dtype=Mean),
-    point_out: wp.array(dtype=wp.vec3d),
-    impulse_out: wp.array2d(dtype=wp.vec3d),
+    poses: Poses,
+    state: NodeState,
+    step_out: RigidStep,
 ):
     """Mean motion of a pin's cluster after the free step, and its point P at t(n), from the place at the start."""
     begin = clusters.begin[p]
-    total = cluster_sums(begin[0], begin[1], lane, place, clusters, X, mass, u, v, dt)
+    total = cluster_sums(begin[0], begin[1], lane, place, clusters, X, mass, state.u, state.v, dt)
     if lane == 0:
-        P = wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(orientation[p], clusters.arm[p, 0])
-        mean_out[p] = mean_motion(total, P)
-        point_out[p] = P
-        impulse_out[p, 0] = wp.vec3d()
-        impulse_out[p, 1] = wp.vec3d()
+        P = wp.vec3d(total[1], total[2], total[3]) / total[0] + wp.quat_rotate(poses.orientation[p], clusters.arm[p, 0])
+        step_out.mean[p] = mean_motion(total, P)
+        step_out.point[p] = P
+        step_out.impulse[p, 0] = wp.vec3d()
+        step_out.impulse[p, 1] = wp.vec3d()
 
 
 @wp.func
-def move_pin(
-    p: int,
-    clusters: Clusters,
-    dt: wp.float64,
-    orientation: wp.array(dtype=wp.quatd),
-    mean: wp.array(dtype=Mean),
-    point: wp.array(dtype=wp.vec3d),
-    impulse: wp.array2d(dtype=wp.vec3d),
-    place_out: wp.array(dtype=wp.vec3d),
-    axis_out: wp.array(dtype=wp.vec3d),
-):
+def move_pin(p: int, clusters: Clusters, dt: wp.float64, poses: Poses, step_out: RigidStep):
     """Point of a pin on the cluster at t(n+1), relative to its place at the start [m], and its axis there."""
-    m = mean[p]
-    J = impulse[p, 0]
-    T = impulse[p, 1]
-    arm = point[p] - m.centre
+    m = step_out.mean[p]
+    J = step_out.impulse[p, 0]
+    T = step_out.impulse[p, 1]
+    arm = step_out.point[p] - m.centre
     w = spin_after(m, m.spin, J, T)
     v = m.velocity + wp.cross(m.spin, arm) + m.response.point * J + m.response.mixed * T - wp.cross(w, arm)
-    ahead = turned(orientation[p], dt * w)
-    place_out[p] = m.centre + dt * v + wp.quat_rotate(ahead, clusters.arm[p, 0])
-    axis_out[p] = wp.quat_rotate(ahead, clusters.axis[p])
+    ahead = turned(poses.orientation[p], dt * w)
+    step_out.place[p] = m.centre + dt * v + wp.quat_rotate(ahead, clusters.arm[p, 0])
+    step_out.axis[p] = wp.quat_rotate(ahead, clusters.axis[p])
 
 
 @wp.func
@@ -79,16 +68,12 @@ def pull_cluster(
     clusters: Clusters,
     X: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
-    mean: wp.array(dtype=Mean),
-    point: wp.array(dtype=wp.vec3d),
-    impulse: wp.array2d(dtype=wp.vec3d),
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-    speed_square_out: wp.array(dtype=wp.float32),
+    step: RigidStep,
+    state_out: NodeState,
 ):
     """Distribute the impulses of a pin to the nodes of its cluster."""
     begin = clusters.begin[p]
-    m = mean[p]
-    J = impulse[p, 0]
-    T = wp.cross(point[p] - m.centre, J) + impulse[p, 1]
-    pull(begin[0], begin[1], lane, place, m, J, T, clusters, X, dt, u_out, v_out, speed_square_out)
+    m = step.mean[p]
+    J = step.impulse[p, 0]
+    T = wp.cross(step.point[p] - m.centre, J) + step.impulse[p, 1]
+    pull(begin[0], begin[1], lane, place, m, J, T, clusters, X, dt, state_out.u, state_out.v, state_out.speed_square)

@@ -8,8 +8,8 @@ steps reach rounding.
 
 import warp as wp
 
-from warp_mca.kernels.nodes.cluster import Clusters, Mean
-from warp_mca.kernels.nodes.rigid_motion import RigidBodies, find_motion, turned_by
+from warp_mca.kernels.nodes.cluster import Clusters
+from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import move_pin, pin_lightness
 from warp_mca.kernels.nodes.symmetric import solve
 
@@ -75,45 +75,25 @@ def lightness(
 
 
 @wp.func
-def place_row(
-    r: int,
-    rows: RigidRows,
-    span: wp.float64,
-    centre: wp.array(dtype=wp.vec3d),
-    rotation: wp.array(dtype=wp.quatd),
-    normal_out: wp.array(dtype=wp.vec3d),
-    twist_out: wp.array(dtype=wp.vec3d),
-    lever_out: wp.array2d(dtype=wp.vec3d),
-    gap_out: wp.array(dtype=wp.float64),
-):
+def place_row(r: int, rows: RigidRows, span: wp.float64, poses: Poses, step_out: RigidStep):
     """n and twist at t(n), levers on both bodies, and the speed that closes the opening along n in the step [m/s]."""
     a = rows.first[r]
     b = rows.second[r]
     n = rows.direction[r]
-    q = rotation[a]
-    apart = centre[a] + turned_by(q) * rows.first_arm[r]
+    q = poses.rotation[a]
+    apart = poses.centre[a] + turned_by(q) * rows.first_arm[r]
     if b >= 0:
         n = wp.quat_rotate(q, n)
-        apart -= centre[b] + turned_by(rotation[b]) * rows.second_arm[r]
-        lever_out[r, 1] = lever(rotation[b], rows.second_arm[r], n)
-    normal_out[r] = n
-    twist_out[r] = wp.quat_rotate(q, rows.twist[r])
-    lever_out[r, 0] = lever(q, rows.first_arm[r], n) + rows.twist[r]
-    gap_out[r] = wp.dot(n, apart) / span
+        apart -= poses.centre[b] + turned_by(poses.rotation[b]) * rows.second_arm[r]
+        step_out.lever[r, 1] = lever(poses.rotation[b], rows.second_arm[r], n)
+    step_out.normal[r] = n
+    step_out.twist[r] = wp.quat_rotate(q, rows.twist[r])
+    step_out.lever[r, 0] = lever(q, rows.first_arm[r], n) + rows.twist[r]
+    step_out.gap[r] = wp.dot(n, apart) / span
 
 
 @wp.func
-def row_lightness(
-    r: int,
-    s: int,
-    bodies: RigidBodies,
-    rows: RigidRows,
-    moves: bool,
-    normal: wp.array(dtype=wp.vec3d),
-    twist: wp.array(dtype=wp.vec3d),
-    levers: wp.array2d(dtype=wp.vec3d),
-    mean: wp.array(dtype=Mean),
-) -> wp.float64:
+def row_lightness(r: int, s: int, bodies: RigidBodies, rows: RigidRows, moves: bool, step: RigidStep) -> wp.float64:
     """Entry of a group's matrix: opening speed of row r due to a unit impulse of row s [1/kg]; 0 for idle pins."""
     if not moves and (rows.pin[r] >= 0 or rows.pin[s] >= 0):
         return wp.float64(0.0)
@@ -121,14 +101,14 @@ def row_lightness(
     b = rows.second[r]
     c = rows.first[s]
     d = rows.second[s]
-    n = normal[r]
-    m = normal[s]
-    found = lightness(a, c, bodies, n, levers[r, 0], m, levers[s, 0])
-    found -= lightness(a, d, bodies, n, levers[r, 0], m, levers[s, 1])
-    found -= lightness(b, c, bodies, n, levers[r, 1], m, levers[s, 0])
-    found += lightness(b, d, bodies, n, levers[r, 1], m, levers[s, 1])
+    n = step.normal[r]
+    m = step.normal[s]
+    found = lightness(a, c, bodies, n, step.lever[r, 0], m, step.lever[s, 0])
+    found -= lightness(a, d, bodies, n, step.lever[r, 0], m, step.lever[s, 1])
+    found -= lightness(b, c, bodies, n, step.lever[r, 1], m, step.lever[s, 0])
+    found += lightness(b, d, bodies, n, step.lever[r, 1], m, step.lever[s, 1])
     if rows.pin[r] >= 0 and rows.pin[r] == rows.pin[s]:
-        found += pin_lightness(mean[rows.pin[r]], n, twist[r], m, twist[s])
+        found += pin_lightness(step.mean[rows.pin[r]], n, step.twist[r], m, step.twist[s])
     return found
 
 
@@ -140,32 +120,27 @@ def opening(
     moves: bool,
     rows: RigidRows,
     clusters: Clusters,
-    rotation: wp.array(dtype=wp.quatd),
-    normal: wp.array(dtype=wp.vec3d),
-    twist: wp.array(dtype=wp.vec3d),
-    gap: wp.array(dtype=wp.float64),
-    velocity: wp.array(dtype=wp.vec3d),
-    rate: wp.array(dtype=wp.mat33d),
-    place: wp.array(dtype=wp.vec3d),
-    axis: wp.array(dtype=wp.vec3d),
-    value_out: wp.array(dtype=wp.float64),
+    poses: Poses,
+    step_out: RigidStep,
 ) -> wp.float64:
     """Negative speeds at which rows would open by t(n+1) [m/s], and the greatest; directions open in rad/s."""
     worst = wp.float64(0.0)
     for r in range(begin, end):
         a = rows.first[r]
         b = rows.second[r]
-        v = velocity[a] + rate[a] * rows.first_arm[r]
+        v = step_out.velocity[a] + step_out.rate[a] * rows.first_arm[r]
         if b >= 0:
-            v -= velocity[b] + rate[b] * rows.second_arm[r]
-        speed = wp.dot(normal[r], v) + gap[r]
+            v -= step_out.velocity[b] + step_out.rate[b] * rows.second_arm[r]
+        n = step_out.normal[r]
+        speed = wp.dot(n, v) + step_out.gap[r]
         p = rows.pin[r]
         if p >= 0:
-            d = wp.quat_rotate(rotation[a], clusters.axis[p]) + span * (rate[a] * clusters.axis[p])
-            speed += (wp.dot(twist[r], wp.cross(axis[p], d)) - wp.dot(normal[r], place[p])) / span
+            axis = clusters.axis[p]
+            d = wp.quat_rotate(poses.rotation[a], axis) + span * (step_out.rate[a] * axis)
+            speed += (wp.dot(step_out.twist[r], wp.cross(step_out.axis[p], d)) - wp.dot(n, step_out.place[p])) / span
             if not moves:
                 speed = wp.float64(0.0)
-        value_out[r] = -speed
+        step_out.value[r] = -speed
         worst = wp.max(worst, wp.abs(speed))
     return worst
 
@@ -176,32 +151,27 @@ def give_impulses(
     end: int,
     counts: bool,
     rows: RigidRows,
-    rotation: wp.array(dtype=wp.quatd),
-    normal: wp.array(dtype=wp.vec3d),
-    twist: wp.array(dtype=wp.vec3d),
-    levers: wp.array2d(dtype=wp.vec3d),
-    value: wp.array(dtype=wp.float64),
-    momentum_out: wp.array(dtype=wp.vec3d),
-    spin_out: wp.array(dtype=wp.vec3d),
+    poses_out: Poses,
     impulse_out: wp.array(dtype=wp.vec3d),
-    pin_impulse_out: wp.array2d(dtype=wp.vec3d),
+    step_out: RigidStep,
 ):
     """Apply the impulses of rows to their bodies and to clusters of pins, equal and opposite at the common point."""
     for r in range(begin, end):
         a = rows.first[r]
         b = rows.second[r]
-        J = value[r] * normal[r]
-        momentum_out[a] = momentum_out[a] + J
-        spin_out[a] = spin_out[a] + value[r] * wp.quat_rotate(rotation[a], levers[r, 0])
+        size = step_out.value[r]
+        J = size * step_out.normal[r]
+        poses_out.momentum[a] = poses_out.momentum[a] + J
+        poses_out.spin[a] = poses_out.spin[a] + size * wp.quat_rotate(poses_out.rotation[a], step_out.lever[r, 0])
         if b >= 0:
-            momentum_out[b] = momentum_out[b] - J
-            spin_out[b] = spin_out[b] - value[r] * wp.quat_rotate(rotation[b], levers[r, 1])
+            poses_out.momentum[b] = poses_out.momentum[b] - J
+            poses_out.spin[b] = poses_out.spin[b] - size * wp.quat_rotate(poses_out.rotation[b], step_out.lever[r, 1])
         if counts and rows.pair[r] >= 0:
             impulse_out[rows.pair[r]] = impulse_out[rows.pair[r]] + rows.sign[r] * J
         p = rows.pin[r]
         if p >= 0:
-            pin_impulse_out[p, 0] = pin_impulse_out[p, 0] - J
-            pin_impulse_out[p, 1] = pin_impulse_out[p, 1] - value[r] * twist[r]
+            step_out.impulse[p, 0] = step_out.impulse[p, 0] - J
+            step_out.impulse[p, 1] = step_out.impulse[p, 1] - size * step_out.twist[r]
 
 
 @wp.func
@@ -212,25 +182,9 @@ def satisfy(
     bodies: RigidBodies,
     rows: RigidRows,
     clusters: Clusters,
-    orientation: wp.array(dtype=wp.quatd),
-    mean: wp.array(dtype=Mean),
-    point: wp.array(dtype=wp.vec3d),
-    rotation: wp.array(dtype=wp.quatd),
-    normal: wp.array(dtype=wp.vec3d),
-    twist: wp.array(dtype=wp.vec3d),
-    levers: wp.array2d(dtype=wp.vec3d),
-    gap: wp.array(dtype=wp.float64),
-    matrix: wp.array(dtype=wp.float64),
-    momentum_out: wp.array(dtype=wp.vec3d),
-    spin_out: wp.array(dtype=wp.vec3d),
+    poses_out: Poses,
     impulse_out: wp.array(dtype=wp.vec3d),
-    pin_impulse_out: wp.array2d(dtype=wp.vec3d),
-    place_out: wp.array(dtype=wp.vec3d),
-    axis_out: wp.array(dtype=wp.vec3d),
-    turn_out: wp.array(dtype=wp.vec3d),
-    velocity_out: wp.array(dtype=wp.vec3d),
-    rate_out: wp.array(dtype=wp.mat33d),
-    value_out: wp.array(dtype=wp.float64),
+    step_out: RigidStep,
 ):
     """Close the rows of group k, whose bodies moved without them, until only rounding opens them.
 
@@ -239,23 +193,14 @@ def satisfy(
     begin = rows.begin[k]
     end = rows.begin[k + 1]
     best = wp.float64(0.0)
-    # fmt: off
     for step in range(SOLVES):
         for p in range(rows.pins[k], rows.pins[k + 1]):
-            move_pin(p, clusters, span, orientation, mean, point, pin_impulse_out, place_out, axis_out)
-        worst = opening(
-            begin, end, span, counts, rows, clusters, rotation, normal, twist, gap, velocity_out, rate_out,
-            place_out, axis_out, value_out,
-        )
+            move_pin(p, clusters, span, poses_out, step_out)
+        worst = opening(begin, end, span, counts, rows, clusters, poses_out, step_out)
         if worst == wp.float64(0.0) or (step > 0 and worst >= best):
             break
         best = worst
-        solve(rows.entry[k], end - begin, begin, matrix, value_out)
-        give_impulses(
-            begin, end, counts, rows, rotation, normal, twist, levers, value_out,
-            momentum_out, spin_out, impulse_out, pin_impulse_out,
-        )
+        solve(rows.entry[k], end - begin, begin, step_out.matrix, step_out.value)
+        give_impulses(begin, end, counts, rows, poses_out, impulse_out, step_out)
         for place in range(rows.body[k], rows.body[k + 1]):
-            b = rows.member[place]
-            find_motion(b, bodies, span, rotation, momentum_out, spin_out, turn_out, velocity_out, rate_out)
-    # fmt: on
+            find_motion(rows.member[place], bodies, span, poses_out, step_out)

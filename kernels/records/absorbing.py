@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.records.columns import ABSORBED, BEYOND_WORK
 from warp_mca.kernels.records.ledger import run_of
 
@@ -29,8 +30,8 @@ def sum_absorbed(
     for i in range(begin + lane, end, wp.block_dim()):
         energy += absorbed[i]
         work -= wp.dot(velocity[i], impulse[i])
-    energy_sum = wp.tile_sum(wp.tile(energy))
-    work_sum = wp.tile_sum(wp.tile(work))
+    energy = block_sum(energy)
+    work = block_sum(work)
     if lane == 0:
-        partial_out[row[0], scene, column + wp.static(ABSORBED), k] = energy_sum[0]
-        partial_out[row[0], scene, column + wp.static(BEYOND_WORK), k] = work_sum[0]
+        partial_out[row[0], scene, column + wp.static(ABSORBED), k] = energy
+        partial_out[row[0], scene, column + wp.static(BEYOND_WORK), k] = work

@@ -9,6 +9,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.records.columns import (
     DRIVE_WORK,
@@ -78,13 +79,13 @@ def record_motion(
     if scene == 0 and k == 0:
         for p in range(lane, point.shape[0], wp.block_dim()):
             point_out[r, p] = wp.float64(0.5) * (v_before[point[p]] + v[point[p]])
-    kinetic_sum = wp.tile_sum(wp.tile(kinetic))
-    fall_sum = wp.tile_sum(wp.tile(fall))
-    driven_sum = wp.tile_sum(wp.tile(driven))
+    kinetic = block_sum(kinetic)
+    fall = block_sum(fall)
+    driven = block_sum(driven)
     if lane == 0:
-        partial_out[r, scene, wp.static(KINETIC), k] = kinetic_sum[0]
-        partial_out[r, scene, wp.static(GRAVITY_WORK), k] = fall_sum[0]
-        partial_out[r, scene, wp.static(DRIVE_WORK), k] = driven_sum[0]
+        partial_out[r, scene, wp.static(KINETIC), k] = kinetic
+        partial_out[r, scene, wp.static(GRAVITY_WORK), k] = fall
+        partial_out[r, scene, wp.static(DRIVE_WORK), k] = driven
 
 
 @cache
@@ -124,18 +125,18 @@ def sum_elements_kernel(precision: str) -> Any:
                 smallest = wp.min(smallest, energy[3, e])
             begin -= size
             end -= size
-        elastic_sum = wp.tile_sum(wp.tile(elastic))
-        plastic_sum = wp.tile_sum(wp.tile(plastic))
-        hourglass_sum = wp.tile_sum(wp.tile(hourglass))
+        elastic = block_sum(elastic)
+        plastic = block_sum(plastic)
+        hourglass = block_sum(hourglass)
         greatest = wp.tile_max(wp.tile(largest))
         least = wp.tile_min(wp.tile(smallest))
         if lane == 0:
             r = row[0]
-            partial_out[r, scene, wp.static(ELASTIC), k] = elastic_sum[0]
-            partial_out[r, scene, wp.static(PLASTIC), k] = plastic_sum[0]
+            partial_out[r, scene, wp.static(ELASTIC), k] = elastic
+            partial_out[r, scene, wp.static(PLASTIC), k] = plastic
             partial_out[r, scene, wp.static(STRAIN), k] = wp.float64(greatest[0])
             partial_out[r, scene, wp.static(JACOBIAN), k] = wp.float64(least[0])
-            partial_out[r, scene, wp.static(HOURGLASS), k] = hourglass_sum[0]
+            partial_out[r, scene, wp.static(HOURGLASS), k] = hourglass
 
     return sum_elements
 

@@ -5,19 +5,13 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames, turn_function
 
 wp.set_module_options({"enable_backward": False})
 
 LANES = 256  # threads of a block on a GPU; one on a CPU
-
-
-@wp.func
-def sum_of_block(x: wp.vec3d):
-    """Sum of the vectors of all threads of a block, in a fixed order."""
-    found = wp.tile_sum(wp.tile(x, preserve_type=True))
-    return found[0]
 
 
 @wp.kernel(enable_backward=False)
@@ -42,7 +36,7 @@ def mean_vectors(
     for k in range(offset[p] + lane, offset[p + 1], wp.block_dim()):
         i = node[k]
         total += weight[k] * share * (first[i] + second[i])
-    mean = sum_of_block(total)
+    mean = block_sum(total)
     if lane == 0:
         c = channel[p] + place
         for axis in range(3):
@@ -76,7 +70,7 @@ def resultants_kernel(precision: str, turned: bool) -> Any:
         centre = wp.vec3d()
         for k in range(offset[s] + lane, offset[s + 1], wp.block_dim()):
             centre += weight[k] * (X[node[k]] + u[node[k]])
-        centre = sum_of_block(centre)
+        centre = block_sum(centre)
         total = wp.vec3d()
         moment = wp.vec3d()
         for k in range(offset[s] + lane, offset[s + 1], wp.block_dim()):
@@ -85,8 +79,8 @@ def resultants_kernel(precision: str, turned: bool) -> Any:
             f_i = to_world(i, wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2])), frames)
             total += f_i
             moment += wp.cross(X[i] + u[i] - centre, f_i)
-        total = sum_of_block(total)
-        moment = sum_of_block(moment)
+        total = block_sum(total)
+        moment = block_sum(moment)
         if lane == 0:
             c = channel[s]
             for axis in range(3):

@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.constraint import Bonds, bound_node, drive, weighted_mean
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.records.extremes import keep_normal_force, keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes, gather_function, hold_node, next_velocity
@@ -41,7 +42,7 @@ def node_at(i: int, nodes: Nodes, u: wp.array(dtype=wp.vec3d), v: wp.array(dtype
     found = Moved()
     found.node = i
     if i >= 0:
-        found.mass = nodes.mass[i]
+        found.mass = nodes.data.mass[i]
         found.u = u[i]
         found.v = v[i]
     return found
@@ -59,11 +60,11 @@ def moved_to(moved: Moved, u: wp.vec3d, v: wp.vec3d):
 
 
 @wp.func
-def put(moved: Moved, u_out: wp.array(dtype=wp.vec3d), v_out: wp.array(dtype=wp.vec3d)):
+def put(moved: Moved, state_out: NodeState):
     """Give a node its displacement and velocity."""
     if moved.node >= 0:
-        u_out[moved.node] = moved.u
-        v_out[moved.node] = moved.v
+        state_out.u[moved.node] = moved.u
+        state_out.v[moved.node] = moved.v
 
 
 @cache
@@ -106,9 +107,7 @@ def bound_role(precision: str, partial: bool, turned: bool) -> Any:
         force: wp.array(dtype=vec3),
         count_out: wp.array(dtype=wp.int32),
         normal_force_out: wp.array2d(dtype=wp.int64),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         impulse_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
@@ -127,13 +126,13 @@ def bound_role(precision: str, partial: bool, turned: bool) -> Any:
         other_held = hold_node(wp.max(j, 0), nodes)
         other_held.role = 0  # a pair keeps the axes at rest of its first node
         for n in range(steps):
-            one = node_at(i, nodes, u_out, v_out)
-            other = node_at(j, nodes, u_out, v_out)
+            one = node_at(i, nodes, state_out.u, state_out.v)
+            other = node_at(j, nodes, state_out.u, state_out.v)
             push = wp.vec3d()
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             if mine:
-                total = gather_held(held, nodes.more_slots, force)
-                other_total = gather_held(other_held, nodes.more_slots, force)
+                total = gather_held(held, nodes.data.more_slots, force)
+                other_total = gather_held(other_held, nodes.data.more_slots, force)
                 free = next_velocity(held, one.v, total, nodes, dt)
                 one.v = free
                 one.u = one.u + dt * free
@@ -145,16 +144,16 @@ def bound_role(precision: str, partial: bool, turned: bool) -> Any:
                 else:
                     one.v = drive(lane - pairs, one.mass, dt, bonds, free, work_out, work_after_out, clock_out)
                     one.u = one.u + dt * (one.v - free)
-                put(one, u_out, v_out)
-                put(other, u_out, v_out)
+                put(one, state_out)
+                put(other, state_out)
             if lane >= wp.static(MOST_BOUND):
                 keep_normal_force(lane - wp.static(MOST_BOUND), wp.static(KEEPERS), normal_force_out)
             arrive(wp.static(NODES), count_out)
             if mine:  # no node waits for what is counted
                 if lane < pairs:
                     impulse_out[lane] = impulse_out[lane] + push
-                keep_speed(i, one.v, speed_square_out)
+                keep_speed(i, one.v, state_out.speed_square)
                 if j >= 0:
-                    keep_speed(j, other.v, speed_square_out)
+                    keep_speed(j, other.v, state_out.speed_square)
 
     return move_bound

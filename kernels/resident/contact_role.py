@@ -9,12 +9,13 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of
 from warp_mca.kernels.contact.search import STALE, moved_too_far
-from warp_mca.kernels.contact.settle import meet, settle_functions
-from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.settle import meet_side, settle_functions
+from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.shared_memory import shared_functions
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 
 wp.set_module_options({"enable_backward": False})
@@ -85,25 +86,16 @@ def nearest_of_lanes(
     return near, holds
 
 
-@wp.func
-def last_pressure(s: int, friction: bool, spring: Spring):
-    """Contact force of a spring along the normal of its last face [N]."""
-    pressed = spring.force[s]
-    if friction:
-        pressed -= spring.tangential[s]
-    return wp.vec3f(pressed)
-
-
 @cache
 def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
     """The function that gives slave nodes their contact forces in each of the kernel's steps."""
     settle, let_go = settle_functions(friction, stress_free, law)
+    pressure = pressure_function(friction)
 
     @wp.func
     def touch_nearest(
         s: int,
         i: int,
-        v: wp.array(dtype=wp.vec3d),
         near: Nearest,
         along: wp.vec3f,
         held: wp.float64,
@@ -111,24 +103,18 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         master: Master,
         dt: wp.float64,
         spring: Spring,
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        state_out: NodeState,
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
-            touch = meet(v, master.face, i, near, dt, held, along)
-            edge = wp.float64(2.0) * wp.sqrt(near.area)
-            touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
-            if passes_by(near.beside, held, near.front, edge):
-                touch.touches = bool(False)
-            touch.own = slaves.stiffness[s]
-            touch.limit = master.stiffness[near.face]
-            contact_force_out[i] = contact_force_out[i] + settle(
+            touch = meet_side(state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
+            state_out.nodal_force[i] = state_out.nodal_force[i] + settle(
                 s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out
             )
         else:
-            let_go(s, i, v, master.face, dt, near.front, held, spring)
+            let_go(s, i, state_out.v, master.face, dt, near.front, held, spring)
 
     @wp.func
     def touch_slaves(
@@ -137,14 +123,12 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         steps: int,
         movers: int,
         X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        v: wp.array(dtype=wp.vec3d),
         slaves: Slaves,
         master: Master,
         dt: wp.float64,
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        state_out: NodeState,
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -158,18 +142,17 @@ def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
         x = X[i]
         searched = slaves.u_search[i]
         for n in range(steps):
-            along = last_pressure(s, wp.static(friction), spring)
+            along = wp.vec3f(pressure(s, spring))
             held = spring.held[s]
             if n > 0:
                 wait_for(wp.static(NODES), n * movers, count_out)
             if lane < wp.static(PATCH):
-                near, holds = nearest_of_lanes(X, u, master, s, x + u[i], along, q)
+                near, holds = nearest_of_lanes(X, state_out.u, master, s, x + state_out.u[i], along, q)
                 if exists and holds:
                     touch_nearest(
-                        s, i, v, near, along, held, slaves, master, dt, spring,
-                        contact_force_out, normal_force_out, flag_out,
+                        s, i, near, along, held, slaves, master, dt, spring, state_out, normal_force_out, flag_out
                     )  # fmt: skip
-                if q == 0 and moved_too_far(u[i], searched, slaves.margin):
+                if q == 0 and moved_too_far(state_out.u[i], searched, slaves.margin):
                     flag_out[0, wp.static(STALE)] = 1
             arrive(wp.static(FORCES), count_out)
 

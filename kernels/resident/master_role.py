@@ -11,6 +11,7 @@ from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import shared_functions
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes, gather_function, hold_node, next_velocity
@@ -164,9 +165,7 @@ def master_role(precision: str, turned: bool) -> Any:
         force: wp.array(dtype=vec3),
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         """The work of the first PATCH threads of each block. `pushers` is the number of blocks that give forces."""
@@ -177,14 +176,14 @@ def master_role(precision: str, turned: bool) -> Any:
         held = hold_node(faces.master[m], nodes)
         near = faces_near(m, lane % wp.static(LANES), held.node, faces)
         searched = faces.u_search[held.node]
-        u = u_out[held.node]
-        v = v_out[held.node]
+        u = state_out.u[held.node]
+        v = state_out.v[held.node]
         for n in range(steps):
             if mine and moved_too_far(u, searched, faces.margin):
                 flag_out[0, wp.static(STALE)] = 1
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             if lane < wp.static(PATCH):
-                total = gather_held(held, nodes.more_slots, force)
+                total = gather_held(held, nodes.data.more_slots, force)
                 share = reaction(held.node, near, faces, spring)
                 for k in range(wp.static(LANES.bit_length() - 1)):
                     for c in range(3):
@@ -192,10 +191,10 @@ def master_role(precision: str, turned: bool) -> Any:
                 if mine:
                     v = next_velocity(held, v, total + share, nodes, dt)
                     u = u + dt * v
-                    v_out[held.node] = v
-                    u_out[held.node] = u
+                    state_out.v[held.node] = v
+                    state_out.u[held.node] = u
             arrive(wp.static(NODES), count_out)
             if mine:
-                keep_speed(held.node, v, speed_square_out)
+                keep_speed(held.node, v, state_out.speed_square)
 
     return move_masters

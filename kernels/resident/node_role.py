@@ -10,8 +10,7 @@ import warp as wp
 
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.nodes.gather import TOUCHABLE, hold
+from warp_mca.kernels.nodes.gather import TOUCHABLE, NodeData, NodeState, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 
@@ -23,21 +22,13 @@ class Nodes:
     """What moves the nodes of a model.
 
     Attributes:
-        mass, inverse_mass: [kg], [1/kg], shape (node_count,), float64.
-        role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
-        frames: floating frames.
-        first_slots, more_slots: slots of the forces on each node, see `elements.stage.gather_lists`.
+        data: of all nodes.
         free: nodes that neither belong to a master nor are bound, shape (free_count,), int32.
         gravity: [m/s^2].
         weight: acceleration of each node by its weight [m/s^2], shape (node_count,), vec3d; empty where it is gravity.
     """
 
-    mass: wp.array(dtype=wp.float64)
-    inverse_mass: wp.array(dtype=wp.float64)
-    role: wp.array(dtype=wp.uint8)
-    frames: Frames
-    first_slots: wp.array(dtype=wp.vec2i)
-    more_slots: wp.array(dtype=wp.vec4i)
+    data: NodeData
     free: wp.array(dtype=wp.int32)
     gravity: wp.vec3d
     weight: wp.array(dtype=wp.vec3d)
@@ -75,12 +66,12 @@ def hold_node(i: int, nodes: Nodes):
     """Read what is known about node i before the forces are there."""
     held = Held()
     held.node = i
-    if nodes.role.shape[0] > 0:
-        held.role = int(nodes.role[i])
-    held.inverse = nodes.inverse_mass[i]
-    if nodes.frames.of_node.shape[0] > 0:
-        held.turn = nodes.frames.rotation[nodes.frames.of_node[i]]
-    held.pair = nodes.first_slots[i]
+    if nodes.data.role.shape[0] > 0:
+        held.role = int(nodes.data.role[i])
+    held.inverse = nodes.data.inverse_mass[i]
+    if nodes.data.frames.of_node.shape[0] > 0:
+        held.turn = nodes.data.frames.rotation[nodes.data.frames.of_node[i]]
+    held.pair = nodes.data.first_slots[i]
     none = wp.vec4i(-1, -1, -1, 0)
     held.row0 = none
     held.row1 = none
@@ -88,12 +79,12 @@ def hold_node(i: int, nodes: Nodes):
     held.row = -2 - held.pair[1]
     held.end = held.row
     if held.row >= 0:
-        held.row0 = nodes.more_slots[held.row]
+        held.row0 = nodes.data.more_slots[held.row]
         held.end = held.row + held.row0[3]
         if held.row + 1 < held.end:
-            held.row1 = nodes.more_slots[held.row + 1]
+            held.row1 = nodes.data.more_slots[held.row + 1]
         if held.row + 2 < held.end:
-            held.row2 = nodes.more_slots[held.row + 2]
+            held.row2 = nodes.data.more_slots[held.row + 2]
         held.row += 3
     return held
 
@@ -157,7 +148,7 @@ def gather_function(precision: str, turned: bool) -> Any:
 
 
 @cache
-def total_function(precision: str, contact: bool, turned: bool) -> Any:
+def total_function(precision: str, pushed: bool, turned: bool) -> Any:
     """The function that sums the forces of elements and contact on a node, and clears the latter."""
     vec3 = scalars(precision).vec3
     gather_held = gather_function(precision, turned)
@@ -167,27 +158,27 @@ def total_function(precision: str, contact: bool, turned: bool) -> Any:
         held: Held,
         more_slots: wp.array(dtype=wp.vec4i),
         force: wp.array(dtype=vec3),
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        nodal_force_out: wp.array(dtype=wp.vec3d),
     ):
-        fc = wp.vec3d()
-        if wp.static(contact):
+        f = wp.vec3d()
+        if wp.static(pushed):
             if held.role & wp.static(TOUCHABLE) != 0:
-                fc = contact_force_out[held.node]  # loaded together with the others
+                f = nodal_force_out[held.node]  # loaded together with the others
         total = gather_held(held, more_slots, force)
-        if wp.static(contact):
-            total += fc
-            if fc[0] != wp.float64(0.0) or fc[1] != wp.float64(0.0) or fc[2] != wp.float64(0.0):
-                contact_force_out[held.node] = wp.vec3d()
+        if wp.static(pushed):
+            total += f
+            if f[0] != wp.float64(0.0) or f[1] != wp.float64(0.0) or f[2] != wp.float64(0.0):
+                nodal_force_out[held.node] = wp.vec3d()
         return total
 
     return all_forces
 
 
 @cache
-def free_role(precision: str, contact: bool, turned: bool) -> Any:
+def free_role(precision: str, pushed: bool, turned: bool) -> Any:
     """The function that moves free nodes in each of the kernel's steps."""
     vec3 = scalars(precision).vec3
-    all_forces = total_function(precision, contact, turned)
+    all_forces = total_function(precision, pushed, turned)
 
     @wp.func
     def move_others(
@@ -196,18 +187,15 @@ def free_role(precision: str, contact: bool, turned: bool) -> Any:
         nodes: Nodes,
         dt: wp.float64,
         force: wp.array(dtype=vec3),
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
     ):
         for k in range(begin, nodes.free.shape[0], stride):
             held = hold_node(nodes.free[k], nodes)
-            total = all_forces(held, nodes.more_slots, force, contact_force_out)
-            v = next_velocity(held, v_out[held.node], total, nodes, dt)
-            v_out[held.node] = v
-            u_out[held.node] = u_out[held.node] + dt * v
-            keep_speed(held.node, v, speed_square_out)
+            total = all_forces(held, nodes.data.more_slots, force, state_out.nodal_force)
+            v = next_velocity(held, state_out.v[held.node], total, nodes, dt)
+            state_out.v[held.node] = v
+            state_out.u[held.node] = state_out.u[held.node] + dt * v
+            keep_speed(held.node, v, state_out.speed_square)
 
     @wp.func
     def move_free(
@@ -220,30 +208,27 @@ def free_role(precision: str, contact: bool, turned: bool) -> Any:
         dt: wp.float64,
         force: wp.array(dtype=vec3),
         count_out: wp.array(dtype=wp.int32),
-        contact_force_out: wp.array(dtype=wp.vec3d),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
     ):
         """The work of the first PATCH threads of each block. `pushers` is the number of blocks that give forces."""
         free = nodes.free.shape[0]
         item = block * wp.static(PATCH) + lane
         mine = item < free and lane < wp.static(PATCH)
         held = hold_node(nodes.free[wp.min(item, free - 1)], nodes)
-        u = u_out[held.node]
-        v = v_out[held.node]
+        u = state_out.u[held.node]
+        v = state_out.v[held.node]
         for n in range(steps):
             wait_for(wp.static(FORCES), (n + 1) * pushers, count_out)
             if mine:
-                total = all_forces(held, nodes.more_slots, force, contact_force_out)
+                total = all_forces(held, nodes.data.more_slots, force, state_out.nodal_force)
                 v = next_velocity(held, v, total, nodes, dt)
                 u = u + dt * v
-                v_out[held.node] = v
-                u_out[held.node] = u
+                state_out.v[held.node] = v
+                state_out.u[held.node] = u
                 stride = blocks * wp.static(PATCH)
-                move_others(item + stride, stride, nodes, dt, force, contact_force_out, u_out, v_out, speed_square_out)
+                move_others(item + stride, stride, nodes, dt, force, state_out)
             arrive(wp.static(NODES), count_out)
             if mine:
-                keep_speed(held.node, v, speed_square_out)
+                keep_speed(held.node, v, state_out.speed_square)
 
     return move_free

@@ -136,7 +136,7 @@ def see_function(precision: str, turned: bool) -> Any:
                 a = lane + k * wp.static(THREADS)
                 if a < count:
                     i = points[a][3]
-                    pool_out[a] = seen(X[i], pool_out[a], nodes.frames.rotation[nodes.frames.of_node[i]])
+                    pool_out[a] = seen(X[i], pool_out[a], nodes.data.frames.rotation[nodes.data.frames.of_node[i]])
 
     return see_slots
 

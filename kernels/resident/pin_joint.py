@@ -10,6 +10,7 @@ import warp as wp
 
 from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, spin_after
 from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.nodes.hinge import (
     Ahead,
     Side,
@@ -84,7 +85,7 @@ def pinned_node(
         i = clusters.node[k]
         found.node = i
         found.weight = clusters.weight[k]
-        found.moving = found.weight * nodes.mass[i]
+        found.moving = found.weight * nodes.data.mass[i]
         found.start = X[i] - place
         found.u = u[i]
         found.v = v[i]
@@ -236,8 +237,8 @@ def pulled(one: Pinned, side: int, dt: wp.float64, shared: wp.array(dtype=wp.vec
 
 
 @wp.func
-def put_pinned(one: Pinned, u_out: wp.array(dtype=wp.vec3d), v_out: wp.array(dtype=wp.vec3d)):
+def put_pinned(one: Pinned, state_out: NodeState):
     """Give a node its displacement and velocity."""
     if one.node >= 0:
-        u_out[one.node] = one.u
-        v_out[one.node] = one.v
+        state_out.u[one.node] = one.u
+        state_out.v[one.node] = one.v

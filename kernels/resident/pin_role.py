@@ -13,6 +13,7 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import barrier, shared_functions, slot_pools, warp_barrier
 from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.coupling import Inverse
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.nodes.hinge import Ahead, Side, hinge_inverse
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
@@ -40,6 +41,7 @@ from warp_mca.kernels.resident.pin_joint import (
     momentum_row,
     pinned_node,
     pulled,
+    put_pinned,
 )
 
 wp.set_module_options({"enable_backward": False})
@@ -154,18 +156,6 @@ def solve_joint(
     barrier()
 
 
-@wp.func
-def put_pinned(
-    one: Pinned,
-    u_out: wp.array(dtype=wp.vec3d),
-    v_out: wp.array(dtype=wp.vec3d),
-):
-    """Give a node its displacement and velocity."""
-    if one.node >= 0:
-        u_out[one.node] = one.u
-        v_out[one.node] = one.v
-
-
 @cache
 def pin_role(precision: str, turned: bool) -> Any:
     """The function that moves the nodes of one coupling in each step; `turned` as in `gather_function`."""
@@ -176,7 +166,7 @@ def pin_role(precision: str, turned: bool) -> Any:
     @wp.func
     def push(one: Pinned, held: Held, nodes: Nodes, force: wp.array(dtype=vec3), dt: wp.float64):
         """Velocity of a node after the free step."""
-        return next_velocity(held, one.v, gather_held(held, nodes.more_slots, force), nodes, dt)
+        return next_velocity(held, one.v, gather_held(held, nodes.data.more_slots, force), nodes, dt)
 
     @wp.func
     def move_pinned(
@@ -190,9 +180,7 @@ def pin_role(precision: str, turned: bool) -> Any:
         dt: wp.float64,
         force: wp.array(dtype=vec3),
         count_out: wp.array(dtype=wp.int32),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         impulse_out: wp.array(dtype=wp.vec3d),
         place_out: wp.array(dtype=wp.vec3d),
         orientation_out: wp.array2d(dtype=wp.quatd),
@@ -206,8 +194,8 @@ def pin_role(precision: str, turned: bool) -> Any:
         turn = wp.array(ptr=shared_pool() + wp.uint64(wp.static(8 * TURNS)), shape=(2,), dtype=wp.quatd)
         begin = clusters.begin[j]
         start = place_out[j]  # an explicit copy: a tuple of assignments would not make one
-        one = pinned_node(begin[0] + lane, begin[1], start, clusters, nodes, X, u_out, v_out)
-        other = pinned_node(begin[1] + lane, begin[2], start, clusters, nodes, X, u_out, v_out)
+        one = pinned_node(begin[0] + lane, begin[1], start, clusters, nodes, X, state_out.u, state_out.v)
+        other = pinned_node(begin[1] + lane, begin[2], start, clusters, nodes, X, state_out.u, state_out.v)
         held, other_held = hold_node(wp.max(one.node, 0), nodes), hold_node(wp.max(other.node, 0), nodes)
         if lane < 2:
             turn[lane] = orientation_out[j, lane]
@@ -222,15 +210,15 @@ def pin_role(precision: str, turned: bool) -> Any:
             sum_momenta(one, other, lane, pool)
             solve_joint(lane, dt, rate, pool, sides, inverse, ahead, shared)
             one, other = pulled(one, 0, dt, shared), pulled(other, 1, dt, shared)
-            put_pinned(one, u_out, v_out)
-            put_pinned(other, u_out, v_out)
+            put_pinned(one, state_out)
+            put_pinned(other, state_out)
             arrive(wp.static(NODES), count_out)
             if lane < 2:  # no node waits for what follows
                 carry_joint(j, lane, dt, start, sides, ahead, turn, shared, place_out)
             if one.node >= 0:
-                keep_speed(one.node, one.v, speed_square_out)
+                keep_speed(one.node, one.v, state_out.speed_square)
             if other.node >= 0:
-                keep_speed(other.node, other.v, speed_square_out)
+                keep_speed(other.node, other.v, state_out.speed_square)
         barrier()
         if lane == 0:
             impulse_out[begin[0]] = shared[wp.static(PULLED)]

@@ -16,6 +16,7 @@ from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.constraint import Bonds
+from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.resident.bound_role import bound_role
 from warp_mca.kernels.resident.contact_role import Slaves, contact_role
 from warp_mca.kernels.resident.master_role import Faces, master_role
@@ -87,15 +88,13 @@ def resident_kernel(
         slaves: Slaves,
         master: Master,
         dt: wp.float64,
-        u: wp.array(dtype=wp.vec3d),
-        v: wp.array(dtype=wp.vec3d),
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
-        contact_force_out: wp.array(dtype=wp.vec3d),
+        state_out: NodeState,
         normal_force_out: wp.array(dtype=wp.int64),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
@@ -103,13 +102,13 @@ def resident_kernel(
         movers = roles.end - roles.master
         if block < roles.contact:
             compute_patch(
-                block, lane, steps, movers, X, points, patches, law, slot, nodes, u,
+                block, lane, steps, movers, X, points, patches, law, slot, nodes, state_out.u,
                 count_out, yielded_out, history_out, extreme_out, force_out,
             )  # fmt: skip
         elif wp.static(contact):
             touch_slaves(
-                block - roles.contact, lane, steps, movers, X, u, v, slaves, master, dt, spring,
-                count_out, contact_force_out, normal_force_out, flag_out,
+                block - roles.contact, lane, steps, movers, X, slaves, master, dt, spring,
+                count_out, state_out, normal_force_out, flag_out,
             )  # fmt: skip
 
     @wp.func
@@ -127,11 +126,8 @@ def resident_kernel(
         force: wp.array(dtype=vec3),
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
-        contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array2d(dtype=wp.int64),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         impulse_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
@@ -146,23 +142,23 @@ def resident_kernel(
             if wp.static(contact):
                 move_masters(
                     block - roles.master, lane, steps, pushers, nodes, faces, dt, force, spring,
-                    count_out, u_out, v_out, speed_square_out, flag_out,
+                    count_out, state_out, flag_out,
                 )  # fmt: skip
         elif block < roles.pin:
             move_bound(
-                lane, steps, pushers, nodes, bonds, dt, force, count_out, normal_force_out, u_out, v_out,
-                speed_square_out, impulse_out, work_out, work_after_out, clock_out,
+                lane, steps, pushers, nodes, bonds, dt, force, count_out, normal_force_out, state_out,
+                impulse_out, work_out, work_after_out, clock_out,
             )  # fmt: skip
         elif block < roles.free:
             if wp.static(coupled):
                 move_pinned(
-                    block - roles.pin, lane, steps, pushers, nodes, clusters, X, dt, force, count_out, u_out, v_out,
-                    speed_square_out, impulse_out, place_out, orientation_out,
+                    block - roles.pin, lane, steps, pushers, nodes, clusters, X, dt, force, count_out, state_out,
+                    impulse_out, place_out, orientation_out,
                 )  # fmt: skip
         else:
             move_free(
                 block - roles.free, lane, roles.end - roles.free, steps, pushers, nodes, dt, force,
-                count_out, contact_force_out, u_out, v_out, speed_square_out,
+                count_out, state_out,
             )  # fmt: skip
 
     @wp.kernel(
@@ -193,11 +189,8 @@ def resident_kernel(
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=vec3),
-        contact_force_out: wp.array(dtype=wp.vec3d),
         normal_force_out: wp.array2d(dtype=wp.int64),
-        u_out: wp.array(dtype=wp.vec3d),
-        v_out: wp.array(dtype=wp.vec3d),
-        speed_square_out: wp.array(dtype=wp.float32),
+        state_out: NodeState,
         impulse_out: wp.array(dtype=wp.vec3d),
         work_out: wp.array(dtype=wp.vec3d),
         work_after_out: wp.array(dtype=wp.vec3d),
@@ -210,14 +203,14 @@ def resident_kernel(
         block = wp.tid() // wp.static(THREADS)
         if block < roles.master:
             give_forces(
-                block, lane, steps, roles, X, points, patches, law, slot, nodes, slaves, master, dt, u_out, v_out,
-                spring, count_out, yielded_out, history_out, extreme_out, force_out, contact_force_out,
+                block, lane, steps, roles, X, points, patches, law, slot, nodes, slaves, master, dt,
+                spring, count_out, yielded_out, history_out, extreme_out, force_out, state_out,
                 normal_force_out[wp.static(1 if contact else 0)], flag_out,
             )  # fmt: skip
         else:
             move_nodes(
                 block, lane, steps, roles, nodes, faces, bonds, clusters, X, dt, force_out, spring,
-                count_out, contact_force_out, normal_force_out, u_out, v_out, speed_square_out,
+                count_out, normal_force_out, state_out,
                 impulse_out, work_out, work_after_out, clock_out, place_out, orientation_out, flag_out,
             )  # fmt: skip
         leave(count_out)

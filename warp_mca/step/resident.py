@@ -137,12 +137,12 @@ class Resident:
         solver, work, elements = self.solver, self.solver.work, self.solver.elements[0]
         own, bonds, pins = state.elements[0], state.constraints, state.couplings
         slaves, master, faces, spring = _contact(solver, state)
-        self.nodes.frames = work.frames(state)
+        self.nodes.data, force = solver.nodes.given(state)
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, self.bonds, self.clusters, solver.dt, spring]
-        outputs = [self.count, own.yielded, own.history, own.extreme, work.force, work.contact_force]
-        outputs += [state.normal_force, state.u, state.v, state.speed_square]
+        outputs = [self.count, own.yielded, own.history, own.extreme, force, state.normal_force]
+        outputs.append(solver.nodes.moved(state))
         outputs += [bonds.impulse, bonds.work, bonds.work_after, bonds.clock, pins.place, pins.orientation, state.flag]
         wp.launch(self.kernel, self.blocks * THREADS, inputs=inputs, outputs=outputs, block_dim=THREADS)
 
@@ -177,12 +177,10 @@ def roles_of(solver: Solver) -> Any:
 
 
 def _nodes(solver: Solver) -> Any:
-    work, contact = solver.work, surface_of(solver)
+    contact = surface_of(solver)
     others = [_bound(solver)] + ([contact.items[0].master] if contact else [])
     free = np.setdiff1d(np.arange(solver.model.node_count), np.concatenate(others))
     found = Nodes()
-    found.mass, found.inverse_mass, found.role = work.mass, work.inverse_mass, solver.constraints.role
-    found.first_slots, found.more_slots = work.first_slots, work.more_slots
     found.free = wp.array(free, dtype=wp.int32)
     found.gravity = wp.vec3d(*solver.model.gravity[0])
     if (own := nodal_gravity(solver.model)) is not None:

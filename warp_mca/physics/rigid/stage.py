@@ -14,7 +14,7 @@ from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import mean_pose
 from warp_mca.kernels.nodes import rigid_body
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
-from warp_mca.kernels.nodes.rigid_motion import RigidBodies
+from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
 from warp_mca.model.assembly import GROUND
 from warp_mca.physics.actor import Actor, When
@@ -149,15 +149,15 @@ class RigidStage(Actor):
 
     def _make_outputs(self) -> None:
         bodies, size, pins = self.count, len(self.rows.first), len(self.pin_order)
-        # as `rigid_body.advance_kernel` lists them, from force_out on
-        self.found = [wp.zeros(len(self.bodies.node), dtype=wp.vec3d)]
-        self.found += [wp.zeros(bodies, dtype=kind) for kind in (wp.vec3d, wp.vec3d, wp.mat33d, wp.mat33d)]
-        self.found += [wp.zeros(size, dtype=wp.vec3d), wp.zeros(size, dtype=wp.vec3d)]
-        self.found += [wp.zeros((size, 2), dtype=wp.vec3d)]
-        self.found += [wp.zeros(n, dtype=wp.float64) for n in (size, size, self.entries)]
-        self.found += [wp.zeros(pins, dtype=kind) for kind in (Mean, wp.vec3d)]
-        self.found += [wp.zeros((pins, 2), dtype=wp.vec3d)]
-        self.found += [wp.zeros(pins, dtype=wp.vec3d), wp.zeros(pins, dtype=wp.vec3d)]
+        step = self.step = RigidStep()
+        step.force = wp.zeros(len(self.bodies.node), dtype=wp.vec3d)
+        step.turn, step.velocity = (wp.zeros(bodies, dtype=wp.vec3d) for _ in range(2))
+        step.rate, step.turned = (wp.zeros(bodies, dtype=wp.mat33d) for _ in range(2))
+        step.normal, step.twist = (wp.zeros(size, dtype=wp.vec3d) for _ in range(2))
+        step.lever = wp.zeros((size, 2), dtype=wp.vec3d)
+        step.gap, step.value, step.matrix = (wp.zeros(n, dtype=wp.float64) for n in (size, size, self.entries))
+        step.mean, step.impulse = wp.zeros(pins, dtype=Mean), wp.zeros((pins, 2), dtype=wp.vec3d)
+        step.point, step.place, step.axis = (wp.zeros(pins, dtype=wp.vec3d) for _ in range(3))
 
     def new_state(self) -> RigidState:
         """State before `start`, on the current device."""
@@ -197,16 +197,15 @@ class RigidStage(Actor):
         own = state.rigid
         inputs = [self.bodies, self.rows, self.clusters, self.work.X]
         inputs += [*self.nodes.given(state, level), kick, span, moves]
-        outputs = [self.nodes.moved(state), own.centre, own.rotation, own.momentum, own.spin, own.orientation]
-        outputs.append(state.constraints.impulse)
-        threads = (self.groups, self.lanes)
-        wp.launch(self.kernel, threads, inputs=inputs, outputs=[*outputs, *self.found], block_dim=BLOCK)
+        poses = Poses()
+        poses.centre, poses.rotation, poses.momentum = own.centre, own.rotation, own.momentum
+        poses.spin, poses.orientation = own.spin, own.orientation
+        outputs, threads = [self.nodes.moved(state), poses, state.constraints.impulse], (self.groups, self.lanes)
+        wp.launch(self.kernel, threads, inputs=inputs, outputs=[*outputs, self.step], block_dim=BLOCK)
 
     def _follow(self, state: State, split: Split, records: bool = False) -> None:
-        _, _, velocity, rate, turned, *_ = self.found
-
         def launch(part: slice) -> None:
-            inputs = [self.node[part], self.body[part], self.arm[part], state.rigid.centre, velocity, rate, turned]
+            inputs = [self.node[part], self.body[part], self.arm[part], state.rigid.centre, self.step]
             outputs = [self.nodes.moved(state, records)]
             wp.launch(rigid_body.follow, part.stop - part.start, inputs=inputs, outputs=outputs)
 

@@ -1,0 +1,24 @@
+"""Owns what the threads of a block do together; on a CPU a block is one thread."""
+
+from typing import Any
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def block_sum(x: Any):
+    """Sum of what each thread of the block found, in a fixed order; all threads call this and get the sum."""
+    found = wp.tile_sum(wp.tile(x, preserve_type=True))
+    return found[0]
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+__syncthreads();
+#endif
+""")
+def wait_for_block():
+    """Wait for all threads of the block."""
+    ...
