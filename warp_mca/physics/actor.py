@@ -50,6 +50,9 @@ class Actor:
         """Those of a record or a search, which have blocks of Warp's own size."""
         return []
 
+    def start_forces(self, state: State) -> None:
+        """Forces that act at t = 0 already, before `start`."""
+
     def start(self, state: State) -> None:
         """Take half a step back from t = 0, once free nodes have done so."""
 

@@ -131,6 +131,6 @@ class RatedNodeStage(NodeStage):
 def node_stage(solver: Solver) -> NodeStage:
     """The nodal stage of a solver's model."""
     rounds = 0  # of patches that the elements take, where nothing else waits for the nodes
-    if not (solver.contacts or solver.constraints.bound):
+    if not (len(solver.work.nodal_force) or solver.constraints.bound):
         rounds = min(0 if stage.block.plastic else stage.rounds for stage in solver.elements)
     return (RatedNodeStage if solver.model.rates else NodeStage)(solver, rounds)

@@ -141,7 +141,7 @@ class Resident:
         assert isinstance(elements, PatchStage)
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, self.bonds, self.clusters, solver.dt, spring]
-        outputs = [self.count, own.yielded, own.history, own.extreme, work.force, work.contact_force]
+        outputs = [self.count, own.yielded, own.history, own.extreme, work.force, work.nodal_force]
         outputs += [state.normal_force, state.u, state.v, state.speed_square]
         outputs += [bonds.impulse, bonds.work, bonds.work_after, bonds.clock, pins.place, pins.orientation, state.flag]
         wp.launch(self.kernel, self.blocks * THREADS, inputs=inputs, outputs=outputs, block_dim=THREADS)

@@ -12,7 +12,7 @@ import warp as wp
 from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
 from warp_mca.kernels.nodes.gather import LEVEL_BIT
 from warp_mca.kernels.records.absorbing import sum_absorbed
-from warp_mca.kernels.records.columns import absorbing_column
+from warp_mca.model.columns import added_columns
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
 from warp_mca.step.stage import BESIDE, Stage, Step
@@ -75,7 +75,7 @@ class AbsorbingStage(Actor):
         self.kernel = absorbing_kernel(nodes.kind, own.sprung)
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
-        self.column = absorbing_column(len(model.passes) // layout.count)
+        self.column = added_columns(model)["absorbing"].first
 
     def new_state(self) -> AbsorbingState:
         """State before the first step, on the current device."""
