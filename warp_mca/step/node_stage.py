@@ -67,9 +67,9 @@ class NodeStage(Actor):
         """Those of a step."""
         return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
 
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Free nodes, once bound ones have read their forces."""
-        yield Stage("free nodes", lambda s: self.advance_free(s, when.level, when.chain))
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Free nodes, beside bound ones."""
+        yield Stage("advance", "free nodes", lambda s: self.advance_free(s, when.level, when.chain))
 
     def advance_free(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
         """Free nodes, those up to a `level` of `Model.rates` or all; of one `chain` or all."""

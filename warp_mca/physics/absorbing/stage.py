@@ -95,15 +95,12 @@ class AbsorbingStage(Actor):
         """Those of a record."""
         return [sum_absorbed] if self.count else []
 
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Its nodes, against their dashpots."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Its nodes, against their dashpots; energy absorbed and work of what lies beyond."""
         if self.count and len(item := self._items(when)):
-            yield Stage("absorbing boundaries", lambda s: self._advance(s, item, when.level), BESIDE)
-
-    def works(self, when: When) -> Iterable[Stage]:
-        """Energy absorbed and work of what lies beyond."""
+            yield Stage("advance", "absorbing boundaries", lambda s: self._advance(s, item, when.level), BESIDE)
         if self.count:
-            yield Stage("absorbed energy", self._sum, only_records=True)
+            yield Stage("works", "absorbed energy", self._sum, only_records=True)
 
     def _items(self, when: When) -> wp.array:
         """Its nodes up to a level, or all; of one level where a chain is given. As the kernel takes them."""

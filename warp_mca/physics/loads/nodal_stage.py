@@ -62,14 +62,11 @@ class NodalLoad(Actor):
         """Forces that act at t = 0 already."""
         self.push(Step(state), start=True)
 
-    def forces(self, when: When) -> Iterable[Stage]:
-        """Forces, in the stream of contact, which adds to the same ones."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Forces, in the stream of contact, which adds to the same ones; energies of each scene."""
         if when.common:
-            yield Stage(f"loads: {self.name}", self.push, BEYOND)
-
-    def works(self, when: When) -> Iterable[Stage]:
-        """Energies of each scene."""
-        yield Stage(f"energies: {self.name}", self._sum, only_records=True)
+            yield Stage("forces", f"loads: {self.name}", self.push, BEYOND)
+        yield Stage("works", f"energies: {self.name}", self._sum, only_records=True)
 
     def _sum(self, step: Step) -> None:
         for k, entry in enumerate(self.energies_of(step.state)):
