@@ -173,7 +173,7 @@ class Held:
                 own.history.zero_()
             for touched in self.state.contacts:
                 touched.spring.tangential.zero_()
-            self.solver.work.contact_force.zero_()
+            self.solver.work.nodal_force.zero_()
 
     def advance(self, steps: int) -> None:
         """Launch `steps` steps: a multiple of the case's records, or up to one."""

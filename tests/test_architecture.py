@@ -196,10 +196,10 @@ def test_files_that_contributors_are_sent_to_exist():
 
 
 def test_tables_that_contributors_are_sent_to_hold_what_the_package_has():
-    """Each of the five tasks names a table of the code, in the file that it gives, and a test that exists."""
+    """Each of the six tasks names a table of the code, in the file that it gives, and a test that exists."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (material|element|contact law|joint|recorder) \|(.*)\|$", text, flags=re.M)
-    assert len(rows) == 5
+    rows = re.findall(r"^\| (material|element|contact law|joint|load|recorder) \|(.*)\|$", text, flags=re.M)
+    assert len(rows) == 6
     for name, row in rows:
         _, line, test = row.split("|")
         ((constant, path),) = re.findall(r"`([A-Z_]+)` in `([\w/.]+)`", line)

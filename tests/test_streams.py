@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -66,7 +67,7 @@ def launched(solver: Solver, step: Step, monkeypatch: pytest.MonkeyPatch) -> tup
     monkeypatch.setattr(stage, "wp", order)
 
     def noting(item: Stage) -> Stage:
-        return Stage(item.name, lambda _: order.launched(item.name), item.stream, item.only_records, item.after)
+        return replace(item, launch=lambda _: order.launched(item.name))
 
     streams.run([[noting(item) for item in group] for group in solver.groups], step)
     return order, streams

@@ -82,11 +82,11 @@ def frequencies(model: Model, free: np.ndarray | None = None) -> np.ndarray:
     def force(u: np.ndarray) -> np.ndarray:
         state.u.assign(u)
         state.v.assign(u / dt)  # friction measures the motion since the last step
-        solver.work.contact_force.zero_()
+        solver.work.nodal_force.zero_()
         for own in state.contacts:
             own.spring.tangential.zero_()
         solver.forces(state)
-        total = solver.work.contact_force.numpy().copy() if solver.contacts else np.zeros_like(u)
+        total = solver.work.nodal_force.numpy().copy() if solver.contacts else np.zeros_like(u)
         np.add.at(total, node, solver.work.force.numpy())
         return total.ravel()
 

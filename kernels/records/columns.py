@@ -16,17 +16,6 @@ NORMAL_FORCE, PRESSURE, NORMAL_ENERGY, LOST, SQUARES, MADE = slice(8, 11), 11, 1
 DAMPED = 16
 PASS_COLUMNS = 17
 
-# Behind the passes, where a scene has absorbing boundaries: energy that bodies gave to what lies beyond them, in
-# the frame of the body, and work that this does on the bodies as it moves along [J].
+# Behind the passes stand the columns of other actors, see `model.columns`. Of absorbing boundaries: energy that bodies
+# gave to what lies beyond them, in the frame of the body, and work that this does on the bodies as it moves along [J].
 ABSORBED, BEYOND_WORK = 0, 1
-ABSORBING_COLUMNS = 2
-
-
-def absorbing_column(passes: int) -> int:
-    """First column of absorbing boundaries."""
-    return PASS + PASS_COLUMNS * passes
-
-
-def column_count(passes: int, absorbing: bool) -> int:
-    """Number of columns of a record of scenes with `passes` contact passes each."""
-    return absorbing_column(passes) + (ABSORBING_COLUMNS if absorbing else 0)

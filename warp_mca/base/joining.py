@@ -80,9 +80,19 @@ def offsets_of(kind: str) -> dict[str, Any]:
 
 
 AS_IS: dict[str, Any] = {_KEY: _Rule(lambda value, scene, starts: value)}  # as they are, one scene after the other
+
+
+class _Kinds(_Rule):
+    """Of tuples of dataclasses by kind, which all scenes have the same of."""
+
+    def join(self, values: Sequence[Any], starts: Starts) -> Any:
+        return {kind: ITEMS[_KEY].join([value[kind] for value in values], starts) for kind in values[0]}
+
+
 ITEMS: dict[str, Any] = {
     _KEY: _Rule(lambda value, scene, starts: tuple(_moved(item, scene, starts) for item in value))
 }  # a tuple of dataclasses whose fields have rules
+KINDS: dict[str, Any] = {_KEY: _Kinds(_moved)}  # a mapping of such tuples
 PART: dict[str, Any] = {_KEY: _Part(_moved)}  # a dataclass whose fields have rules
 SCENE: dict[str, Any] = {_KEY: _Rule(lambda value, scene, starts: scene)}  # of an item: number of its scene
 ALONE: dict[str, Any] = {_KEY: _Rule(_alone)}  # None in every model of a batch

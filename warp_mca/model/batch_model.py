@@ -13,6 +13,7 @@ from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
+from warp_mca.physics.loads.nodal import check_batch
 
 Index = NDArray[np.int32]
 
@@ -36,11 +37,13 @@ def join_models(models: Sequence[Model]) -> Model:
     scene, and the solver launches the k-th passes of all scenes together.
 
     Raises:
+        RequestError: scenes have different kinds of loads, or one that no batch can.
         TypeError: a field has no rule by which it is joined.
         ValueError: a model has what no batch can.
     """
     if len(models) == 1:
         return models[0]
+    check_batch([model.loads for model in models])
     starts = {kind: offsets([count(model) for model in models]) for kind, count in _COUNTS.items()}
     nodes, elements = starts["nodes"], starts["elements"]
     blocks, order, ranges = _blocks(models, nodes, elements)

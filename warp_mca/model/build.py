@@ -22,6 +22,7 @@ from warp_mca.physics.contact.checks import check_spacing
 from warp_mca.physics.contact.surfaces import ContactPass, contact_eigenvalues, contact_passes
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
+from warp_mca.physics.loads.nodal import loaded_nodes
 from warp_mca.physics.rigid.bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
@@ -97,6 +98,7 @@ def build_model(
     passes, axes, added, penalties = _contacts(parts, velocity)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
+    loads = loaded_nodes(parts, start, added, grouping is not None)
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
@@ -109,6 +111,7 @@ def build_model(
         couplings=soft,
         hinge_loads=hinge_loads(parts, free_nodes(held, pairs, ties), chain, start),
         bases=bases,
+        loads=loads,
         absorbing=absorbing,
         ties=ties,
         passes=passes,

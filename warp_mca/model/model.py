@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
+from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, KINDS, PART, joinable, of, offsets_of
 from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
@@ -21,6 +21,7 @@ from warp_mca.physics.floating.frames import FloatingFrames
 from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.physics.loads.joint_loads import HingeLoad, MovableBase
+from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.rigid.bodies import RigidBody
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow
 from warp_mca.physics.ties.nodes import TiedNodes
@@ -55,6 +56,7 @@ class Model:
             are in `rigid_rows` and `rigid_pins`.
         hinge_loads: torques and friction in hinges of chains; those of each scene in turn.
         bases: of chains, that move or slide; their pairs count as tied in no direction.
+        loads: on nodes, by kind; those of each scene in turn.
         absorbing: nodes of absorbing boundaries.
         ties: nodes tied to faces.
         passes: contact passes; those of each scene in turn.
@@ -114,6 +116,7 @@ class Model:
     rigid_pins: tuple[RigidPin, ...] = field(default=(), metadata=ITEMS)
     rigid_blocks: tuple[Block, ...] = field(default=(), metadata=GIVEN)
     rates: Rates | None = field(default=None, metadata=ALONE)
+    loads: Mapping[str, tuple[LoadedNodes, ...]] = field(default_factory=dict, metadata=KINDS)
     floating: FloatingFrames | None = field(default=None, metadata=ALONE)
 
     def owner(self, element: int) -> tuple[str, int]:

@@ -162,5 +162,5 @@ def _touched_nodes(model: Model) -> Index:
     hinges = [side for load in model.hinge_loads for side in (load.inner, load.outer)]
     contacts = [nodes for item in model.passes for nodes in (item.slave, item.master)]
     joints = [model.joint_first, model.joint_second[model.joint_second >= 0], model.prescribed_node]
-    others = [model.ties.slave, model.ties.carriers]
+    others = [model.ties.slave, model.ties.carriers, *(item.node for items in model.loads.values() for item in items)]
     return _joined([*joints, *others, *(body.nodes for body in model.rigid_bodies), *hinges, *contacts])

@@ -16,6 +16,7 @@ from warp_mca.kernels.records.columns import (
     PRESSURE,
     STICK_IMPULSE,
 )
+from warp_mca.model.columns import added_columns
 from warp_mca.results.contact_history import ContactHistory
 
 if TYPE_CHECKING:
@@ -38,8 +39,7 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
         velocity[:, 1] = model.passes[0].plane.velocity
     stored = energy["elastic"] + energy["plastic"] + energy["hourglass"]
     balance = sum(value for key, value in energy.items() if key != "external_work") - energy["external_work"]
-    absorbed = {"E_absorbed": energy["absorbed"]} if ledger.absorbs else {}
-    return {
+    columns = {
         "time_s": steps.interval * np.arange(first, kept.count, dtype=np.float64),
         "F_n_N": F_n,
         "F_t_N": F_t,
@@ -57,8 +57,9 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
         "plate_vy": velocity[:, 1, 1],
         "plate_vz": velocity[:, 1, 2],
         "closing_speed": _closing_speed(ledger, first),
-        **absorbed,
     }
+    added = {name for own in added_columns(model).values() for name in own.energies} - {"external_work"}
+    return columns | {f"E_{name}": energy[name] for name in sorted(added)}
 
 
 def _forces(ledger: Ledger, springs: Array) -> tuple[Array, Array, Array]:

@@ -82,7 +82,7 @@ def _initial_depths(solver: Solver, state: State) -> list[tuple[Array, Array]]:
         tried = state.copy()
         for stage in solver.contacts:
             stage.launch(solver.work, tried, 0.0)
-        solver.work.contact_force.zero_()
+        solver.work.nodal_force.zero_()
         springs = [own.spring for own in tried.contacts]
         return [(spring.depth.numpy(), spring.energy.numpy()) for spring in springs]
 

@@ -29,9 +29,6 @@ class When:
 class Actor:
     """Something that acts on nodes. It is made of a solver, on whose device it allocates; a State holds what changes.
 
-    The methods that list stages are called in the order in which they stand here, see `step/step_groups.py`. Those of
-    an actor that a model lacks list none.
-
     Attributes:
         block_dim: threads of a block of its kernels; None for Warp's own number.
     """
@@ -50,57 +47,12 @@ class Actor:
         """Those of a record or a search, which have blocks of Warp's own size."""
         return []
 
+    def stages(self, when: When) -> Iterable[Stage]:
+        """What it launches in a step, each with its place in `step.step_groups.STEP`; none where a model lacks it."""
+        return ()
+
+    def start_forces(self, state: State) -> None:
+        """Forces that act at t = 0 already, before `start`."""
+
     def start(self, state: State) -> None:
         """Take half a step back from t = 0, once free nodes have done so."""
-
-    def frames(self, when: When) -> Iterable[Stage]:
-        """Displacements in frames that float with bodies."""
-        return ()
-
-    def forces(self, when: When) -> Iterable[Stage]:
-        """Forces at u(n), v(n-1/2)."""
-        return ()
-
-    def keep(self, when: When) -> Iterable[Stage]:
-        """What a record reads while nodes move."""
-        return ()
-
-    def search(self, when: When) -> Iterable[Stage]:
-        """Search for contact while nodes move, for the steps that follow."""
-        return ()
-
-    def energies(self, when: When) -> Iterable[Stage]:
-        """Energies and stresses at t(n)."""
-        return ()
-
-    def look(self, when: When) -> Iterable[Stage]:
-        """What recorders show of springs, before their sums begin anew."""
-        return ()
-
-    def sums(self, when: When) -> Iterable[Stage]:
-        """Sums of energies and forces of each scene."""
-        return ()
-
-    def picture(self, when: When) -> Iterable[Stage]:
-        """What recorders show of stresses."""
-        return ()
-
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Nodes that it moves."""
-        return ()
-
-    def follow(self, when: When) -> Iterable[Stage]:
-        """Nodes that follow others which have moved."""
-        return ()
-
-    def correct(self, when: When) -> Iterable[Stage]:
-        """What acts on the velocities that all else gave."""
-        return ()
-
-    def motion(self, when: When) -> Iterable[Stage]:
-        """Sums over nodes, once they have moved."""
-        return ()
-
-    def works(self, when: When) -> Iterable[Stage]:
-        """Sums of works, once nodes have moved."""
-        return ()

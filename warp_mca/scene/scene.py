@@ -13,6 +13,7 @@ from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
+from warp_mca.scene.loads import LOADS, Load
 from warp_mca.scene.phases import ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
 from warp_mca.scene.sensors import Probe, Section, check_class
@@ -46,6 +47,7 @@ class Scene:
             for one impact.
         joints, contacts, fixed, prescribed, ties: what binds the bodies.
         absorbing: sides of bodies through which waves leave.
+        loads: forces on nodes in the impact phase, of the kinds in `scene.loads.LOADS`.
         gravity: [m/s^2].
         up: direction that points up in pictures [-], of any length; None takes the one opposite to gravity, else the
             normal of the first rigid plane, else y.
@@ -70,6 +72,7 @@ class Scene:
     prescribed: tuple[Prescribed, ...] = ()
     absorbing: tuple[Absorbing, ...] = ()
     ties: tuple[Tie, ...] = ()
+    loads: tuple[Load, ...] = ()
     paths: tuple[Path, ...] = ()
     probes: tuple[Probe, ...] = ()
     sections: tuple[Section, ...] = ()
@@ -90,6 +93,11 @@ class Scene:
             if type(joint) not in JOINTS.values():  # others are not registered
                 remedy = f"give a {' or a '.join(JOINTS)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.joints[{k}]", validate.brief(joint), remedy)
+        validate.kind_of("Scene.loads", self.loads, (tuple, list), "give a tuple of loads")
+        for k, load in enumerate(self.loads):
+            if type(load) not in LOADS.values():
+                known = f"the kinds are {', '.join(LOADS)}" if LOADS else "the package has none of its own"
+                raise bad_value(f"Scene.loads[{k}]", validate.brief(load), f"{known}; list its class in LOADS")
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()
@@ -152,6 +160,9 @@ class Scene:
         if self.absorbing:
             remedy = "a cut body with absorbing sides does not move between impacts as the large one; leave t_end out"
             raise bad_value("Scene.t_end", self.t_end, remedy)
+        if self.loads:
+            remedy = "loads act in an impact alone, not in the swings between; leave t_end out"
+            raise bad_value("Scene.t_end", self.t_end, remedy)
         if self.prescribed:
             remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
             raise bad_value("Scene.t_end", self.t_end, remedy)
@@ -160,6 +171,7 @@ class Scene:
         named = [("Fixed.body", item.body) for item in self.fixed]
         named += [("Prescribed.body", item.body) for item in self.prescribed]
         named += [("Absorbing.body", item.body) for item in self.absorbing]
+        named += [(f"{type(load).__name__}.{key}", body) for load in self.loads for key, body in load.bodies().items()]
         named += [(f"{item.title}.body", item.body) for item in self.joints]
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
@@ -179,6 +191,7 @@ class Scene:
         named = [("Fixed.nodes", item.body, item.nodes, False) for item in self.fixed]
         named += [("Prescribed.nodes", item.body, item.nodes, False) for item in self.prescribed]
         named += [("Absorbing.nodes", item.body, item.nodes, True) for item in self.absorbing]
+        named += [(f"{type(load).__name__}.{key}", *own) for load in self.loads for key, own in load.sets().items()]
         for joint in self.joints:
             if isinstance(joint, Weld | Prismatic):
                 named.append((f"{joint.title}.nodes", joint.body, joint.nodes, False))

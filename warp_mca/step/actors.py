@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from warp_mca.physics.absorbing.stage import AbsorbingStage
@@ -15,10 +16,12 @@ from warp_mca.physics.joints.coupling_stage import CouplingStage
 from warp_mca.physics.loads.stage import LoadStage
 from warp_mca.physics.rigid.stage import RigidStage
 from warp_mca.physics.ties.stage import TieStage
+from warp_mca.scene.loads import LOADS
 from warp_mca.step.rated_nodes import node_stage
 from warp_mca.step.record_stage import RecordStage
 
 if TYPE_CHECKING:
+    from warp_mca.model.model import Model
     from warp_mca.step.solver import Solver
 
 ACTORS: dict[str, Callable[[Solver], Actor]] = {
@@ -34,3 +37,9 @@ ACTORS: dict[str, Callable[[Solver], Actor]] = {
     "nodes": node_stage,
     "records": RecordStage,
 }
+
+
+def actors_of(model: Model) -> dict[str, Callable[[Solver], Actor]]:
+    """All of ACTORS, and behind them the kinds of loads that a model has."""
+    loads = {kind: partial(LOADS[kind].stage(), name=kind) for kind in model.loads}
+    return ACTORS | loads

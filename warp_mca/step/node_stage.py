@@ -54,7 +54,7 @@ class NodeStage(Actor):
             each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         turned = work.frame is not None
-        self.kind = Kind(solver.precision, len(work.contact_force) > 0, each, self.rated, turned)
+        self.kind = Kind(solver.precision, len(work.nodal_force) > 0, each, self.rated, turned)
         self._choose(bool(model.fixed_axes.any()), rounds >= EARLY_ROUNDS)
 
     def _choose(self, fixed: bool, early: bool) -> None:
@@ -67,9 +67,9 @@ class NodeStage(Actor):
         """Those of a step."""
         return [self.integrate_kernel, *([self.bound_kernel] if self.bound_kernel else [])]
 
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Free nodes, once bound ones have read their forces."""
-        yield Stage("free nodes", lambda s: self.advance_free(s, when.level, when.chain))
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Free nodes, beside bound ones."""
+        yield Stage("advance", "free nodes", lambda s: self.advance_free(s, when.level, when.chain))
 
     def advance_free(self, step: Step, level: int | None = None, chain: int | None = None) -> None:
         """Free nodes, those up to a `level` of `Model.rates` or all; of one `chain` or all."""
@@ -91,7 +91,7 @@ class NodeStage(Actor):
     def moved(self, state: State, records: bool = False) -> Any:
         """What they write; where the step records, `Workspace.v_before` takes the velocities before it."""
         found = NodeState()
-        found.nodal_force, found.u, found.v = self.work.contact_force, state.u, state.v
+        found.nodal_force, found.u, found.v = self.work.nodal_force, state.u, state.v
         found.speed_square = state.speed_square
         if records:
             found.v_before = self.work.v_before
@@ -138,7 +138,7 @@ class NodeStage(Actor):
         moved = self.moved(state, records)
 
         def launch(part: slice) -> None:
-            keepers = node.KEEPERS if pressed and part.start == 0 else 0
+            keepers = node.KEEPERS if pressed and len(state.normal_force) and part.start == 0 else 0
             outputs, threads = [moved, state.normal_force if keepers else None], part.stop - part.start + keepers
             wp.launch(kernel, threads, inputs=[part.start, part.stop, *inputs], outputs=outputs, block_dim=BLOCK_DIM)
 

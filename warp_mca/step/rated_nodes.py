@@ -123,14 +123,15 @@ class RatedNodeStage(NodeStage):
         """As `NodeStage.at_record`: what was kept of the record itself."""
         return self.work.at_record(state), self.v_record, 0.0
 
-    def correct(self, when: When) -> Iterable[Stage]:
-        """Keep the velocities of a record, before the next substep changes them."""
-        yield Stage("velocities kept", lambda s: wp.copy(self.v_record, s.state.v), only_records=True)
+    def stages(self, when: When) -> Iterable[Stage]:
+        """As `NodeStage.stages`; velocities of a record are kept before the next substep changes them."""
+        yield from super().stages(when)
+        yield Stage("correct", "velocities kept", lambda s: wp.copy(self.v_record, s.state.v), only_records=True)
 
 
 def node_stage(solver: Solver) -> NodeStage:
     """The nodal stage of a solver's model."""
     rounds = 0  # of patches that the elements take, where nothing else waits for the nodes
-    if not (solver.contacts or solver.constraints.bound):
+    if not (len(solver.work.nodal_force) or solver.constraints.bound):
         rounds = min(0 if stage.block.plastic else stage.rounds for stage in solver.elements)
     return (RatedNodeStage if solver.model.rates else NodeStage)(solver, rounds)

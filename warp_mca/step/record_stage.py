@@ -38,48 +38,37 @@ class RecordStage(Actor):
         own = [ledger.record_motion, self.sum_elements_kernel, *([output.nodal_stress] if shown else [])]
         return own + self.solver.sensors.kernels()
 
-    def keep(self, when: When) -> Iterable[Stage]:
-        """The next row of the rings, and displacements that are read while nodes move."""
-        yield Stage("next record", self.next_row, BESIDE, only_records=True)
-        yield Stage("displacements kept", lambda s: self.work.keep(s.state), BESIDE, only_records=True)
+    def stages(self, when: When) -> Iterable[Stage]:
+        """What is kept, shown and summed of each record.
 
-    def energies(self, when: When) -> Iterable[Stage]:
-        """Stresses, places and forces through sections at t(n)."""
-        yield self._shown("paths, frames: stress", lambda o, s: o.before_step(s.state, s.needs), SHOWN)
-        yield Stage("places, sections", lambda s: self.solver.sensors.before_step(s), BESIDE, only_records=True)
-
-    def look(self, when: When) -> Iterable[Stage]:
-        """What is shown of springs."""
-        yield self._shown("frames: contact", lambda o, s: o.contact_points(s.state, s.needs))
-
-    def picture(self, when: When) -> Iterable[Stage]:
-        """What is shown of stresses at the corners of elements."""
-        yield self._shown("paths, frames: nodal stress", lambda o, s: o.nodal_stress(s.needs), LAST, (SHOWN,))
-
-    def motion(self, when: When) -> Iterable[Stage]:
-        """Sums over nodes and velocities at t(n), from those half a step before and after it.
-
-        Where nodes have kept all that the sums read, these may go on beside later steps.
+        Sums over nodes may go on beside later steps where nodes have kept all that they read.
         """
         kept = self.solver.nodes.rated and not self.solver.constraints.driven
-        yield Stage("motion sums", self.sum_motion, LAST if kept else MAIN, only_records=True)
-        yield Stage("frames: velocity", self._velocities, only_records=True)
+        stress = self._shown(lambda output, s: output.before_step(s.state, s.needs))
+        contact = self._shown(lambda output, s: output.contact_points(s.state, s.needs))
+        picture = self._shown(lambda output, s: output.nodal_stress(s.needs))
+        velocity = self._shown(lambda output, s: output.after_step(s.state, s.needs))
+        for place, name, launch, stream, after in (
+            ("keep", "next record", self.next_row, BESIDE, ()),
+            ("keep", "displacements kept", lambda s: self.work.keep(s.state), BESIDE, ()),
+            ("energies", "paths, frames: stress", stress, SHOWN, ()),
+            ("energies", "places, sections", lambda s: self.solver.sensors.before_step(s), BESIDE, ()),
+            ("look", "frames: contact", contact, MAIN, ()),
+            ("picture", "paths, frames: nodal stress", picture, LAST, (SHOWN,)),
+            ("motion", "motion sums", self.sum_motion, LAST if kept else MAIN, ()),
+            ("motion", "frames: velocity", velocity, MAIN, ()),
+            ("motion", "velocities of probes", lambda s: self.solver.sensors.after_step(s), MAIN, ()),
+        ):
+            yield Stage(place, name, launch, stream, only_records=True, after=after)
 
-    def _shown(
-        self, name: str, show: Callable[[Output, Step], None], stream: str = MAIN, after: tuple[str, ...] = ()
-    ) -> Stage:
-        """A stage of rows of the history, where there is output."""
+    def _shown(self, show: Callable[[Output, Step], None]) -> Callable[[Step], None]:
+        """Let the output show something in rows of the history, where there is one."""
 
         def launch(step: Step) -> None:
             if self.solver.output and step.is_row:
                 show(self.solver.output, step)
 
-        return Stage(name, launch, stream, only_records=True, after=after)
-
-    def _velocities(self, step: Step) -> None:
-        if self.solver.output and step.is_row:
-            self.solver.output.after_step(step.state, step.needs)
-        self.solver.sensors.after_step(step)
+        return launch
 
     def sum_runs(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
         """Sums of each run of entries, by a block of threads each; no scene has more entries than `largest`."""

@@ -22,7 +22,7 @@ from warp_mca.model.model import Model
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.stage import has_sides
 from warp_mca.physics.elements.stage import gather_lists
-from warp_mca.step.actors import ACTORS
+from warp_mca.step.actors import actors_of
 from warp_mca.step.device import check_device
 from warp_mca.step.rate_chains import Chains
 from warp_mca.step.records import SceneRecords
@@ -62,7 +62,7 @@ class Solver:
         dt: time step [s]; with `Model.rates` that of their substeps together.
         threads: that compute; one on a GPU, and for a model that is too small to gain from more.
         common_dt: time step of contacts and joints [s].
-        actors: all that acts, in the order of ACTORS; each is an attribute, too, by its name there.
+        actors: all that acts, in the order of `step.actors.actors_of`; each is an attribute, too, by its name there.
         output: what is read off the state for paths and recorders, or None.
         sensors: probes and sections.
         replay: graphs of what is launched.
@@ -99,9 +99,10 @@ class Solver:
 
     def __getattr__(self, name: str) -> Any:
         """An actor, made at its first use: whatever it reads of others is made before it."""
-        if name not in ACTORS:
+        kinds = self.__dict__.get("kinds", {})
+        if name not in kinds:
             raise AttributeError(name)
-        self.__dict__[name] = found = ACTORS[name](self)
+        self.__dict__[name] = found = kinds[name](self)
         return found
 
     @cached_property
@@ -113,8 +114,9 @@ class Solver:
 
     def _allocate(self) -> None:
         model = self.model
+        self.kinds = actors_of(model)
         self.sensors = SensorStage(self, ())
-        self.actors: list[Actor] = [getattr(self, name) for name in ACTORS]
+        self.actors: list[Actor] = [getattr(self, name) for name in self.kinds]
         if blocks := self.contacts.blocks + self.couplings.blocks:
             for stage in self.elements:
                 stage.make_room(blocks)
@@ -129,7 +131,7 @@ class Solver:
         """State at the start of the phase: the model's velocities, no displacement, no stress."""
         with wp.ScopedDevice(self.device):
             single = wp.get_device().is_cuda and self.layout.count == 1
-            parts = {name: getattr(self, name).new_state() for name in ACTORS}
+            parts = {name: getattr(self, name).new_state() for name in self.kinds}
             return State(
                 u=wp.zeros(self.model.node_count, dtype=wp.vec3d),
                 v=wp.array(self.model.V, dtype=wp.vec3d),
@@ -150,10 +152,8 @@ class Solver:
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            flush = [] if wp.get_device().is_cuda else [subnormals.begin_flush]
-            by_size: dict[int | None, list[Any]] = {
-                None: flush + [kernel for actor in self.actors for kernel in actor.record_kernels()]
-            }
+            by_size: dict[int | None, list[Any]] = {None: [] if wp.get_device().is_cuda else [subnormals.begin_flush]}
+            by_size[None] += [kernel for actor in self.actors for kernel in actor.record_kernels()]
             kernels = [(actor.block_dim, actor.kernels()) for actor in self.actors]
             kernels += [self.resident.kernels()] if self.resident else []
             for size, some in kernels:
@@ -181,10 +181,12 @@ class Solver:
     def start(self, state: State) -> None:
         """Take the velocities half a step back, from t = 0 to t = -dt / 2, as central differences hold them.
 
-        Bodies are free of stress then, so that gravity and the drives of joints alone accelerate them.
+        Bodies are free of stress then, so that gravity, loads and the drives of joints alone accelerate them.
         """
         with wp.ScopedDevice(self.device):
             self.work.force.zero_()  # of a state that was advanced before
+            for actor in self.actors:
+                actor.start_forces(state)
             self.nodes.integrate(state, -0.5 * self.nodes.base, 0.0, self.constraints.at_rest)
             for actor in self.actors:
                 actor.start(state)

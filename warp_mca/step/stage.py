@@ -49,6 +49,7 @@ class Stage:
     """Something that is launched in every step, or in those that record.
 
     Attributes:
+        place: in a step, as `step.step_groups.STEP` lists them.
         name: as docs/architecture.md lists it.
         launch: launches its kernels for a step.
         stream: MAIN, or what else stands at the head of this module.
@@ -56,6 +57,7 @@ class Stage:
         after: streams of which it waits for what is in them so far.
     """
 
+    place: str
     name: str
     launch: Callable[[Step], None]
     stream: str = MAIN

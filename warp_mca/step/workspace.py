@@ -9,8 +9,9 @@ import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
-from warp_mca.kernels.records.columns import JACOBIAN, column_count
+from warp_mca.kernels.records.columns import JACOBIAN
 from warp_mca.kernels.records.ledger import SUM_WIDTH
+from warp_mca.model.columns import column_count
 from warp_mca.model.layout import Layout
 from warp_mca.model.model import Model
 from warp_mca.model.precision import limited
@@ -36,7 +37,8 @@ class Workspace:
         frame: floating frame of each node, shape (node_count,), int32; None where elements compute in the world frame.
         u_seen: displacement of each node in its frame [m], shape (node_count,), vec3d; empty without frames.
         force: of each element on its nodes in their frames, by slot [N], vec3 in the scalars of the precision.
-        contact_force: other forces on nodes [N], shape (node_count,), vec3d, zero between steps; empty without contact.
+        nodal_force: forces on nodes beside those of elements [N], of contact and loads, shape (node_count,), vec3d,
+            zero between steps; empty without these.
         u_record: displacements at the latest record [m], shape (node_count,), vec3d, for energies and stresses that are
             taken while nodes move; empty on a CPU with one rate.
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
@@ -52,7 +54,7 @@ class Workspace:
         self, model: Model, layout: Layout, precision: str, first_slots: np.ndarray, more_slots: np.ndarray, slots: int
     ):
         """Allocate on the current device; `slots` are those of the forces."""
-        t, passes = scalars(precision), len(model.passes) // layout.count
+        t = scalars(precision)
         self.X = wp.array(model.X, dtype=wp.vec3d)
         self.mass = wp.array(model.mass, dtype=wp.float64)
         self.inverse_mass = wp.array(1.0 / np.where(model.mass > 0.0, model.mass, 1.0), dtype=wp.float64)
@@ -63,14 +65,13 @@ class Workspace:
         self.u_seen = wp.zeros(model.node_count if model.floating else 0, dtype=wp.vec3d)
         # one slot more, without force, for nodes without elements
         self.force = wp.zeros(slots + bool(model.rigid_bodies), dtype=t.vec3)
-        self.contact_force = wp.zeros(model.node_count if passes else 0, dtype=wp.vec3d)
+        self.nodal_force = wp.zeros(model.node_count if model.passes or model.loads else 0, dtype=wp.vec3d)
         kept = wp.get_device().is_cuda or model.rates is not None
         self.u_record = wp.zeros(model.node_count if kept else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
         self.energy = wp.zeros((5, model.element_count), dtype=t.real)
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
-        columns = column_count(passes, len(model.absorbing.node) > 0)
-        self.partial = wp.zeros((ROWS, layout.count, columns, SUM_WIDTH), dtype=wp.float64)
+        self.partial = wp.zeros((ROWS, layout.count, column_count(model), SUM_WIDTH), dtype=wp.float64)
         self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)

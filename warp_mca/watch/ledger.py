@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.kernels.records.columns import (
-    ABSORBED,
-    BEYOND_WORK,
     CARRIAGE,
     DAMPED,
     DRIVE_WORK,
@@ -33,9 +31,8 @@ from warp_mca.kernels.records.columns import (
     SPRING_ENERGY,
     SQUARES,
     STRAIN,
-    absorbing_column,
-    column_count,
 )
+from warp_mca.model.columns import added_columns, column_count
 from warp_mca.step.records import SceneRecords
 from warp_mca.watch.guards import Reading, stop
 from warp_mca.watch.row import When
@@ -92,7 +89,7 @@ class Ledger:
     @property
     def _width(self) -> int:
         """Columns of a record."""
-        return column_count(len(self.model.passes), self.absorbs)
+        return column_count(self.model)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of a scene's `records`, see `Layout.records`, and hold them to the guards.
@@ -140,7 +137,7 @@ class Ledger:
 
     def springs(self, sums: Array) -> Array:
         """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
-        end = absorbing_column(len(self.model.passes))
+        end = PASS + PASS_COLUMNS * len(self.model.passes)
         return sums[..., PASS:end].reshape(*sums.shape[:-1], len(self.model.passes), PASS_COLUMNS)
 
     def _energies(self, sums: Array) -> dict[str, Array]:
@@ -148,8 +145,7 @@ class Ledger:
         springs = self.springs(sums)
         work = sums[..., GRAVITY_WORK] + sums[..., DRIVE_WORK] + sums[..., LOAD_WORK]
         work = work + springs[..., PLANE_WORK].sum(axis=-1)
-        absorbed, beyond = self._absorbed(sums)
-        return {
+        found = {
             "kinetic": sums[..., KINETIC] + sums[..., CARRIAGE],
             "elastic": sums[..., ELASTIC],
             "plastic": sums[..., PLASTIC],
@@ -159,16 +155,13 @@ class Ledger:
             "contact_loss": springs[..., LOST].sum(axis=-1),
             "damping": springs[..., DAMPED].sum(axis=-1),
             "joint": sums[..., JOINT_HEAT],
-            "absorbed": absorbed,
-            "external_work": work + beyond - self.kept.initial_work,
+            "absorbed": np.zeros(sums.shape[:-1]),
+            "external_work": work,
         }
-
-    def _absorbed(self, sums: Array) -> tuple[Array, Array]:
-        """Energy that absorbing boundaries took up, and work of what lies beyond them [J], of each row of sums."""
-        if not self.absorbs:
-            return np.zeros(sums.shape[:-1]), np.zeros(sums.shape[:-1])
-        first = absorbing_column(len(self.model.passes))
-        return sums[..., first + ABSORBED], sums[..., first + BEYOND_WORK]
+        for own in added_columns(self.model).values():
+            for k, name in enumerate(own.energies):
+                found[name] = found.get(name, 0.0) + sums[..., own.first + k]
+        return found | {"external_work": found["external_work"] - self.kept.initial_work}
 
     def _made(self, sums: Array) -> Array:
         """Energy that contact springs made as they closed and opened within steps [J], of each row of sums."""

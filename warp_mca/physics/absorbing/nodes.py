@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +30,14 @@ class AbsorbingNodes:
     """Nodes of absorbing boundaries; none where a scene has none.
 
     Attributes:
+        ENERGIES: entries of the energy ledger that their columns add to.
         node: sorted, shape (count,), int32.
         damping: matrix C of each node's dashpots [N s/m], symmetric, 0 for axes at rest, shape (count, 3, 3), float64.
         stiffness: matrix S of each node's springs [N/m], symmetric, 0 for axes at rest, shape (count, 3, 3), float64.
         velocity: of the body that each belongs to, relative to which they absorb [m/s], shape (count, 3), float64.
     """
+
+    ENERGIES: ClassVar[tuple[str, ...]] = ("absorbed", "external_work")
 
     node: Index = field(metadata=of("nodes"))
     damping: Array = field(metadata=AS_IS)

@@ -12,7 +12,7 @@ import warp as wp
 from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
 from warp_mca.kernels.nodes.gather import LEVEL_BIT
 from warp_mca.kernels.records.absorbing import sum_absorbed
-from warp_mca.kernels.records.columns import absorbing_column
+from warp_mca.model.columns import added_columns
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
 from warp_mca.step.stage import BESIDE, Stage, Step
@@ -75,7 +75,7 @@ class AbsorbingStage(Actor):
         self.kernel = absorbing_kernel(nodes.kind, own.sprung)
         first = np.searchsorted(own.node, layout.nodes)
         self.first, self.most = wp.array(first, dtype=wp.int32), int(np.diff(first).max())
-        self.column = absorbing_column(len(model.passes) // layout.count)
+        self.column = added_columns(model)["absorbing"].first
 
     def new_state(self) -> AbsorbingState:
         """State before the first step, on the current device."""
@@ -95,15 +95,12 @@ class AbsorbingStage(Actor):
         """Those of a record."""
         return [sum_absorbed] if self.count else []
 
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Its nodes, against their dashpots."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Its nodes, against their dashpots; energy absorbed and work of what lies beyond."""
         if self.count and len(item := self._items(when)):
-            yield Stage("absorbing boundaries", lambda s: self._advance(s, item, when.level), BESIDE)
-
-    def works(self, when: When) -> Iterable[Stage]:
-        """Energy absorbed and work of what lies beyond."""
+            yield Stage("advance", "absorbing boundaries", lambda s: self._advance(s, item, when.level), BESIDE)
         if self.count:
-            yield Stage("absorbed energy", self._sum, only_records=True)
+            yield Stage("works", "absorbed energy", self._sum, only_records=True)
 
     def _items(self, when: When) -> wp.array:
         """Its nodes up to a level, or all; of one level where a chain is given. As the kernel takes them."""

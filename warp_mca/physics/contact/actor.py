@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,39 +63,30 @@ class Contacts(list[ContactStage], Actor):
         for stage in self:
             stage.search(self.solver.work, state)
 
-    def forces(self, when: When) -> Iterable[Stage]:
-        """Forces of each pass, after the search or ahead of it."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Forces of each pass, after the search or ahead of it, and sums of these."""
         work, dt = self.solver.work, self.solver.nodes.dt
+
+        def searching(which: Search, act: Callable[[ContactStage, Step], None]) -> Callable[[Step], None]:
+            def launch(step: Step) -> None:
+                for own in self if step.search == which else ():
+                    act(own, step)
+
+            return launch
+
         if when.common and self:
-            search = self._in_search("before", lambda own, s: own.search(work, s.state))
-            yield Stage("search before contact", search, BEYOND, only_records=True)
+            search = searching("before", lambda own, s: own.search(work, s.state))
+            boxes = searching("after", lambda own, s: own.find_boxes(work, work.at_record(s.state)))
+            lists = searching("after", lambda own, s: own.list_faces(work, s.state, work.at_record(s.state)))
+            yield Stage("forces", "search before contact", search, BEYOND, only_records=True)
             for own in self:
-                yield Stage("contact", lambda s, own=own: own.launch(work, s.state, dt, s.split), BEYOND)
-
-    def search(self, when: When) -> Iterable[Stage]:
-        """Search while nodes move, for the steps that follow."""
-        work = self.solver.work
-        if when.common and self:
-            boxes = self._in_search("after", lambda own, s: own.find_boxes(work, work.at_record(s.state)))
-            lists = self._in_search("after", lambda own, s: own.list_faces(work, s.state, work.at_record(s.state)))
-            yield Stage("boxes of faces", boxes, LISTS, only_records=True, after=(BESIDE,))
-            yield Stage("search after contact", lists, LISTS, only_records=True, after=(BEYOND,))
-
-    def sums(self, when: When) -> Iterable[Stage]:
-        """Force, impulse, energy and friction of each pass."""
+                yield Stage("forces", "contact", lambda s, own=own: own.launch(work, s.state, dt, s.split), BEYOND)
+            yield Stage("search", "boxes of faces", boxes, LISTS, only_records=True, after=(BESIDE,))
+            yield Stage("search", "search after contact", lists, LISTS, only_records=True, after=(BEYOND,))
         for own in self:
-            yield Stage("spring sums", lambda s, own=own: self._sum(s, own), SPRINGS, only_records=True)
+            yield Stage("sums", "spring sums", partial(self._sum, own), SPRINGS, only_records=True)
 
-    def _in_search(self, which: Search, act: Callable[[ContactStage, Step], None]) -> Callable[[Step], None]:
-        """Let each pass act in steps that search before or after contact."""
-
-        def launch(step: Step) -> None:
-            for own in self if step.search == which else ():
-                act(own, step)
-
-        return launch
-
-    def _sum(self, step: Step, own: ContactStage) -> None:
+    def _sum(self, own: ContactStage, step: Step) -> None:
         """Sums of a pass. In a check between rows, what is summed over an output interval goes on."""
         inputs = [own.column, own.first, step.is_row, step.state.contacts[own.index].spring]
         self.solver.records.sum_runs(sum_springs, int(np.diff(own.springs).max()), inputs)

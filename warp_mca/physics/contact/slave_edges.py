@@ -72,6 +72,6 @@ class SlaveEdges:
 
         def launch(part: slice) -> None:
             inputs = [part.start, self.faces, own.spring]
-            wp.launch(self.carry, part.stop - part.start, inputs, [work.contact_force], block_dim=contact.BLOCK_DIM)
+            wp.launch(self.carry, part.stop - part.start, inputs, [work.nodal_force], block_dim=contact.BLOCK_DIM)
 
         split(len(self.faces.node), launch, CONTACT)

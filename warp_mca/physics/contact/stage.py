@@ -246,7 +246,7 @@ class ContactStage:
 
         def launch(kernel: Any, lanes: int, inputs: Sequence[Any], part: slice) -> None:
             threads = lanes * (part.stop - part.start)
-            outputs: list[Any] = [work.contact_force, state.flag]
+            outputs: list[Any] = [work.nodal_force, state.flag]
             if not self.on_plane:
                 outputs.insert(1, state.recent_force)
             if kernel is self.kernel:  # a row of sums for each range of slaves

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.stage import SUMS, Stage
+from warp_mca.step.stage import SUMS, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
@@ -38,24 +39,18 @@ class Elements(list[ElementStage], Actor):
         more = [stage.stress_kernel for stage in self if shown]
         return [kernel for stage in self for kernel in stage.kernels()] + more
 
-    def forces(self, when: When) -> Iterable[Stage]:
-        """Forces of the elements of each block."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Forces of each block; energies at t(n), which a GPU takes from kept displacements while nodes move."""
         work, level, chain = self.solver.work, when.level, when.chain
+
+        def forces(own: ElementStage, step: Step) -> None:
+            own.launch(work, step.state, step.split, level, chain)
+
+        def energies(own: ElementStage, step: Step) -> None:
+            own.energies(work, step.state, step.split, work.at_record(step.state))
+
         for own in self:
             if level is None or own.parts(level, chain):
-                yield Stage("element forces", lambda s, own=own: own.launch(work, s.state, s.split, level, chain))
-
-    def energies(self, when: When) -> Iterable[Stage]:
-        """Energies at t(n); a GPU takes them from the displacements that were kept, while nodes move."""
-        work = self.solver.work
-        for own in self:
-            yield Stage(
-                "element energies",
-                lambda s, own=own: own.energies(work, s.state, s.split, work.at_record(s.state)),
-                SUMS,
-                only_records=True,
-            )
-
-    def sums(self, when: When) -> Iterable[Stage]:
-        """Energies and extremes of each scene."""
-        yield Stage("element sums", self.solver.records.sum_elements, SUMS, only_records=True)
+                yield Stage("forces", "element forces", partial(forces, own))
+            yield Stage("energies", "element energies", partial(energies, own), SUMS, only_records=True)
+        yield Stage("sums", "element sums", self.solver.records.sum_elements, SUMS, only_records=True)

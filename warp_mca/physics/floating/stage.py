@@ -54,11 +54,11 @@ class FloatingStage(Actor):
         """Those of a step."""
         return [floating.follow_bodies, floating.see_nodes] if self.count else []
 
-    def frames(self, when: When) -> Iterable[Stage]:
+    def stages(self, when: When) -> Iterable[Stage]:
         """Frames that turn with their bodies, and nodes as seen in them."""
         if self.count:
-            yield Stage("floating frames", self._turn, only_records=True)
-            yield Stage("nodes in floating frames", self._see)
+            yield Stage("frames", "floating frames", self._turn, only_records=True)
+            yield Stage("frames", "nodes in floating frames", self._see)
 
     def _turn(self, step: Step) -> None:
         """Turn the frames with their bodies."""

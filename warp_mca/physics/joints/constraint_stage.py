@@ -68,6 +68,8 @@ class ConstraintStage(Actor):
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
             role[item.master] |= TOUCHABLE
+        for item in (item for items in model.loads.values() for item in items):
+            role[item.node] |= TOUCHABLE
         if not self.bound and not role.any():
             role = role[:0]
         self.at_rest = wp.array(role, dtype=wp.uint8)
@@ -103,10 +105,10 @@ class ConstraintStage(Actor):
         """That of rails, which has blocks of Warp's own size; `NodeStage` has those of bound nodes."""
         return [slide.slide] if len(self.rails) else []
 
-    def advance(self, when: When) -> Iterable[Stage]:
+    def stages(self, when: When) -> Iterable[Stage]:
         """Nodes in joints and driven ones, then sliders, which have moved as free ones."""
         nodes = self.solver.nodes
         if when.common and self.count:
-            yield Stage("joints, driven nodes", lambda s: nodes.advance_bound(s, when.level), BESIDE)
+            yield Stage("advance", "joints, driven nodes", lambda s: nodes.advance_bound(s, when.level), BESIDE)
         if when.common and len(self.rails):
-            yield Stage("sliders on rails", nodes.slide, BESIDE)
+            yield Stage("advance", "sliders on rails", nodes.slide, BESIDE)

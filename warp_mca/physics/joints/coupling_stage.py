@@ -104,15 +104,11 @@ class CouplingStage(Actor):
         """Blocks of threads that take part."""
         return self.threads[0] if self.count else 0
 
-    def forces(self, when: When) -> Iterable[Stage]:
-        """What impulses need of positions, beside the forces."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """What impulses need of positions, beside the forces; then clusters, which have moved as free nodes."""
         if when.common and self.count:
-            yield Stage("couplings: responses", self.find_responses, ASIDE)
-
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Clusters, which have moved as free nodes."""
-        if when.common and self.count:
-            yield Stage("couplings", self.couple, BESIDE)
+            yield Stage("forces", "couplings: responses", self.find_responses, ASIDE)
+            yield Stage("advance", "couplings", self.couple, BESIDE)
 
     def find_responses(self, step: Step) -> None:
         """What impulses need and positions give."""

@@ -147,20 +147,14 @@ class LoadStage(Actor):
         if self.hinges:
             self.torques(state, -0.5 * self.dt, 0.0)
 
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Bases that move or slide, with their hinge nodes."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Bases that move or slide, with their hinge nodes; torques; work, heat and kinetic energy of carriages."""
         if when.common and self.bases:
-            yield Stage("bases", self.move_bases, BESIDE)
-
-    def correct(self, when: When) -> Iterable[Stage]:
-        """Torques, on the velocities that all else gave."""
+            yield Stage("advance", "bases", self.move_bases, BESIDE)
         if when.common and self.hinges:
-            yield Stage("joint torques", lambda s: self.torques(s.state, self.dt, self.dt))
-
-    def works(self, when: When) -> Iterable[Stage]:
-        """Work, heat and kinetic energy of carriages."""
+            yield Stage("correct", "joint torques", lambda s: self.torques(s.state, self.dt, self.dt))
         if self.hinges or self.bases:
-            yield Stage("joint and base sums", self._sum, only_records=True)
+            yield Stage("works", "joint and base sums", self._sum, only_records=True)
 
     def torques(self, state: State, kick: float, drift: float) -> None:
         """Let torques act for `kick` [s] on nodes that all else has moved for `drift` [s]; 0 before the first step."""

@@ -183,10 +183,10 @@ class RigidStage(Actor):
         self._advance(state, -0.5 * self.dt, -self.dt, False)
         self._follow(state, whole)
 
-    def advance(self, when: When) -> Iterable[Stage]:
+    def stages(self, when: When) -> Iterable[Stage]:
         """Rigid bodies and their nodes."""
         if when.common and self.count:
-            yield Stage("rigid bodies", lambda s: self._step(s, when.level), BESIDE)
+            yield Stage("advance", "rigid bodies", lambda s: self._step(s, when.level), BESIDE)
 
     def _step(self, step: Step, level: int | None) -> None:
         """All rigid bodies and their nodes, with forces of elements up to a level, or of all."""

@@ -53,15 +53,11 @@ class TieStage(Actor):
         """Those of a step."""
         return [self.masters_kernel, self.follow_kernel] if self.count else []
 
-    def advance(self, when: When) -> Iterable[Stage]:
-        """Masters, which carry the slaves."""
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Masters, which carry the slaves, and slaves, once these have moved."""
         if when.common and self.count:
-            yield Stage("masters of ties", lambda s: self._advance(s, when.level), BESIDE)
-
-    def follow(self, when: When) -> Iterable[Stage]:
-        """Slaves, once their masters have moved."""
-        if when.common and self.count:
-            yield Stage("slaves of ties", self._follow)
+            yield Stage("advance", "masters of ties", lambda s: self._advance(s, when.level), BESIDE)
+            yield Stage("follow", "slaves of ties", self._follow)
 
     def _advance(self, step: Step, level: int | None) -> None:
         """Masters, with the forces on their slaves of elements up to a level, or of all."""

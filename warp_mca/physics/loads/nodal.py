@@ -1,0 +1,77 @@
+"""Owns the host side of loads on nodes, of the kinds in `scene.loads.LOADS`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import bad_value
+from warp_mca.base.joining import SCENE, joinable, of
+from warp_mca.model.assembly import Assembly
+from warp_mca.scene.loads import LOADS
+
+
+@joinable
+@dataclass(frozen=True, kw_only=True)
+class LoadedNodes:
+    """Arrays of one load, to which a kind adds its own, each with a rule of `base/joining.py`.
+
+    Attributes:
+        node: on which it acts, shape (count,), int32.
+        scene: number of the scene in a batch.
+    """
+
+    node: NDArray[np.int32] = field(metadata=of("nodes"))
+    scene: int = field(default=0, metadata=SCENE)
+
+    def eigenvalues(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What it adds at each of its nodes to the eigenvalue that bounds the stable step [1/s^2], shape (count,).
+
+        `mass` is that of all nodes [kg], shape (node_count,).
+        """
+        return np.zeros(len(self.node))
+
+
+def loaded_nodes(
+    parts: Assembly, start: float, added: NDArray[np.float64], several_rates: bool
+) -> dict[str, tuple[LoadedNodes, ...]]:
+    """The loads of a scene by kind, for a phase that starts so long after the release [s].
+
+    What they add to the eigenvalues is added to `added` [1/s^2], shape (node_count,).
+
+    Raises:
+        RequestError: a load acts on a rigid body, or does not go with `several_rates`.
+    """
+    found: dict[str, list[LoadedNodes]] = {}
+    for load in parts.scene.loads:
+        kind = type(load).__name__
+        for name, body in load.bodies().items():
+            if parts.scene.body(body).rigid:
+                raise bad_value(f"{kind}.{name}", body, "loads act on nodes of flexible bodies; leave rigid off")
+        if several_rates and "multi_rate" in load.refuses:
+            raise bad_value("Scene.loads", kind, f"it does not go with multi_rate; {load.refuses['multi_rate']}")
+        item = load.build(parts, start)
+        np.add.at(added, item.node, item.eigenvalues(parts.mass))
+        found.setdefault(kind, []).append(item)
+    return {kind: tuple(found[kind]) for kind in sorted(found)}
+
+
+def check_batch(scenes: Sequence[Mapping[str, object]]) -> None:
+    """Refuse scenes of a batch whose kinds of loads differ, or that have a kind which no batch can.
+
+    Args:
+        scenes: loads of each scene by kind, as `Model.loads`.
+
+    Raises:
+        RequestError: there are such scenes.
+    """
+    for loads in scenes:
+        if loads.keys() != scenes[0].keys():
+            differing = ", ".join(sorted(loads.keys() ^ scenes[0].keys()))
+            raise bad_value("Scene.loads", differing, "scenes of a batch have loads of the same kinds; run them apart")
+    for kind in scenes[0]:
+        if "run_batch" in LOADS[kind].refuses:
+            raise bad_value("Scene.loads", kind, f"it does not go with run_batch; {LOADS[kind].refuses['run_batch']}")

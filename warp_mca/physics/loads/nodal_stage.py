@@ -1,0 +1,73 @@
+"""Owns the device side of loads on nodes: forces that they add to those of a step, and sums of their energies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.base.joining import offsets
+from warp_mca.kernels.records.entries import sum_entries
+from warp_mca.model.columns import added_columns
+from warp_mca.physics.actor import Actor, When
+from warp_mca.step.stage import BEYOND, Stage, Step
+
+if TYPE_CHECKING:
+    from warp_mca.step.solver import Solver
+    from warp_mca.step.state import State
+
+
+class NodalLoad(Actor):
+    """All loads of one kind. A subclass computes forces in `push`; its part of the State is `State.parts[name]`.
+
+    Attributes:
+        name: of the kind.
+        items: the loads, those of each scene in turn.
+        column: of a record, the first that they add.
+        count: numbers that hold the energies of all.
+    """
+
+    def __init__(self, solver: Solver, name: str) -> None:
+        """Allocate on the current device."""
+        self.solver, self.name, self.work = solver, name, solver.work
+        self.items: Sequence[Any] = solver.model.loads[name]
+        self.column = added_columns(solver.model)[name].first
+        counts = np.zeros(solver.layout.count, dtype=np.int64)
+        np.add.at(counts, [item.scene for item in self.items], [self.entries(item) for item in self.items])
+        self.count, self.most = int(counts.sum()), int(counts.max())
+        self.first = wp.array(offsets(counts.tolist()), dtype=wp.int32)
+
+    def entries(self, item: Any) -> int:
+        """How many numbers hold the energies of a load."""
+        return len(item.node)
+
+    def push(self, step: Step, start: bool = False) -> None:
+        """Add forces [N] at u(n), v(n-1/2) to `work.nodal_force`, and count energies up to t(n).
+
+        `start`: at t = 0, for the half step before it; the State stays as it is.
+        """
+        raise NotImplementedError
+
+    def energies_of(self, state: State) -> Sequence[wp.array]:
+        """Of each of `Load.energies` at t(n) [J], shape (count,), float64: `entries` of each load in turn."""
+        raise NotImplementedError
+
+    def record_kernels(self) -> list[Any]:
+        """That of the sums."""
+        return [sum_entries]
+
+    def start_forces(self, state: State) -> None:
+        """Forces that act at t = 0 already."""
+        self.push(Step(state), start=True)
+
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Forces, in the stream of contact, which adds to the same ones; energies of each scene."""
+        if when.common:
+            yield Stage("forces", f"loads: {self.name}", self.push, BEYOND)
+        yield Stage("works", f"energies: {self.name}", self._sum, only_records=True)
+
+    def _sum(self, step: Step) -> None:
+        for k, entry in enumerate(self.energies_of(step.state)):
+            self.solver.records.sum_runs(sum_entries, self.most, [self.column + k, self.first, entry])
