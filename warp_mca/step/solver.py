@@ -131,7 +131,6 @@ class Solver:
         """State at the start of the phase: the model's velocities, no displacement, no stress."""
         with wp.ScopedDevice(self.device):
             single = wp.get_device().is_cuda and self.layout.count == 1
-            parts = {name: getattr(self, name).new_state() for name in self.kinds}
             return State(
                 u=wp.zeros(self.model.node_count, dtype=wp.vec3d),
                 v=wp.array(self.model.V, dtype=wp.vec3d),
@@ -140,7 +139,7 @@ class Solver:
                 normal_force=self.contacts.normal_force.new_state(),
                 recent_force=wp.zeros(self.model.node_count if has_sides(self.model) else 0, dtype=wp.vec3d),
                 flag=wp.zeros((self.layout.count, len(FLAGS)), dtype=wp.int32),
-                parts={name: part for name, part in parts.items() if part is not None},
+                parts={name: part for name in self.kinds if (part := getattr(self, name).new_state()) is not None},
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
@@ -191,8 +190,7 @@ class Solver:
             for actor in self.actors:
                 actor.start(state)
             speeds = (self.model.V**2).sum(axis=1)  # not those before the start
-            squares = state.speed_square
-            squares.assign(speeds if len(squares) > 1 else speeds.max(keepdims=True))
+            state.speed_square.assign(speeds if len(state.speed_square) > 1 else speeds.max(keepdims=True))
 
     @property
     def _captured(self) -> int:
