@@ -15,16 +15,19 @@ def size(array: wp.array) -> int:
     return array.size * wp.types.type_size_in_bytes(array.dtype)
 
 
-def arrays(owner: Any, seen: dict[int, wp.array]) -> dict[int, wp.array]:
-    """Every array that an object holds, by address; stages, springs and lists are looked through."""
-    values = owner if isinstance(owner, list | tuple) else vars(owner).values() if hasattr(owner, "__dict__") else ()
-    for value in list(values):
+def arrays(owner: Any, seen: dict[int, wp.array], owners: dict[int, Any]) -> dict[int, wp.array]:
+    """Every array that an object holds, by address; stages, springs, lists and tables are looked through, each once."""
+    if id(owner) in owners:
+        return seen
+    owners[id(owner)] = owner  # kept, so that no other object gets its number meanwhile
+    items = owner.values() if isinstance(owner, dict) else owner if isinstance(owner, list | tuple) else ()
+    for value in [*items, *getattr(owner, "__dict__", {}).values()]:
         if isinstance(value, wp.array):
-            if value.ptr:
+            if value.ptr and (value.ptr not in seen or size(value) > size(seen[value.ptr])):  # not a view of it
                 seen[value.ptr] = value
-        elif type(value).__module__.startswith("warp_mca.") or isinstance(value, list | tuple):
+        elif type(value).__module__.startswith("warp_mca.") or isinstance(value, list | tuple | dict):
             if not type(value).__module__.startswith("warp_mca.model.model"):
-                arrays(value, seen)
+                arrays(value, seen, owners)
         elif type(value).__name__ in ("StructInstance", "NewStructInstance"):
             for name in value._cls.vars:
                 item = getattr(value, name)
@@ -64,7 +67,7 @@ def memory(held: Held) -> dict[str, float]:
     """Bytes of the arrays of solver and state, and of a step, for each element."""
     count = held.solver.model.element_count
     found = {
-        "bytes_per_element": sum(size(a) for a in arrays([held.solver, held.state], {}).values()) / count,
+        "bytes_per_element": sum(size(a) for a in arrays([held.solver, held.state], {}, {}).values()) / count,
         "step_bytes_per_element": step_bytes(held) / count,
     }
     return found
