@@ -13,7 +13,7 @@ from warp_mca.accuracy.store import Family, Size
 from warp_mca.accuracy.variant import Variant
 from warp_mca.phases.rate_groups import StepCost
 
-# Probabilities, weighed by scenes of the store that are left out in turn (docs/accuracy.md):
+# Probabilities, weighed by scenes of the store that are left out in turn (docs/measurements/accuracy.md):
 LEAST = 0.84  # that all errors are within what was asked; a variant below it is not chosen [-]
 WORTH = 0.2  # what twice the cost must add to it [-]
 REGRET = 0.4  # weight of the probability that no variant of less than half the cost would do [-]

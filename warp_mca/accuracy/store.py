@@ -1,7 +1,8 @@
 """Owns the store of measured runs: for families of scenes, variants of the model and the errors that each has made.
 
 The package has a file of its own; users add theirs, of the same form, to a folder (`user_folder`). Nothing is written
-there by a run, so that what a run chooses depends on these files and the scene alone. docs/accuracy.md has the format.
+there by a run, so that what a run chooses depends on these files and the scene alone. The format stands in
+docs/measurements/accuracy.md.
 """
 
 from __future__ import annotations
