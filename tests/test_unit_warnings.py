@@ -60,6 +60,7 @@ def test_the_likely_unit_of_stiffness_and_density_is_named(E: float, rho: float,
     [
         STEEL,
         {"E": 1e6, "nu": 0.49, "rho": 1000.0},  # rubber, 31 m/s
+        {"E": 2e5, "nu": 0.49, "rho": 1100.0},  # softer rubber, 13 m/s
         {"E": 1e5, "nu": 0.0, "rho": 100.0},  # soft foam
         {"E": 1e4, "nu": 0.2, "rho": 1.0},  # aerogel
         {"E": 1.1e12, "nu": 0.07, "rho": 3520.0},  # diamond, 17.7 km/s

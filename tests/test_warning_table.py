@@ -24,6 +24,7 @@ def test_each_row_is_told_beyond_its_limit_and_not_just_within(row: Row):
 def test_names_of_rows_are_their_own():
     assert len({row.name for row in TABLE}) == len(TABLE)
     assert set(PAIRS) == {row.name for row in TABLE}
+    assert all(row.found.__doc__ and (row.unit or not row.limit) for row in TABLE)
 
 
 def test_the_page_of_warnings_is_written_from_the_table():

@@ -25,7 +25,7 @@ class SceneRecords:
             (pass_count, 2), float64.
         stiffened: of each body, when its strain energy [J] was greatest of a few looks, what `bent_cells` names of the
             bending of its cells, shape (body_count, COLUMNS), float64.
-        passed: of each case that `runs.passing_cases` lists, how deep it was seen [m], when first [s], where deepest
+        passed: of each case that `watch.passing_cases` lists, how deep it was seen [m], when first [s], where deepest
             [m] and how deep at the start [m], shape (case_count, 6), float64; empty before the first look.
         due: step from which on the next of these looks is due [-].
         apart: steps between two of them, by the latest one [-]; 0 before the first.

@@ -133,7 +133,8 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
 )
 def bending(c: Finished, most: float) -> Iterator[Values]:
     """Strain energy of cells that bend right over that of the body's cells, when this was greatest."""
-    for body, sums, kinds in _bodies(c):
+    for body, sums in _bodies(c):
+        kinds = _kinds(c.model, body)
         error = sums[RIGHT] / sums[SPENT] - 1.0
         limit = STRUCK if c.ledger.kept.touched else JUMPING if kinds.jump else most
         if -error > limit or (error > limit and sums[BENT] > SINGLE * sums[SPENT]):
@@ -155,10 +156,12 @@ def bending(c: Finished, most: float) -> Iterator[Values]:
 )
 def bending_flow(c: Finished, most: float) -> Iterator[Values]:
     """Equivalent strain of cells that yield in bending over that of cells that bend right."""
-    for body, sums, kinds in _bodies(c):
+    for body, sums in _bodies(c):
         flow = sums[FLOWING] / sums[FLOW] if sums[FLOW] > 0.0 else 1.0
         if abs(flow - 1.0) > (STRUCK if c.ledger.kept.touched else most):
-            yield dict(body=body, early="early" if flow < 1.0 else "late", flow=flow, remedy=kinds.remedy)
+            yield dict(
+                body=body, early="early" if flow < 1.0 else "late", flow=flow, remedy=_kinds(c.model, body).remedy
+            )
 
 
 @row(
@@ -171,9 +174,9 @@ def bending_flow(c: Finished, most: float) -> Iterator[Values]:
 )
 def bending_without_flow(c: Finished, most: float) -> Iterator[Values]:
     """Energy of bending stresses beyond yield that do not yield."""
-    for body, sums, kinds in _bodies(c):
+    for body, sums in _bodies(c):
         if sums[MISSED] > most * sums[SPENT]:
-            yield dict(body=body, remedy=kinds.remedy)
+            yield dict(body=body, remedy=_kinds(c.model, body).remedy)
 
 
 class Kinds(NamedTuple):
@@ -192,14 +195,14 @@ class Kinds(NamedTuple):
         return f"take {layers}" if self.yields else f"choose hex8r, or {layers}"
 
 
-def _bodies(c: Finished) -> Iterator[tuple[str, Array, Kinds]]:
-    """Bodies with strain energy that tells something: names, energies, and what they are made of."""
+def _bodies(c: Finished) -> Iterator[tuple[str, Array]]:
+    """Bodies with strain energy that tells something: names and energies."""
     if c.stopped:
         return
     kept = c.ledger.kept
     for name, sums in zip(c.model.element_start, c.bent, strict=False):  # empty without cells that are looked at
         if sums[SPENT] > max(LEAST * kept.exchanged, FREE * kept.energy_scale):
-            yield name, sums, _kinds(c.model, name)
+            yield name, sums
 
 
 def _kinds(model: Model, name: str) -> Kinds:

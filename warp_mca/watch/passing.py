@@ -1,7 +1,7 @@
 """Owns the watch for bodies that go through each other, through a plane or through themselves, and what it says.
 
 A look takes the boxes of all bodies. Where two meet, edges of one skin are followed through the faces of the other
-(`runs.skins`): skins of bodies that overlap cross, whatever their cells. How far anything can have moved since the last
+(`skins.py`): skins of bodies that overlap cross, whatever their cells. How far anything can have moved since the last
 look decides when the next one is due, so that nothing passes the thinnest part of a body in between.
 """
 

@@ -27,7 +27,7 @@ def check_spacing(contact: Contact, X: Array, slave: Faces, master: Faces | None
     """Raise RequestError if bodies are about to pass between slave nodes: only nodes are kept out of the master.
 
     Each edge that is longer than the other body is wide counts by itself: where the bodies lie nearest to each other,
-    none may come nearer between its ends than at them. What comes near in a run is the matter of `runs.passing`.
+    none may come nearer between its ends than at them. What comes near in a run is the matter of `watch.passing`.
 
     Args:
         contact: of the scene.
