@@ -58,6 +58,7 @@ class Checkpoint:
             "sensors": digest(ready.sensors),
             "impact": repr(ready.scene.impact),
             "t_end": repr(ready.scene.t_end),
+            "phases": repr(ready.scene.phases),
             "span": repr(span),
             "dt": repr(solver.dt),
             "precision": settings.precision,

@@ -47,7 +47,7 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     speed = float(np.linalg.norm(impact.ready[0].scene.gravity)) * phase.duration
     steps = coarser(fine, model, joined, math.ceil(phase.duration / (joined * fine.interval)), speed)
     impact.take(steps)
-    motion = _Motion(impact)
+    motion = HalfSteps(impact)
     motion.slow(0.0)
     greatest = kinetic = 0.0
     quiet = reached = count = 0
@@ -74,8 +74,12 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     return stretch
 
 
-class _Motion:
-    """Velocities of nodes and momenta of rigid bodies at half steps, and how a state gets others."""
+class HalfSteps:
+    """Velocities of nodes and momenta of rigid bodies at half steps, and how a state gets others.
+
+    A phase calls `slow(0.0)` at its start, `look` and `slow` after some steps, `rest` at its end, and `release` after
+    `stretch_ended`.
+    """
 
     def __init__(self, impact: Impact) -> None:
         """Bodies that have a velocity now, at the start, wait from now on."""

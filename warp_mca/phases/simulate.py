@@ -101,11 +101,12 @@ def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) ->
 
     def told() -> None:
         nonlocal passed
-        if impact.recording and impact.rows > passed:
+        if recording and impact.rows > passed:
             first, passed = passed, impact.rows
-            impact.recording.history(lambda: impact.scene_runs[0].history(first))
+            recording.history(lambda: impact.scene_runs[0].history(first))
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
+    recording, impact.recording = impact.recording, None  # they see the impact
     try:
         kept = store.stored() if store else None
         if store and kept:
@@ -114,13 +115,14 @@ def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) ->
         else:
             phases = impact.ready[0].scene.phases
             stretches = [_before(phase, impact, lambda done: tell("impact", done)) for phase in phases]
+        impact.recording = recording
         if store:
             advance_stored(impact, store, told, before=stored(stretches))
         else:
             impact.advance(told=told)
     except BaseException:
-        if impact.recording:
-            impact.recording.finish(False)
+        if recording:
+            recording.finish(False)
         raise
     return stretches
 

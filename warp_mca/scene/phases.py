@@ -197,7 +197,8 @@ class Settle:
         validate.within("Settle", 1e-14, 0.1, tolerance=self.tolerance)
 
 
-PHASES: dict[str, type] = {"Settle": Settle}  # that `Scene.phases` may hold
+# That `Scene.phases` may hold: others have a method advance(impact, tell) that returns a `phases.stretch.Stretch`.
+PHASES: dict[str, type] = {"Settle": Settle}
 
 
 @dataclass(frozen=True, kw_only=True)

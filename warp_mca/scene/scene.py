@@ -179,7 +179,7 @@ class Scene:
         validate.kind_of("Scene.phases", self.phases, (tuple, list), "give a tuple of phases, as (mca.Settle(),)")
         for k, phase in enumerate(self.phases):
             if type(phase) not in PHASES.values():
-                remedy = f"give {' or '.join(PHASES)}; other classes must be listed in PHASES"
+                remedy = f"give {' or '.join(PHASES)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.phases[{k}]", validate.brief(phase), remedy)
         for name in ("rigid", "prescribed", "loads") if self.phases else ():
             if getattr(self, name):
