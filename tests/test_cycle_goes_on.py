@@ -54,7 +54,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty folder with the scene, and no figures, which take longer than the runs."""
     (tmp_path / "scene.py").write_text(SCENE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for figure in ("warp_mca.report.forces.save_forces", "warp_mca.report.energies.save_energies"):
+    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)
 
 

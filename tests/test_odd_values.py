@@ -56,6 +56,7 @@ SOUND: dict[type, Any] = {
     mca.Absorbing: mca.Absorbing(body="low", nodes="ymin", centre=(0.0, 0.0, 0.0)),
     mca.Tip: TIP,
     mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),
+    mca.Settle: mca.Settle(duration=1e-3),
     mca.ImpactPhase: mca.ImpactPhase(duration=1e-7, output_interval=1e-7),
     mca.BaseMotion: mca.BaseMotion(times=(0.0, 1.0), vx=(0.0, 1.0), vy=(0.5, 0.0)),
     mca.Slide: mca.Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.1, velocity=0.1),
@@ -178,6 +179,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Prescribed: "prescribed",
                 mca.Absorbing: "absorbing",
                 mca.Tie: "ties",
+                mca.Settle: "phases",
             }[type(item)]
             change = {name: item if name == "tip" else (item,)}
     return dataclasses.replace(whole, **change)

@@ -61,19 +61,21 @@ TABLES = {
         "warp_mca.geometry.cell_types", "CELL_TYPES", ("warp_mca.geometry.cell_types", "CellType"), whole=False
     ),
     "element": Table("warp_mca.scene.elements", "ELEMENTS", parts=ELEMENT_PARTS, whole=False),
+    "phase": Table("warp_mca.scene.phases", "PHASES", parts=("advance",)),
     "recorder": Table("warp_mca.recorders", "RECORDERS", parts=RECORDER_PARTS),
 }
 
 
 def register(thing: Thing, *, kind: str | None = None) -> Thing:
-    """Add a material, contact law, joint, cell type, element or recorder to those that the package knows.
+    """Add a material, contact law, joint, cell type, element, phase or recorder to those that the package knows.
 
     Its name is that of its class, or its attribute `name` where the table holds objects (elements, cell types). It can
     be used as a decorator of a class. A class that is read again from the same module replaces itself.
 
     Args:
         thing: a class made of `scene.materials.Elastic`, `scene.contact_laws.ContactLaw` or `scene.joints.Joint`; a
-            class with the methods of `recorders.Recorder`; an object with the attributes of `physics.elements.Element`;
+            class with the methods of `recorders.Recorder`, or with the method `advance(impact, tell)` of a phase before
+            the impact (`phases.stretch`); an object with the attributes of `physics.elements.Element`;
             a `geometry.cell_types.CellType`.
         kind: which of them it is, where that cannot be told from the object: a key of `TABLES`.
 

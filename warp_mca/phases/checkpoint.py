@@ -58,6 +58,7 @@ class Checkpoint:
             "sensors": digest(ready.sensors),
             "impact": repr(ready.scene.impact),
             "t_end": repr(ready.scene.t_end),
+            "phases": repr(ready.scene.phases),
             "span": repr(span),
             "dt": repr(solver.dt),
             "precision": settings.precision,
@@ -151,6 +152,7 @@ def advance(
     told: Callable[[], None],
     ended: Callable[[], bool] | None = None,
     number: int | None = None,
+    before: tuple[Mapping[str, Any], Mapping[str, NDArray]] = ({}, {}),
 ) -> None:
     """Advance an impact phase to its end, from where an earlier run of the same request was, and store it on the way.
 
@@ -160,17 +162,19 @@ def advance(
         told: as in `Impact.advance`.
         ended: likewise.
         number: of the impact, in a run of several: the state at its end is kept until the run is over.
+        before: place and arrays of what came before it, to be stored too.
 
     Raises:
         RequestError: the folder holds the state of another request.
     """
-    place = {} if number is None else {"impact": number}
+    place, more = before
+    place = place if number is None else {**place, "impact": number}
     found = checkpoint.stored(number)
     if found is not None:
         impact.load(found[2])
     if found is None or found[2] == checkpoint.path:
         last = None if number is None else impact.steps.count - 1
-        go_on(impact, checkpoint, told, lambda: checkpoint.store(impact, place), ended, last)
+        go_on(impact, checkpoint, told, lambda: checkpoint.store(impact, place, more), ended, last)
         if number is not None and impact.stopped[0] is None:
             checkpoint.store_end(impact, number)
     impact.advance(told=told, ended=ended)

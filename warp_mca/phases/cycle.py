@@ -6,23 +6,20 @@ Each kind of phase has a driver, which takes a `Motion` and returns the next one
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.sensors import locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.film import Film
 from warp_mca.phases.impact_driver import ImpactDriver
-from warp_mca.phases.meshing import mesh
 from warp_mca.phases.motion import Motion
 from warp_mca.phases.parts import Part, SwingPart
-from warp_mca.phases.prepare import Clock
+from warp_mca.phases.prepare import Clock, place
 from warp_mca.phases.settings import Settings
 from warp_mca.phases.swing_driver import SwingDriver
-from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.recorders.recorder import Recorder
-from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import Scene
 
@@ -37,31 +34,9 @@ def begin_cycle(
     Raises:
         RequestError: the scene cannot be built as written.
     """
-    assert scene.t_end is not None and scene.rigid is not None
     clock = Clock()
-    tell("mesh", 0.0)
-    made = mesh(scene, None, meshes)
-    masses = nodal_masses(scene, made)
-    clock.lap("mesh")
-    tell("rigid", 0.0)
-    first = hand_off(scene, made, masses, t_end=scene.t_end)
-    assert first.chain is not None
-    clock.lap("rigid")
-    return Setup(
-        scene=scene,
-        rigid=scene.rigid,
-        t_end=scene.t_end,
-        span=span,
-        meshes=made,
-        sensors=locate_sensors(scene, made),
-        masses=masses,
-        held=held_axes(scene, made),
-        first=first,
-        chain=first.chain,
-        settings=settings,
-        clock=clock,
-        tell=tell,
-    )
+    placed = place(scene, meshes, clock, tell, by=partial(hand_off, t_end=scene.t_end))
+    return Setup(**vars(placed), span=span, settings=settings, clock=clock, tell=tell)
 
 
 class Cycle:

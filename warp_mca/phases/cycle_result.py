@@ -93,7 +93,7 @@ def _paths(results: Sequence[Result], story: Story) -> tuple[PathHistory, ...]:
 
 def _without_impact(setup: Setup, history: Columns) -> dict[str, Any]:
     """The summary of a run that touched nothing."""
-    start, scene = setup.first, setup.scene
+    start, scene = setup.start, setup.scene
     facts = RunFacts(
         scene=scene.name,
         n_elements=sum(item.cell_count for item in setup.meshes.values()),

@@ -4,56 +4,60 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.sensors import Sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.motion import Motion
-from warp_mca.phases.prepare import Clock
+from warp_mca.phases.prepare import Clock, Placed
 from warp_mca.phases.settings import Settings
+from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.chain import Chain
-from warp_mca.rigid.handoff import HandOff
 from warp_mca.rigid.placement import Placement
-from warp_mca.scene import RigidPhase, Scene, Surface
+from warp_mca.scene import RigidPhase, Surface
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup:
-    """A scene that goes through swings and impacts in turn.
+class Setup(Placed):
+    """A scene that goes through swings and impacts in turn, from its first hand-off on.
 
     Attributes:
-        scene: with `t_end`.
-        rigid: its rigid phase.
-        t_end: time from the release at which the run ends [s].
         span: longest time that an impact lasts [s].
-        meshes: of its bodies.
-        sensors: its probes and sections.
-        masses: lumped nodal masses [kg] by body, each shape (node_count,), float64.
-        held: axes of nodes that are fixed, by body, each shape (node_count, 3), bool.
-        first: the first hand-off.
-        chain: of rigid links, without deformation.
         settings: how it is run.
         clock, tell: wall time by stage, and who is told of stages.
     """
 
-    scene: Scene
-    rigid: RigidPhase
-    t_end: float
     span: float
-    meshes: Mapping[str, Mesh]
-    sensors: Sensors
-    masses: Mapping[str, Array]
-    held: Mapping[str, NDArray[np.bool_]]
-    first: HandOff
-    chain: Chain
     settings: Settings
     clock: Clock
     tell: Progress
+
+    @property
+    def rigid(self) -> RigidPhase:
+        """The rigid phase."""
+        assert self.scene.rigid is not None
+        return self.scene.rigid
+
+    @property
+    def t_end(self) -> float:
+        """Time from the release at which the run ends [s]."""
+        assert self.scene.t_end is not None
+        return self.scene.t_end
+
+    @property
+    def chain(self) -> Chain:
+        """Rigid links, without deformation."""
+        assert self.start.chain is not None
+        return self.start.chain
+
+    @cached_property
+    def held(self) -> Mapping[str, NDArray[np.bool_]]:
+        """Axes of nodes that are fixed, by body, each shape (node_count, 3), bool."""
+        return held_axes(self.scene, self.meshes)
 
     def others(self, placements: Mapping[str, Placement]) -> float:
         """Kinetic energy of the bodies that are no links [J]."""

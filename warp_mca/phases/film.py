@@ -40,7 +40,7 @@ class Film:
         """
         self.setup, self.model, self.story = setup, ready.model, Story()
         self.said: list[str] = []
-        self.origin = setup.first.t_contact or 0.0
+        self.origin = setup.start.t_contact or 0.0
         self.needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
         self.surfaces = skins(ready.model, ready.meshes)
         steps, paths = divide(ready.scene, ready.model, setup.span), ready.probes.position

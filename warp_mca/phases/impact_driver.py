@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
-from warp_mca.model.build import build_model
-from warp_mca.model.paths import Found, locate
 from warp_mca.model.precision import check_range
 from warp_mca.phases.checkpoint import Checkpoint, advance
 from warp_mca.phases.cycle_setup import Setup
@@ -31,7 +29,6 @@ from warp_mca.rigid.placement import link_placements
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
 from warp_mca.step.workspace import ROWS
-from warp_mca.watch.table import told_before
 
 Array = NDArray[np.float64]
 ByBody = dict[str, Array]
@@ -53,7 +50,6 @@ class ImpactDriver:
         """Of a run that goes on from what `store` has, and stores its state there."""
         self.setup, self.store, self.count, self.open_time = setup, store, 0, open_time(setup)
         self.film: Film | None = None
-        self._places: Found = {}
         self._prepared: tuple[Motion | None, tuple[Prepared, ByBody, ByBody]] | None = None
 
     def run(self, motion: Motion | None) -> tuple[Motion | None, ImpactPart]:
@@ -126,15 +122,11 @@ class ImpactDriver:
         watched = [(link.body, node) for link in setup.chain.links for node in setup.link_ends(link.body)]
         settings, span = setup.settings, min(setup.span, setup.t_end - motion.t)
         groups = grouping(setup.scene, span, settings.device, settings.multi_rate)
-        model = build_model(
-            setup.scene, setup.meshes, X, V, watched, chain=setup.chain, start=motion.t, grouping=groups
-        )
-        check_range(model, settings.precision)
-        probes = locate(setup.scene, model, setup.meshes, self._places)
-        warnings = told_before(setup.scene, setup.meshes, model) if first else ()
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
-        start = setup.first if first else replace(setup.first, **mismatch)  # those are of the first hand-off
-        return Prepared(setup.scene, setup.meshes, start, model, probes, setup.sensors, warnings), u, V
+        start = None if first else replace(setup.start, **mismatch)  # those are of the first hand-off
+        ready = setup.ready(X, V, motion.t, start=start, grouping=groups, watched=watched, said=first)
+        check_range(ready.model, settings.precision)
+        return ready, u, V
 
     def _shape(
         self, motion: Motion, relaxation: Relaxation, u: ByBody, settled: list[Shape]

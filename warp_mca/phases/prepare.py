@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import Grouping, build_model
@@ -58,6 +61,86 @@ class Clock:
         self.last = now
 
 
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """A scene with its meshes, and where its bodies stand when finite elements take over.
+
+    Attributes:
+        scene: as it was asked for.
+        meshes: of its bodies, by name.
+        masses: lumped nodal masses [kg] by body, each shape (node_count,), float64; none without a rigid phase.
+        sensors: its probes and sections.
+        start: the hand-off.
+        places: of paths that were found so far, see `locate`.
+    """
+
+    scene: Scene
+    meshes: Mapping[str, Mesh]
+    masses: Mapping[str, NDArray[np.float64]]
+    sensors: Sensors
+    start: HandOff
+    places: Found = field(default_factory=dict)
+
+    def ready(
+        self,
+        X: Mapping[str, NDArray[np.float64]],
+        V: Mapping[str, NDArray[np.float64]],
+        time: float = 0.0,
+        *,
+        start: HandOff | None = None,
+        grouping: Grouping | None = None,
+        watched: Sequence[tuple[str, int]] = (),
+        said: bool = True,
+    ) -> Prepared:
+        """Assemble the model of bodies with these positions [m] and velocities [m/s], at a time from the release [s].
+
+        Args:
+            X, V: of the nodes by body, each shape (node_count, 3), float64.
+            time: from the release [s].
+            start: what results say of the hand-off, if not that of this scene.
+            grouping, watched: as in `build_model`.
+            said: whether its meshes are warned of.
+
+        Raises:
+            RequestError: the scene cannot be built as written.
+        """
+        scene, meshes = self.scene, self.meshes
+        model = build_model(scene, meshes, X, V, watched, chain=self.start.chain, start=time, grouping=grouping)
+        probes = locate(scene, model, meshes, self.places)
+        warnings = told_before(scene, meshes, model) if said else ()
+        return Prepared(scene, meshes, start or self.start, model, probes, self.sensors, warnings)
+
+
+def place(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    clock: Clock,
+    tell: Progress,
+    *,
+    by: Callable[..., HandOff] = hand_off,
+    found: Found | None = None,
+    made: dict[object, Mesh] | None = None,
+) -> Placed:
+    """Mesh a scene, unless its `meshes` are given, and place its bodies `by` a hand-off.
+
+    `found` as in `locate`, `made` as in `mesh`.
+
+    Raises:
+        RequestError: the scene cannot be meshed, or does not swing as written.
+    """
+    tell("mesh", 0.0)
+    meshes = mesh(scene, made, meshes)
+    masses = nodal_masses(scene, meshes) if scene.rigid else {}
+    clock.lap("mesh")
+    tell("rigid", 0.0)
+    start = by(scene, meshes, masses)
+    clock.lap("rigid")
+    sensors = locate_sensors(scene, meshes)
+    return Placed(
+        scene=scene, meshes=meshes, masses=masses, sensors=sensors, start=start, places={} if found is None else found
+    )
+
+
 def prepare(
     scene: Scene,
     meshes: Mapping[str, Mesh] | None,
@@ -67,22 +150,13 @@ def prepare(
     made: dict[object, Mesh] | None = None,
     grouping: Grouping | None = None,
 ) -> Prepared:
-    """Mesh a scene, unless its `meshes` are given, run its rigid phase and assemble its model.
-
-    `found` as in `locate`, `made` as in `mesh`, `grouping` as in `build_model`.
+    """A scene at its first touch, or where its bodies start without a rigid phase; arguments as in `place` and `ready`.
 
     Raises:
         RequestError: the scene cannot be built as written.
     """
-    tell("mesh", 0.0)
-    meshes = mesh(scene, made, meshes)
+    placed = place(scene, meshes, clock, tell, found=found, made=made)
+    start = placed.start
+    ready = placed.ready(start.positions, start.velocities, start.t_contact or 0.0, grouping=grouping)
     clock.lap("mesh")
-    tell("rigid", 0.0)
-    start = hand_off(scene, meshes, nodal_masses(scene, meshes) if scene.rigid else {})
-    clock.lap("rigid")
-    X, V = start.positions, start.velocities
-    model = build_model(scene, meshes, X, V, chain=start.chain, start=start.t_contact or 0.0, grouping=grouping)
-    probes = locate(scene, model, meshes, found)
-    clock.lap("mesh")
-    sensors = locate_sensors(scene, meshes)
-    return Prepared(scene, meshes, start, model, probes, sensors, told_before(scene, meshes, model))
+    return ready

@@ -18,15 +18,18 @@ from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.base.log import warn
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
+from warp_mca.model.precision import check_range
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import Checkpoint, damage_explained, go_on
 from warp_mca.phases.division import coarser
 from warp_mca.phases.every import METHOD
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.prepare import Clock
-from warp_mca.phases.pure_setup import Place, angles_of, check, is_of_link, prepare_release
+from warp_mca.phases.prepare import Clock, place
+from warp_mca.phases.pure_setup import Place, angles_of, check, is_of_link
+from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.settings import Settings
+from warp_mca.rigid.handoff import at_release
 from warp_mca.rigid.placement import link_placements
 from warp_mca.scene import Scene
 from warp_mca.step.records import SceneRecords
@@ -70,7 +73,13 @@ class PureRun:
         check(scene)
         self.clock, self.tell, self.span, self.settings = Clock(), tell, span, settings
         self.place, self.swing = Place(), SceneRecords()
-        ready, self.touch = prepare_release(scene, meshes, span, settings, self.clock, tell)
+        placed = place(scene, meshes, self.clock, tell, by=at_release)
+        start, groups = placed.start, grouping(scene, span, settings.device, settings.multi_rate)
+        ready = placed.ready(start.positions, start.velocities, grouping=groups)
+        check_range(ready.model, settings.precision)
+        self.clock.lap("mesh")
+        assert start.touch is not None
+        self.touch = start.touch
         warn(ready.warnings)
         tell("compile", 0.0)
         assert self.touch.swing is not None and self.touch.chain is not None

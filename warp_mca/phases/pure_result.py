@@ -6,20 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.phases.cycle_rows import STORED
 from warp_mca.phases.every import METHOD
-from warp_mca.phases.history_rows import contact_histories, history_columns
 from warp_mca.phases.pure_fem import PureRun
-from warp_mca.results.contact_history import ContactHistory
-from warp_mca.results.paths import PathHistory, path_histories
+from warp_mca.phases.stretch import Stretch, joined, phase_facts
 from warp_mca.results.result import Result
-from warp_mca.results.sensor_history import sensor_figures, sensor_histories
 from warp_mca.rigid.target import target_plane
-from warp_mca.watch.ledger import Ledger
-
-Array = NDArray[np.float64]
 
 
 def pure_result(run: PureRun) -> Result:
@@ -28,36 +21,9 @@ def pure_result(run: PureRun) -> Result:
     assert touch is not None
     origin = (touch - 1) * run.fine.interval
     found = scene_run.result(run.clock.wall, origin=origin)
-    ready, kept = scene_run.ready, run.swing
-    before = Ledger(ready.model, run.coarse, ready.scene.impact.energy_tolerance, run.settings.precision, kept)
-    early = history_columns(before)
-    early["time_s"] = early["time_s"] - run.begin - origin
-    history = {name: np.concatenate([early[name], column]) for name, column in found.history.items()}
-    open_contacts = contact_histories(before, [contact.name for contact in found.contacts])
-    paths = path_histories(ready.probes, kept.path_stress) if kept.count else ()
-    records = [*kept.sensors, *scene_run.ledger.kept.sensors]
-    probes, sections = sensor_histories(ready.scene, history["time_s"], records)
-    figures = _figures(run, found, origin, touch) | sensor_figures(probes, sections, history)
-    return replace(
-        found,
-        summary={**found.summary, **figures},
-        history=history,
-        contacts=tuple(_joined(a, b) for a, b in zip(open_contacts, found.contacts, strict=True)),
-        paths=tuple(_path(a, b) for a, b in zip(paths, found.paths, strict=True)) if paths else found.paths,
-        probes=probes,
-        sections=sections,
-    )
-
-
-def _joined(first: ContactHistory, second: ContactHistory) -> ContactHistory:
-    names = ("force", "pressure", "normal_force", "closing_speed")
-    return ContactHistory(
-        name=second.name, **{n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
-    )
-
-
-def _path(first: PathHistory, second: PathHistory) -> PathHistory:
-    return replace(second, stress=np.concatenate([first.stress, second.stress]))
+    swing = Stretch(kind="swing", ended_by="touch", steps=run.coarse, count=run.place.swung, records=run.swing)
+    whole = joined(found, scene_run, [swing], origin)
+    return replace(whole, summary={**whole.summary, **_figures(run, found, origin, touch)})
 
 
 def _figures(run: PureRun, found: Result, origin: float, touch: int) -> dict[str, Any]:
@@ -102,8 +68,7 @@ def _phases(run: PureRun, t_contact: float, touch: int) -> list[dict[str, Any]]:
         energy = {key: float(column[row]) for key, column in energies.items() if key in (*STORED, "external_work")}
         energy |= {key: float(energies[key][row]) for key in ("friction", "contact_loss", "joint")}
         wall = place.wall.get(kind, 0.0)
-        phase = {"kind": kind, "start": start, "end": end, "ended_by": ended_by, "energy": energy, "lost": 0.0}
-        found.append({**phase, "wall": wall})
+        found.append({**phase_facts(kind, start, end, ended_by, energy), "wall": wall})
     return found
 
 

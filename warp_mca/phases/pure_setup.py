@@ -11,21 +11,9 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import is_list
-from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.build import build_model
-from warp_mca.model.paths import locate
-from warp_mca.model.precision import check_range
-from warp_mca.model.sensors import locate_sensors
-from warp_mca.phases.arguments import Progress
 from warp_mca.phases.every import METHOD
-from warp_mca.phases.meshing import mesh
-from warp_mca.phases.prepare import Clock, Prepared
-from warp_mca.phases.rate_groups import grouping
-from warp_mca.phases.settings import Settings
-from warp_mca.physics.elements.cells import nodal_masses
-from warp_mca.rigid.handoff import HandOff, at_release
+from warp_mca.rigid.handoff import HandOff
 from warp_mca.scene import RigidPlane, Scene
-from warp_mca.watch.table import told_before
 
 Array = NDArray[np.float64]
 
@@ -82,30 +70,6 @@ def check(scene: Scene) -> None:
     if scene.prescribed:
         remedy = f"times of a Prescribed velocity count from the touch, which {METHOD} does not know; leave it out"
         raise bad_value("Scene.prescribed", scene.prescribed[0].body, remedy)
-
-
-def prepare_release(
-    scene: Scene, meshes: Mapping[str, Mesh] | None, span: float, settings: Settings, clock: Clock, tell: Progress
-) -> tuple[Prepared, HandOff]:
-    """The scene at its release, and the hand-off of rigid links.
-
-    Raises:
-        RequestError: the scene cannot be built as written.
-    """
-    tell("mesh", 0.0)
-    meshes = mesh(scene, None, meshes)
-    clock.lap("mesh")
-    tell("rigid", 0.0)
-    start, touch = at_release(scene, meshes, nodal_masses(scene, meshes))
-    clock.lap("rigid")
-    groups = grouping(scene, span, settings.device, settings.multi_rate)
-    X, V = start.positions, start.velocities
-    model = build_model(scene, meshes, X, V, chain=start.chain, start=0.0, grouping=groups)
-    check_range(model, settings.precision)
-    probes = locate(scene, model, meshes)
-    clock.lap("mesh")
-    sensors, warnings = locate_sensors(scene, meshes), told_before(scene, meshes, model)
-    return Prepared(scene, meshes, start, model, probes, sensors, warnings), touch
 
 
 def is_of_link(scene: Scene, contact: int, links: list[str]) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from warp_mca.base.errors import RequestError
 from warp_mca.base.log import warn
@@ -12,18 +12,22 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.paths import Found
 from warp_mca.model.precision import check_range
 from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import Checkpoint
+from warp_mca.phases.checkpoint import Checkpoint, damage_explained
 from warp_mca.phases.checkpoint import advance as advance_stored
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Clock, Prepared, prepare
 from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.settings import Settings
+from warp_mca.phases.settle import settle
+from warp_mca.phases.stretch import Stretch, joined, restored, stored
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results.result import Result
-from warp_mca.scene import Scene
+from warp_mca.scene import Scene, Settle
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
+
+DRIVERS = {Settle: settle}  # of phases before the impact
 
 
 def simulate(
@@ -72,7 +76,7 @@ def simulate(
     if store:
         store.is_for(impact, span, settings, "mca")
     announce(impact)
-    _advance(impact, tell, store)
+    stretches = _advance(impact, tell, store)
     clock.lap("fe")
     failed: tuple[str, ...] = ()
     if impact.recording:
@@ -80,32 +84,53 @@ def simulate(
         failed = tuple(impact.recording.failed)
         clock.lap("output")
     tell("impact", 1.0)
-    results = [
-        item.result(clock.wall, said, stopped) for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)
-    ]
-    return [replace(result, failed=failed) for result in results]
+    results = []
+    for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True):
+        found = joined(item.result(clock.wall, said, stopped), item, stretches)
+        results.append(replace(found, failed=failed))
+    return results
 
 
-def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) -> None:
-    """The impact phase, with its recorders or its checkpoint."""
+def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) -> list[Stretch]:
+    """The phases before the impact, and this one with its recorders or its checkpoint.
+
+    Returns:
+        What comes before the impact.
+    """
     passed = 0  # rows that recorders have
 
     def told() -> None:
         nonlocal passed
-        if impact.recording and impact.rows > passed:
+        if recording and impact.rows > passed:
             first, passed = passed, impact.rows
-            impact.recording.history(lambda: impact.scene_runs[0].history(first))
+            recording.history(lambda: impact.scene_runs[0].history(first))
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
-    if store:
-        advance_stored(impact, store, told)
-        return
+    recording, impact.recording = impact.recording, None  # they see the impact
     try:
-        impact.advance(told=told)
+        kept = store.stored() if store else None
+        if store and kept:
+            with damage_explained(store.path):
+                stretches = restored(*kept[:2])
+        else:
+            phases = impact.ready[0].scene.phases
+            stretches = [_before(phase, impact, lambda done: tell("impact", done)) for phase in phases]
+        impact.recording = recording
+        if store:
+            advance_stored(impact, store, told, before=stored(stretches))
+        else:
+            impact.advance(told=told)
     except BaseException:
-        if impact.recording:
-            impact.recording.finish(False)
+        if recording:
+            recording.finish(False)
         raise
+    return stretches
+
+
+def _before(phase: Any, impact: Impact, tell: Callable[[float], None]) -> Stretch:
+    """Carry out a phase that comes before the impact: one of `DRIVERS`, or of the user's own, which has `advance`."""
+    driver = DRIVERS.get(type(phase))
+    return driver(phase, impact, tell) if driver else phase.advance(impact, tell)
 
 
 def _prepare(

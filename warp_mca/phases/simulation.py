@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from warp_mca.accuracy.plan import Plan, planned, run_planned
@@ -96,7 +96,7 @@ def run(
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    request = partial(_result, scene, meshes, span, tell, settings, recorders, method)
+    request = partial(_result, _Request(scene, meshes, span, tell, settings, recorders, method))
     return run_planned(plan, partial(_carry_out, request, out, force, every))
 
 
@@ -152,29 +152,6 @@ def _kept(
         return found
 
 
-def _pure(
-    scene: Scene,
-    meshes: Mapping[str, Mesh] | None,
-    span: float,
-    tell: Progress,
-    settings: Settings,
-    store: Checkpoint | None,
-) -> Result:
-    """Finite elements from the release on; arguments as in `simulate`.
-
-    Raises:
-        RequestError: the request cannot be carried out.
-        GuardError: the run lost its footing, or nothing touched.
-    """
-    from warp_mca.phases.pure_fem import PureRun
-    from warp_mca.phases.pure_result import pure_result
-
-    run = PureRun(scene, meshes, span, settings, tell)
-    run.run(store)
-    tell("impact", 1.0)
-    return pure_result(run)
-
-
 def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | None, force: bool) -> None:
     """Refuse what is no recorder, and files that cannot be written.
 
@@ -187,74 +164,53 @@ def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | No
     check_files(recorders, None if out is None else check_output(out, force=force))
 
 
-def _result(
-    scene: Scene,
-    meshes: Mapping[str, Mesh] | None,
-    span: float,
-    tell: Progress,
-    settings: Settings,
-    recorders: Sequence[Recorder],
-    method: str,
-    plan: Plan | None,
-    store: Checkpoint | None,
-) -> Result:
-    """One impact, or many in turn, of the scene or what was planned in its place; arguments as in `simulate`.
+@dataclass(frozen=True)
+class _Request:
+    """What is run, and how; fields as in `simulate`."""
+
+    scene: Scene
+    meshes: Mapping[str, Mesh] | None
+    span: float
+    tell: Progress
+    settings: Settings
+    recorders: Sequence[Recorder]
+    method: str
+
+
+def _result(request: _Request, plan: Plan | None, store: Checkpoint | None) -> Result:
+    """What came of a request, or of what was planned in its place.
 
     Raises:
         RequestError: the request cannot be carried out.
-        GuardError: the run lost its footing.
+        GuardError: the run lost its footing, or nothing touched.
     """
+    if plan is None or request.method == METHOD:
+        return _phases(request, store)
+    settings = replace(request.settings, **plan.variant.options)
+    ready = None if request.recorders else plan.ready
+    return plan.judged(ready or _phases(replace(request, scene=plan.scene, settings=settings)))
+
+
+def _phases(request: _Request, store: Checkpoint | None = None) -> Result:
+    """Finite elements from the release on, swings and impacts in turn, or one impact; raises as `_result`."""
+    scene, meshes, span, tell, settings, recorders, method = vars(request).values()
     if method == METHOD:
-        return _pure(scene, meshes, span, tell, settings, store)
-    if plan is None:
-        return _single(scene, meshes, span, tell, settings, recorders, store)
-    settings = replace(settings, **plan.variant.options)
-    ready = None if recorders else plan.ready
-    return plan.judged(ready or _single(plan.scene, meshes, span, tell, settings, recorders))
+        from warp_mca.phases.pure_fem import PureRun
+        from warp_mca.phases.pure_result import pure_result
 
-
-def _single(
-    scene: Scene,
-    meshes: Mapping[str, Mesh] | None,
-    span: float,
-    tell: Progress,
-    settings: Settings,
-    recorders: Sequence[Recorder],
-    store: Checkpoint | None = None,
-) -> Result:
-    """One impact, or many in turn; arguments as in `simulate`.
-
-    Raises:
-        RequestError: the request cannot be carried out.
-        GuardError: the run lost its footing.
-    """
+        run = PureRun(scene, meshes, span, settings, tell)
+        run.run(store)
+        tell("impact", 1.0)
+        return pure_result(run)
     if scene.t_end is not None:
-        return _cycle(scene, meshes, span, tell, settings, recorders, store)
+        from warp_mca.phases.cycle import Cycle, begin_cycle
+        from warp_mca.phases.cycle_result import cycle_result
+
+        cycle = Cycle(begin_cycle(scene, meshes, span, settings, tell), store, recorders)
+        parts, film = cycle.run(), cycle.film
+        result = cycle_result(cycle.setup, parts, film.said if film else ())
+        return replace(result, failed=film.failed if film else ())
     (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders, store)
     if found.stopped is not None:
         raise GuardError(found.stopped)
     return found
-
-
-def _cycle(
-    scene: Scene,
-    meshes: Mapping[str, Mesh] | None,
-    span: float,
-    tell: Progress,
-    settings: Settings,
-    recorders: Sequence[Recorder],
-    store: Checkpoint | None,
-) -> Result:
-    """Swings and impacts in turn until `Scene.t_end`; arguments as in `simulate`.
-
-    Raises:
-        RequestError: the request cannot be carried out.
-        GuardError: an impact lost its footing.
-    """
-    from warp_mca.phases.cycle import Cycle, begin_cycle
-    from warp_mca.phases.cycle_result import cycle_result
-
-    cycle = Cycle(begin_cycle(scene, meshes, span, settings, tell), store, recorders)
-    parts, film = cycle.run(), cycle.film
-    result = cycle_result(cycle.setup, parts, film.said if film else ())
-    return replace(result, failed=film.failed if film else ())

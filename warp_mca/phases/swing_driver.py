@@ -26,7 +26,7 @@ class SwingDriver:
 
     def first(self, motion: Motion | None = None) -> tuple[Motion, SwingPart]:
         """From the release to the first touch, as the first hand-off has it."""
-        start = self.setup.first
+        start = self.setup.start
         assert start.swing is not None
         release = Motion(
             t=0.0,

@@ -57,6 +57,7 @@ class HandOff:
             inertia="mesh" and a few per cent with "slender".
         chain: the rigid links, with base and loads as at the release; None without a rigid phase.
         swing: the trajectory up to contact or t_end; None without.
+        touch: the hand-off at the first touch of rigid links, of one at the release.
     """
 
     positions: dict[str, Array]
@@ -76,6 +77,7 @@ class HandOff:
     energy_mismatch: float = 0.0
     chain: Chain | None = None
     swing: Swing | None = None
+    touch: HandOff | None = None
 
     def angles(self, coordinates: Array) -> Array:
         """The links' part of `theta` or `theta_dot`, shape (link_count,)."""
@@ -137,13 +139,13 @@ def hand_off(
     )
 
 
-def at_release(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> tuple[HandOff, HandOff]:
+def at_release(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> HandOff:
     """Place every body at the release, and say where rigid links will touch.
 
     The target's body lies where its motion takes it under the tip of rigid links, with `centre_target`.
 
     Returns:
-        The scene at t = 0, with a chain of the mesh's inertia, and the hand-off of that chain at its touch.
+        The scene at t = 0, with a chain of the mesh's inertia, and with the hand-off of that chain at its `touch`.
 
     Raises:
         RequestError: as in `hand_off`.
@@ -160,15 +162,15 @@ def at_release(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[s
     theta, theta_dot = touch.swing.theta_t[0], touch.swing.theta_dot_t[0]
     placements |= link_placements(touch.chain, theta, theta_dot)
     positions, velocities = _place(placements, meshes)
-    start = HandOff(
+    return HandOff(
         positions=positions,
         velocities=velocities,
         placements=placements,
         theta=theta,
         theta_dot=theta_dot,
         chain=touch.chain,
+        touch=touch,
     )
-    return start, touch
 
 
 def _own_placement(body: Body, t: float) -> Placement:

@@ -10,7 +10,7 @@ from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
-from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Slide, Tip
+from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Settle, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
 from warp_mca.scene.sensors import Probe, Section
@@ -38,6 +38,7 @@ __all__ = [
     "Scene",
     "Section",
     "Spherical",
+    "Settle",
     "Slide",
     "Surface",
     "Tie",

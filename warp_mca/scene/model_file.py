@@ -33,6 +33,7 @@ from warp_mca.scene.contact_laws import CONTACT_LAWS
 from warp_mca.scene.joints import JOINTS
 from warp_mca.scene.loads import LOADS
 from warp_mca.scene.materials import MATERIALS
+from warp_mca.scene.phases import PHASES
 
 SUFFIX = ".mca"
 FORMAT = "warp_mca model 1"
@@ -201,6 +202,7 @@ def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel
 def _vocabulary() -> dict[str, type]:
     """The classes that a file may name: the dataclasses of scenes and geometry recipes, and what was registered."""
     members = {**vars(warp_mca.geometry), **vars(warp_mca.scene), **MATERIALS, **CONTACT_LAWS, **JOINTS, **LOADS}
+    members |= PHASES
     return {name: item for name, item in members.items() if isinstance(item, type) and dataclasses.is_dataclass(item)}
 
 

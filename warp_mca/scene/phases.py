@@ -176,6 +176,32 @@ class RigidPhase:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Settle:
+    """Bodies come to rest under gravity, before the impact begins.
+
+    Bodies without an initial velocity move until they rest; those that have one wait where they are, and take it when
+    the impact begins. The others are damped in proportion to mass, and the ledger books that energy as `damping`.
+
+    Attributes:
+        duration: the run stops if they do not rest by then [s].
+        tolerance: they rest when their kinetic energy has stayed below this share of its greatest value for as long as
+            they took to reach that [-].
+    """
+
+    duration: float = 0.1
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.times("Settle", duration=self.duration)
+        validate.within("Settle", 1e-14, 0.1, tolerance=self.tolerance)
+
+
+# That `Scene.phases` may hold: others have a method advance(impact, tell) that returns a `phases.stretch.Stretch`.
+PHASES: dict[str, type] = {"Settle": Settle}
+
+
+@dataclass(frozen=True, kw_only=True)
 class ImpactPhase:
     """The small timescale: explicit finite elements.
 

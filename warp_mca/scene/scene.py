@@ -14,7 +14,7 @@ from warp_mca.scene.contacts import Contact, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
 from warp_mca.scene.loads import LOADS, Load
-from warp_mca.scene.phases import ImpactPhase, RigidPhase
+from warp_mca.scene.phases import PHASES, ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
 from warp_mca.scene.sensors import Probe, Section, check_class
 from warp_mca.scene.tied_surfaces import Tie
@@ -45,6 +45,7 @@ class Scene:
         rigid: the rigid phase before it, or None: then the bodies' own initial motion applies.
         t_end: the run goes through as many swings and impacts as occur until then, counted from the release [s]; None
             for one impact.
+        phases: of finite elements that come before the impact, in their order, as `(Settle(),)`.
         joints, contacts, fixed, prescribed, ties: what binds the bodies.
         absorbing: sides of bodies through which waves leave.
         loads: forces on nodes in the impact phase, of the kinds in `scene.loads.LOADS`.
@@ -66,6 +67,7 @@ class Scene:
     impact: ImpactPhase
     rigid: RigidPhase | None = None
     t_end: float | None = None
+    phases: tuple[object, ...] = ()
     joints: tuple[Joint, ...] = ()
     contacts: tuple[Contact, ...] = ()
     fixed: tuple[Fixed, ...] = ()
@@ -101,6 +103,7 @@ class Scene:
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()
+        self._check_phases()
         validate.within("Scene", 1.0 / FINEST, FINEST, refine=self.refine)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
@@ -166,6 +169,21 @@ class Scene:
         if self.prescribed:
             remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
             raise bad_value("Scene.t_end", self.t_end, remedy)
+
+    def _check_phases(self) -> None:
+        """Refuse phases that are not known, or that cannot come before this impact.
+
+        Raises:
+            RequestError: as described.
+        """
+        validate.kind_of("Scene.phases", self.phases, (tuple, list), "give a tuple of phases, as (mca.Settle(),)")
+        for k, phase in enumerate(self.phases):
+            if type(phase) not in PHASES.values():
+                remedy = f"give {' or '.join(PHASES)}; register other classes by warp_mca.register"
+                raise bad_value(f"Scene.phases[{k}]", validate.brief(phase), remedy)
+        for name in ("rigid", "prescribed", "loads") if self.phases else ():
+            if getattr(self, name):
+                raise bad_value(f"Scene.{name}", "given", "its times count from the impact; leave it or phases out")
 
     def _named_bodies(self) -> list[tuple[str, str]]:
         named = [("Fixed.body", item.body) for item in self.fixed]

@@ -46,6 +46,7 @@ class SceneRecords:
             lost [J].
         imbalance: greatest imbalance [J].
         worked: greatest external work [J].
+        damping: energy that damping took so far [J].
         touched: whether a contact spring was ever pressed, 0 or 1 [-].
         turned: whether a pressed node went over to a face across a sharp edge, 0 or 1 [-].
     """
@@ -74,6 +75,7 @@ class SceneRecords:
     exchanged: float = 0.0
     imbalance: float = 0.0
     worked: float = 0.0
+    damping: float = 0.0
     touched: bool = False
     turned: bool = False
 

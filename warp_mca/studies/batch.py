@@ -145,6 +145,9 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
         if scene.t_end is not None:
             remedy = "the scenes of a batch step together, for one impact each; leave t_end out, or use mca.run"
             raise bad_value(f"scenes[{k}].t_end", scene.t_end, remedy)
+        if scene.phases:
+            remedy = "the scenes of a batch begin together with the impact; leave phases out, or use mca.run"
+            raise bad_value(f"scenes[{k}].phases", validate.brief(scene.phases), remedy)
     first = scenes[0]
     span = span_of(first, duration)
     for k, scene in enumerate(scenes[1:], 1):

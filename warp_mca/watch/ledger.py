@@ -88,8 +88,8 @@ class Ledger:
 
     @property
     def _width(self) -> int:
-        """Columns of a record."""
-        return column_count(self.model)
+        """Columns of a row: those of a record, and the damping between records."""
+        return column_count(self.model) + 1
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of a scene's `records`, see `Layout.records`, and hold them to the guards.
@@ -131,9 +131,9 @@ class Ledger:
     def _sums(self, partial: Array) -> Array:
         """Columns of each record from its partial sums, shape (row_count, column_count)."""
         with np.errstate(over="ignore", invalid="ignore"):  # what is not a number is found out
-            sums = partial[:, : self._width].sum(axis=2)  # others of a batch may absorb
+            sums = partial[:, : self._width - 1].sum(axis=2)  # others of a batch may absorb
         sums[:, STRAIN], sums[:, JACOBIAN] = partial[:, STRAIN].max(axis=1), partial[:, JACOBIAN].min(axis=1)
-        return sums
+        return np.append(sums, np.full((len(sums), 1), self.kept.damping), axis=1)
 
     def springs(self, sums: Array) -> Array:
         """Columns of `sum_springs` for each contact pass, shape (..., pass_count, PASS_COLUMNS)."""
@@ -153,7 +153,7 @@ class Ledger:
             "contact": springs[..., SPRING_ENERGY].sum(axis=-1),
             "friction": springs[..., FRICTION].sum(axis=-1),
             "contact_loss": springs[..., LOST].sum(axis=-1),
-            "damping": springs[..., DAMPED].sum(axis=-1),
+            "damping": springs[..., DAMPED].sum(axis=-1) + sums[..., -1],
             "joint": sums[..., JOINT_HEAT],
             "absorbed": np.zeros(sums.shape[:-1]),
             "external_work": work,

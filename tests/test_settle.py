@@ -1,0 +1,157 @@
+"""Gravity settled before the impact: bodies rest on what bears them, their loss is booked, and the impact follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.phases.checkpoint import FILE, Checkpoint
+from warp_mca.scene import model_file
+
+SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1e3)
+SIDE, GAP, SPEED, G = 0.02, 5e-4, 1.0, 9.81
+WEIGHT = SIDE**3 * 1e3 * G
+
+
+def block(**changes: Any) -> mca.Body:
+    """A cube that rests on the plane y = 0."""
+    return mca.Body(name="block", geometry=mca.Box(size=3 * (SIDE,), divisions=(4, 4, 4)), material=SOFT, **changes)
+
+
+def on_plane(body: str) -> mca.Contact:
+    return mca.Contact(slave=mca.Surface(body=body, nodes="ymin"), master=mca.RigidPlane(), mu=0.3, penalty=0.1)
+
+
+def scene(**changes: Any) -> mca.Scene:
+    """A small cube flies at one that is pressed on a plane by gravity."""
+    small = mca.Body(
+        name="small",
+        geometry=mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2)),
+        material=SOFT,
+        position=(0.005, SIDE + GAP, 0.005),
+        velocity=(0.0, -SPEED, 0.0),
+    )
+    struck = mca.Surface(body="block", nodes="ymax")
+    hit = mca.Contact(slave=mca.Surface(body="small", nodes="ymin"), master=struck, mu=0.3, penalty=0.1)
+    made = mca.Scene(
+        name="settled",
+        bodies=(block(), small),
+        gravity=(0.0, -G, 0.0),
+        contacts=(on_plane("block"), hit),
+        impact=mca.ImpactPhase(duration=7e-4, time_step_scale=0.1),
+        phases=(mca.Settle(),),
+    )
+    return replace(made, **changes)
+
+
+@cache
+def settled() -> mca.Result:
+    return mca.run(scene(), precision="float64", threads=1)
+
+
+def test_the_contact_force_is_the_weight_when_the_impact_begins():
+    result = settled()
+    first = int(np.argmax(result.time > -1e-12))
+    assert first > 0 and result.time[first] == 0.0
+    struck = int(np.argmax(result.contacts[1].pressure > 0.0))
+    assert result.time[struck] == pytest.approx(GAP / SPEED, abs=2e-6)  # it waited where the scene put it
+    assert result.contacts[0].pressure[first:struck] == pytest.approx(WEIGHT, rel=0.01)
+    assert result.contacts[0].pressure[struck:].max() > 10.0 * WEIGHT
+
+
+def test_the_ledger_closes_over_both_phases_and_books_the_damping():
+    """A body that is let go on springs gains m g d, of which they keep half: the other half is damped."""
+    result = settled()
+    settle, impact = result.summary["phases"]
+    assert (settle["kind"], settle["ended_by"], impact["kind"]) == ("settle", "rest", "impact")
+    assert settle["end"] == impact["start"] and impact["end"] - impact["start"] == pytest.approx(7e-4)
+    energy = result.summary["energy"]
+    assert result.summary["energy_error"] < 1e-4
+    assert energy["initial"] == pytest.approx(0.5 * 1e-3 * SPEED**2, rel=1e-6)
+    held = settle["energy"]["elastic"] + settle["energy"]["contact"]
+    assert energy["damping"] == pytest.approx(held, rel=0.02)
+    assert settle["energy"]["external_work"] == pytest.approx(2.0 * held, rel=0.02)
+    scale = energy["initial"] + abs(energy["external_work"])
+    assert np.abs(result["E_total_error"]).max() < 1e-4 * scale
+
+
+def test_bodies_at_rest_need_no_time():
+    result = mca.run(scene(gravity=(0.0, 0.0, 0.0), impact=mca.ImpactPhase(duration=2e-5)), threads=1)
+    assert result.summary["energy"]["damping"] == 0.0
+    alone = mca.run(scene(gravity=(0.0, 0.0, 0.0), phases=(), impact=mca.ImpactPhase(duration=2e-5)), threads=1)
+    assert result["E_kinetic"][result.time >= 0.0] == pytest.approx(alone["E_kinetic"], rel=1e-6)
+
+
+def test_a_rigid_body_settles_on_a_flexible_one():
+    top = mca.Body(
+        name="top",
+        geometry=mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2)),
+        material=SOFT,
+        position=(0.005, SIDE, 0.005),
+        rigid=True,
+    )
+    rests = mca.Contact(slave=mca.Surface(body="top", nodes="ymin"), master=mca.Surface(body="block", nodes="ymax"))
+    made = scene(bodies=(block(), top), contacts=(on_plane("block"), rests), impact=mca.ImpactPhase(duration=5e-5))
+    result = mca.run(made, precision="float64", threads=1)
+    last = [contact.pressure[-20:].mean() for contact in result.contacts]
+    assert last == pytest.approx([WEIGHT + 1e-3 * G, 1e-3 * G], rel=0.01)
+    assert result.summary["energy_error"] < 1e-3
+
+
+def test_a_run_that_is_stopped_after_settling_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    class StoppedError(Exception):
+        pass
+
+    made, store = scene(impact=mca.ImpactPhase(duration=1e-4)), Checkpoint.store
+
+    def store_and_stop(self: Checkpoint, impact: Any, place: Any, more: Any = None) -> None:
+        store(self, impact, place, more)
+        raise StoppedError
+
+    whole = mca.run(made, threads=1)
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "store", store_and_stop)
+        with pytest.raises(StoppedError):
+            mca.run(made, threads=1, out=tmp_path / "out", checkpoint="2e-5s")
+    assert (tmp_path / "out" / FILE).exists()
+    monkeypatch.setitem(__import__("warp_mca.phases.simulate", fromlist=["DRIVERS"]).DRIVERS, mca.Settle, None)
+    result = mca.run(made, threads=1, out=tmp_path / "out", checkpoint="2e-5s")  # it does not settle again
+    assert all(result[name].tobytes() == whole[name].tobytes() for name in whole.history)
+    assert result.summary["phases"] == whole.summary["phases"]
+
+
+def test_a_model_file_keeps_the_phases(tmp_path: Path):
+    made = scene()
+    model_file.save(tmp_path / "a.mca", made, mca.mesh(made))
+    assert model_file.load(tmp_path / "a.mca").scene == made
+
+
+FINE = (block(), replace(scene().bodies[1], geometry=mca.Box(size=3 * (0.01,), divisions=(8, 8, 8))))
+REFUSED: tuple[tuple[dict[str, Any], Callable[[mca.Scene], Any], type[Exception], str], ...] = (
+    ({"bodies": FINE}, lambda made: mca.run(made, multi_rate=2), mca.RequestError, "multi_rate = 2: bodies settle"),
+    ({}, lambda made: mca.run_batch([made]), mca.RequestError, "leave phases out"),
+    ({"phases": (mca.Settle(duration=5e-5),)}, mca.run, mca.GuardError, "do not rest after Settle.duration = 5e-05 s"),
+    ({"contacts": (), "phases": (mca.Settle(duration=1e-3),)}, mca.run, mca.GuardError, "hold what falls"),
+)
+
+
+@pytest.mark.parametrize(("change", "run", "kind", "words"), REFUSED)
+def test_what_cannot_settle_is_refused(
+    change: dict[str, Any], run: Callable[[mca.Scene], Any], kind: type[Exception], words: str
+):
+    with pytest.raises(kind, match=words):
+        run(scene(**change))
+
+
+def test_a_phase_that_is_not_known_is_refused():
+    with pytest.raises(mca.RequestError, match=r"Scene.phases\[0\].*give Settle"):
+        scene(phases=(mca.ImpactPhase(duration=1e-3),))
+    with pytest.raises(mca.RequestError, match="tolerance"):
+        mca.Settle(tolerance=0.0)

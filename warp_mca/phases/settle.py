@@ -1,0 +1,172 @@
+"""Owns the phase in which bodies come to rest under gravity before an impact, by damping in proportion to mass.
+
+Bodies swing about their equilibrium. Their kinetic energy has its first maximum after a quarter of the period,
+t = pi / (2 w), where they pass it (Cundall, Explicit finite-difference methods in geomechanics, 1976): there velocities
+become zero. From then on all velocities shrink by exp(-2 w t), which is critical damping of that motion. The ledger
+books what they lose as damping. Velocities are held at half steps: v(n) is the mean of v(n-1/2) and v(n+1/2), and one
+step of a copy of the state tells how far they are apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mca.base.errors import GuardError, bad_value
+from warp_mca.phases.division import coarser
+from warp_mca.phases.stretch import Stretch, stretch_ended
+from warp_mca.scene import Settle
+
+if TYPE_CHECKING:
+    from warp_mca.phases.impact import Impact
+    from warp_mca.phases.scene_run import SceneRun
+    from warp_mca.step.state import State
+
+Array = NDArray[np.float64]
+STEPS = 10  # between two looks at the kinetic energy
+ROWS = 500  # of the history, where it lasts as long as it may
+
+
+def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stretch:
+    """Advance an impact phase that has not begun until its bodies rest; `tell` gets the share of the time.
+
+    Raises:
+        RequestError: its elements have steps of their own.
+        GuardError: a guard stopped it, or the bodies do not rest in time.
+    """
+    solver, state, fine = impact.solver, impact.state, impact.steps
+    model = solver.model
+    if model.rates:
+        raise bad_value("multi_rate", model.rates.top + 1, "bodies settle with one time step; leave it or Settle out")
+    joined = max(1, round(phase.duration / ROWS / fine.interval))
+    speed = float(np.linalg.norm(impact.ready[0].scene.gravity)) * phase.duration
+    steps = coarser(fine, model, joined, math.ceil(phase.duration / (joined * fine.interval)), speed)
+    impact.take(steps)
+    motion = HalfSteps(impact)
+    motion.slow(0.0)
+    greatest = kinetic = 0.0
+    quiet = reached = count = 0
+    passed = False
+    while quiet <= reached:
+        if state.steps >= steps.count - STEPS:
+            raise GuardError(
+                f"bodies do not rest after Settle.duration = {phase.duration:g} s: their kinetic energy is still "
+                f"{kinetic / greatest:.2g} of its greatest value; give a longer duration, or hold what falls"
+            )
+        impact.advance(until=state.steps + STEPS)
+        if impact.stopped[0] is not None:
+            raise GuardError(f"before the impact: {impact.stopped[0]}")
+        tell(state.steps / steps.count)
+        kinetic, count = motion.look(), count + 1
+        if kinetic > greatest:
+            greatest, reached = kinetic, count
+        quiet = 0 if kinetic > phase.tolerance * greatest else quiet + 1
+        rising, passed = not passed and kinetic == greatest, passed or kinetic < greatest
+        motion.slow(1.0 if rising else math.exp(-math.pi / reached) if count > reached + 1 else 0.0)
+    motion.rest(fine.per_interval - 1)
+    stretch = stretch_ended(impact, "settle", "rest", fine)
+    motion.release(impact.scene_runs[0])
+    return stretch
+
+
+class HalfSteps:
+    """Velocities of nodes and momenta of rigid bodies at half steps, and how a state gets others.
+
+    A phase calls `slow(0.0)` at its start, `look` and `slow` after some steps, `rest` at its end, and `release` after
+    `stretch_ended`.
+    """
+
+    def __init__(self, impact: Impact) -> None:
+        """Bodies that have a velocity now, at the start, wait from now on."""
+        self.solver, self.state = impact.solver, impact.state
+        model = self.solver.model
+        self.kept = impact.scene_runs[0].ledger.kept
+        self.trial = self.state.copy()
+        waiting = np.zeros(model.node_count, dtype=bool)
+        ends = [*sorted(model.node_start.values())[1:], model.node_count]
+        for first, end in zip(sorted(model.node_start.values()), ends, strict=True):
+            waiting[first:end] = model.V[first:end].any()
+        bodies = np.array([waiting[body.own[0]] for body in model.rigid_bodies], dtype=bool)
+        self.waiting = [waiting, bodies, bodies]
+        self.now = before, after = self._half_steps()
+        self.initial = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
+        rigid = self.state.rigid
+        self.places = [(self.state.u, waiting), (rigid.centre, bodies), (rigid.rotation, bodies)]
+        self.start = [np.array(array.numpy()) for array, _ in self.places]
+
+    def look(self) -> float:
+        """Kinetic energy of the bodies that settle [J]."""
+        self.now = self._half_steps()
+        (before, *_), (after, *_) = self.now
+        return self._kinetic(before, after, ~self.waiting[0])
+
+    def slow(self, factor: float) -> None:
+        """Let bodies that wait be where they were without velocity, and the others keep a factor of theirs."""
+        wanted = []
+        for before, after, waiting in zip(*self.now, self.waiting, strict=True):
+            wanted.append(np.where(waiting[:, None], 0.0, factor * 0.5 * (before + after)))
+        self._give(wanted, factor != 1.0)
+        for (array, mask), start in zip(self.places, self.start, strict=True):
+            if mask.any():
+                array.assign(np.where(mask[:, None], start, array.numpy()))
+
+    def rest(self, steps: int) -> None:
+        """So many steps in which contact forces are summed, as before any row: the first one of the impact has them."""
+        for contact in self.state.contacts:
+            for array in (contact.spring.impulse, contact.spring.normal_impulse, contact.spring.stick_impulse):
+                array.zero_()
+        self.solver.search(self.state)
+        self.solver.step(self.state, steps)
+        self.look()
+        self.slow(0.0)
+
+    def release(self, scene_run: SceneRun) -> None:
+        """Let bodies that waited have their velocities, in a state whose rows begin anew."""
+        kept, state = scene_run.ledger.kept, self.state
+        at_rest = self.look()
+        self._give(self.initial, False)
+        before = np.array(state.v.numpy())
+        given = self._kinetic(before, 2.0 * self.initial[0] - before, self.waiting[0])
+        kept.initial_energy += given
+        kept.initial_kinetic = at_rest + given
+        state.normal_force.zero_()
+        squares = (self.solver.model.V**2).sum(axis=1)
+        state.speed_square.assign(squares if len(state.speed_square) > 1 else squares.max(keepdims=True))
+
+    def _half_steps(self) -> tuple[list[Array], list[Array]]:
+        """Velocities and momenta half a step before and after the present time."""
+        self.trial.assign(self.state)
+        before = [np.array(array.numpy()) for array in self._arrays(self.state)]
+        with wp.ScopedDevice(self.solver.device):
+            self.solver.step(self.trial, 1)
+        return before, [np.array(array.numpy()) for array in self._arrays(self.trial)]
+
+    def _give(self, wanted: list[Array], everything: bool) -> None:
+        """Give velocities at the present time to bodies that wait, or to all, and book what the others lose."""
+        before, after = self.now
+        half = [0.5 * (b - a) for a, b in zip(before, after, strict=True)]
+        masks = [np.ones_like(mask) if everything else mask for mask in self.waiting]
+        given = [
+            np.where(mask[:, None], value - kick, old)
+            for mask, value, kick, old in zip(masks, wanted, half, before, strict=True)
+        ]
+        for array, values in zip(self._arrays(self.state), given, strict=True):
+            if len(array):
+                array.assign(values)
+        changed = masks[0] & ~self.waiting[0]
+        lost = self._kinetic(before[0], after[0], changed)
+        self.kept.damping += lost - self._kinetic(given[0], given[0] + 2.0 * half[0], changed)
+
+    def _kinetic(self, before: Array, after: Array, mask: NDArray[np.bool_]) -> float:
+        """v(n-1/2) . M v(n+1/2) / 2 of some nodes [J], as records have it."""
+        return float(0.5 * self.solver.model.mass[mask] @ (before[mask] * after[mask]).sum(axis=1))
+
+    @staticmethod
+    def _arrays(state: State) -> list[wp.array]:
+        """Of nodes, and of rigid bodies."""
+        return [state.v, state.rigid.momentum, state.rigid.spin]
