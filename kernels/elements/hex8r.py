@@ -83,12 +83,12 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
         flag = int(0)
         if wp.static(plastic):
             flag = yielded_out[e]
-        S, pressure, dp = update(strain, theta, G, 0, e, m, flag, law, dt, history_out)
-        if wp.static(plastic):
             q_p = mat43()
-            if flag != 0:
+            if flag != 0:  # read before the point writes
                 q_p = read_amplitudes(history_out, e)
                 q = q - q_p
+        S, pressure, dp = update(strain, theta, G, 0, e, m, flag, law, dt, history_out)
+        if wp.static(plastic):
             if dp > R(0.0):
                 # the flow rule at a point is linear in its stress: the part about the mean relaxes by 3 G dp / S_eq
                 S_eq = wp.sqrt(R(1.5) * wp.ddot(S, S))

@@ -15,9 +15,9 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def shared_function(maker: Maker, precision: str, law_name: str, finite: bool) -> Any:
-    """The function (struct, e, K, group, dilatation) -> what points share: (J - 1, pressure [Pa], energy [J]).
+    """The function (struct, e, K, group, dilatation) -> what points share.
 
-    Nothing where pressures are those of the points; J - 1 alone is of use to a general law.
+    (J - 1 and pressure [Pa] of the mean; pressure and its energy [J] of pressure nodes; 0 where there is none.)
     """
     form, _, _ = parts_of(maker, precision, law_name, finite)
     struct, gradient, points, corners = form.struct, form.gradient, form.points, form.corners
@@ -38,7 +38,6 @@ def shared_function(maker: Maker, precision: str, law_name: str, finite: bool) -
                 theta += dilatation_of(H) * weight
             theta = theta / volume
             pressure = pressure_of(K, theta)
-            energy = volume * volumetric_energy(K, theta)
         if wp.static(nodal):
             for a in range(wp.static(corners)):
                 pressure += R(share) * pressure_of(K, dilatation[group[a, e]])
@@ -60,6 +59,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     load_shape, gradient, rotation, modes, points = form.load, form.gradient, form.rotation, form.modes, form.points
     shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
     plastic, general, has_modes, read = bool(law_name), point.general, form.modes is not None, point.read
+    late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
     k, R = kinematics(precision, finite), scalars(precision).real
     dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
 
@@ -88,8 +88,12 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         if wp.static(plastic):
             flag = yielded[e]
         identity = wp.identity(n=3, dtype=R)
-        theta, _pressure, volumetric = shared(shape, e, K, group, dilatation)
+        theta = R(0.0)
         elastic = R(0.0)
+        if wp.static(not late):
+            theta, _pressure, elastic = shared(shape, e, K, group, dilatation)
+        volume = R(0.0)
+        growth = R(0.0)
         dissipated = R(0.0)
         largest = extreme[STRAIN_SQUARE, e]
         smallest = R(1.0)
@@ -99,14 +103,17 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             largest = wp.max(largest, wp.ddot(strain, strain))
             if wp.static(own):
                 theta = dilatation_of(H)
+            if wp.static(late):
+                volume += weight
+                growth += dilatation_of(H) * weight
             _S, _pressure, _p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
             if wp.static(own and not general):
                 stored += volumetric_energy(K, theta)
             elastic += weight * stored
             dissipated += weight * spent
             smallest = wp.min(smallest, wp.determinant(identity + H))
-        if wp.static(not general):
-            elastic += volumetric
+        if wp.static(late):
+            elastic += volume * volumetric_energy(K, growth / volume)
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         # an inverted element's Q is a reflection, which would hide the inversion in its own frame

@@ -1,7 +1,8 @@
 """Owns the public vocabulary of materials: moduli, densities and yield, checked.
 
 A material is plain, immutable data; it raises `RequestError` with the field, the value and the remedy. A new one names
-the module of its law, gives its parameters, and has a place in the table `MATERIALS`.
+the module of its law, gives its parameters, and has a place in the table `MATERIALS`. One with elasticity of its own
+overrides the moduli: they bound those of any state, for stable steps, penalties and hourglass stiffness.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ class Elastic:
         E: Young's modulus [Pa].
         nu: Poisson's ratio [-], in (-1, 0.5).
         rho: density [kg/m^3].
-        law: module of its flow rule, with the functions of `kernels.materials.laws`; empty where it never flows.
+        law: module of its law, with the functions of `kernels.materials.laws`; empty where it never flows.
     """
 
     E: float
@@ -48,7 +49,10 @@ class Elastic:
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Its row of `Model.law`: K, G [Pa], then the initial yield stress [Pa] and what else its law reads."""
+        """Its row of `Model.law`: K, G [Pa], then the initial yield stress [Pa] and what else its law reads.
+
+        A law without yield stress gives infinity there.
+        """
         return self.bulk_modulus, self.shear_modulus
 
     @property

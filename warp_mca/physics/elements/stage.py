@@ -129,7 +129,9 @@ class ElementStage:
 
     def _history(self, own: ElementState, part: slice) -> list[Any]:
         """Yield flags and history of a range of elements."""
-        return [own.yielded[part], own.history[:, part]] if self.block.plastic else [own.yielded, own.history]
+        if not self.block.plastic:
+            return [own.yielded, own.history]
+        return [own.yielded[part], own.history[:, part] if self.kept else own.history]
 
     def make_room(self, blocks: int) -> None:
         """Called where contact is computed beside the elements: leave room on the device for its blocks of threads."""
