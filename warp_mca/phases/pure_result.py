@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.phases.cycle_rows import STORED
+from warp_mca.phases.cycle_rows import SPENT, STORED
 from warp_mca.phases.every import METHOD
 from warp_mca.phases.history_rows import contact_histories, history_columns
 from warp_mca.phases.pure_fem import PureRun
@@ -100,7 +100,7 @@ def _phases(run: PureRun, t_contact: float, touch: int) -> list[dict[str, Any]]:
     for kind, start, row, ended_by in (("swing", 0.0, touch - 1, "touch"), ("impact", t_contact, -1, "duration")):
         end = run.begin + (len(ledger.kept.sums) - 1 if row < 0 else row) * run.fine.interval
         energy = {key: float(column[row]) for key, column in energies.items() if key in (*STORED, "external_work")}
-        energy |= {key: float(energies[key][row]) for key in ("friction", "contact_loss", "joint")}
+        energy |= {key: float(energies[key][row]) for key in SPENT}
         wall = place.wall.get(kind, 0.0)
         phase = {"kind": kind, "start": start, "end": end, "ended_by": ended_by, "energy": energy, "lost": 0.0}
         found.append({**phase, "wall": wall})
