@@ -23,7 +23,7 @@ IMPORTED = """
     scipy.integrate scipy.signal scipy.sparse.csgraph warp warp_mca.accuracy.tradeoff warp_mca.cli.main
     warp_mca.paper.report warp_mca.recorders warp_mca.recorders.rerun_blueprint warp_mca.results.energy_figure
     warp_mca.results.force_figure warp_mca.results.path_figures warp_mca.phases.impact warp_mca.phases.simulate
-    warp_mca.phases.simulation warp_mca.verify.runner
+    warp_mca.accuracy.simulation warp_mca.verify.runner
 """.split()
 STAND_IN = """\
 #!{python} -IS

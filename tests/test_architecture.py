@@ -31,7 +31,6 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 # Imports against the order of the folders, which the page gives. The list may only shrink.
 UPWARD = {
-    ("phases", "accuracy"),  # `run(accuracy=...)` chooses a variant of the scene before it runs
     ("physics", "model"),  # Model, Block and Layout, for their types and for joining scenes
     ("physics", "step"),  # State, Workspace and Stage, for their types; `threads.py`, which cuts launches
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ import warp_mca as mca
 from warp_mca.base import outside
 from warp_mca.base.errors import RequestError
 from warp_mca.cli.main import main
+from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.phases.checkpoint import FILE, Checkpoint
 from warp_mca.registration import TABLES
 from warp_mca.scene import model_file
@@ -102,6 +104,13 @@ def test_another_thing_of_the_same_name_is_refused():
     with pytest.raises(RequestError, match=words):
         mca.register(taken)
     assert MATERIALS["Elastic"] is mca.Elastic
+
+
+def test_another_cell_type_of_the_same_name_is_refused():
+    other = replace(TETRAHEDRON, gmsh=11)
+    with pytest.raises(RequestError, match=r"^register: name of the cell type = 'tetrahedron': "):
+        mca.register(other)
+    assert mca.register(TETRAHEDRON) is TABLES["cell type"].entries["tetrahedron"] is TETRAHEDRON
 
 
 def test_a_class_that_is_read_again_replaces_itself():

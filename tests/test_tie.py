@@ -174,7 +174,7 @@ def test_a_tied_run_repeats_bit_for_bit_alone_in_a_batch_and_on_threads(monkeypa
 
 
 def test_parts_of_one_body_are_tied_and_a_model_file_keeps_them(tmp_path: Path):
-    from warp_mca.phases.simulation import mesh
+    from warp_mca.accuracy.simulation import mesh
     from warp_mca.scene.model_file import load, save
 
     scene = bar()

@@ -43,10 +43,10 @@ from warp_mca.scene.materials import Elastic, J2Bilinear
 
 if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
+    from warp_mca.accuracy.simulation import mesh, run
     from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
     from warp_mca.phases.quality import quality_table
-    from warp_mca.phases.simulation import mesh, run
     from warp_mca.registration import register
     from warp_mca.results.cfc import cfc_filter
     from warp_mca.results.result import Result
@@ -78,8 +78,8 @@ _LAZY = {
     "load": "warp_mca.results.storage",
     "tradeoff": "warp_mca.accuracy.tradeoff",
     "quality_table": "warp_mca.phases.quality",
-    "mesh": "warp_mca.phases.simulation",
-    "run": "warp_mca.phases.simulation",
+    "mesh": "warp_mca.accuracy.simulation",
+    "run": "warp_mca.accuracy.simulation",
     "run_batch": "warp_mca.studies.batch",
     "sweep": "warp_mca.studies.sweep",
 }

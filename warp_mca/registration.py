@@ -57,6 +57,7 @@ TABLES = {
     "material": Table("warp_mca.scene.materials", "MATERIALS", ("warp_mca.scene.materials", "Elastic")),
     "contact law": Table("warp_mca.scene.contact_laws", "CONTACT_LAWS", ("warp_mca.scene.contact_laws", "ContactLaw")),
     "joint": Table("warp_mca.scene.joints", "JOINTS", ("warp_mca.scene.joints", "Joint")),
+    "load": Table("warp_mca.scene.loads", "LOADS", ("warp_mca.scene.loads", "Load")),
     "cell type": Table(
         "warp_mca.geometry.cell_types", "CELL_TYPES", ("warp_mca.geometry.cell_types", "CellType"), whole=False
     ),
@@ -67,16 +68,16 @@ TABLES = {
 
 
 def register(thing: Thing, *, kind: str | None = None) -> Thing:
-    """Add a material, contact law, joint, cell type, element, phase or recorder to those that the package knows.
+    """Add a material, contact law, joint, load, cell type, element, phase or recorder to those the package knows.
 
     Its name is that of its class, or its attribute `name` where the table holds objects (elements, cell types). It can
     be used as a decorator of a class. A class that is read again from the same module replaces itself.
 
     Args:
-        thing: a class made of `scene.materials.Elastic`, `scene.contact_laws.ContactLaw` or `scene.joints.Joint`; a
-            class with the methods of `recorders.Recorder`, or with the method `advance(impact, tell)` of a phase before
-            the impact (`phases.stretch`); an object with the attributes of `physics.elements.Element`;
-            a `geometry.cell_types.CellType`.
+        thing: a class made of `scene.materials.Elastic`, `scene.contact_laws.ContactLaw`, `scene.joints.Joint` or
+            `scene.loads.Load`; a class with the methods of `recorders.Recorder`, or with the method
+            `advance(impact, tell)` of a phase before the impact (`phases.stretch`); an object with the attributes of
+            `physics.elements.Element`; a `geometry.cell_types.CellType`.
         kind: which of them it is, where that cannot be told from the object: a key of `TABLES`.
 
     Returns:
@@ -96,11 +97,19 @@ def register(thing: Thing, *, kind: str | None = None) -> Thing:
     if not (isinstance(name, str) and name):
         raise bad_value(f"register: name of the {found[0]}", brief(name), "give a text that is not empty")
     other = entries.get(name)
-    if other is not None and other is not thing and _place(other) != _place(thing):
+    if other is not None and other is not thing and not _read_again(other, thing):
         remedy = f"{_words(other)} has this name; give {_words(thing)} another one"
         raise bad_value(f"register: name of the {found[0]}", name, remedy)
     entries[name] = thing
     return thing
+
+
+def _read_again(other: object, thing: object) -> bool:
+    """Whether a thing is one that was registered before, from a module outside the package that was read again."""
+    if other == thing:
+        return True
+    place, _ = _place(other)
+    return _place(other) == _place(thing) and not place.startswith("warp_mca.")
 
 
 def _place(thing: object) -> tuple[str, str]:

@@ -13,13 +13,13 @@ from typing import Any
 from warp_mca.accuracy.figures import Figures, figures_of
 from warp_mca.accuracy.knobs import BASE, Trial
 from warp_mca.accuracy.same_mesh import Meshes
+from warp_mca.accuracy.simulation import run
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import McaError
 from warp_mca.base.log import LOGGER
 from warp_mca.base.progress import duration_words
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.meshing import mesh
-from warp_mca.phases.simulation import run
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene
 

@@ -20,6 +20,7 @@ Columns = dict[str, Array]
 
 MORE_COLUMNS = ("tip_vz", "plate_vy", "plate_vz", "closing_speed")
 STORED = ("kinetic", "elastic", "plastic", "hourglass", "contact")
+SPENT = ("friction", "contact_loss", "damping", "joint")
 
 
 @dataclass
@@ -31,6 +32,7 @@ class Totals:
         external_work: of gravity, moving planes, driven nodes, joint torques and a moving base.
         friction: heat of contacts.
         contact_loss: what springs lost as they became softer.
+        damping: what dashpots of contacts dissipated.
         joint: heat of friction in joints.
         lost: energy of vibration that the ways back to rigid bodies left out.
         hand_off: kinetic energy that other inertia gave where nodes took over from rigid links, and back.
@@ -40,13 +42,14 @@ class Totals:
     external_work: float = 0.0
     friction: float = 0.0
     contact_loss: float = 0.0
+    damping: float = 0.0
     joint: float = 0.0
     lost: float = 0.0
     hand_off: float = 0.0
 
     def error(self, stored: Array | float) -> Any:
         """What the energies of bodies and contacts leave unexplained [J]."""
-        spent = self.friction + self.contact_loss + self.joint + self.lost
+        spent = self.friction + self.contact_loss + self.damping + self.joint + self.lost
         return stored + spent - self.external_work - self.hand_off - self.initial
 
 
@@ -150,7 +153,7 @@ def _add_impact(setup: Setup, part: ImpactPart, story: Story) -> None:
     totals.lost += part.settled
     rows, energies = scene_run.history(), scene_run.ledger.energies()
     stored = np.sum([energies[key] for key in STORED], axis=0)
-    spent = energies["friction"] + energies["contact_loss"] + energies["joint"]
+    spent = np.sum([energies[key] for key in SPENT], axis=0)
     rows["t"] = part.start + rows.pop("time_s")
     rows["E_total_error"] = totals.error(stored) + spent - energies["external_work"]
     rows["E_friction"] = totals.friction + rows["E_friction"]
@@ -160,9 +163,8 @@ def _add_impact(setup: Setup, part: ImpactPart, story: Story) -> None:
     last = {key: float(column[-1]) for key, column in energies.items()}
     back = part.back
     totals.external_work += last["external_work"] - (back.drive_work if back else 0.0)
-    totals.friction += last["friction"]
-    totals.contact_loss += last["contact_loss"]
-    totals.joint += last["joint"]
+    for key in SPENT:
+        setattr(totals, key, getattr(totals, key) + last[key])
     totals.lost += part.lost
     totals.hand_off += part.jump_back
     energy = {key: last[key] for key in STORED}

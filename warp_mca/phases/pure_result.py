@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warp_mca.phases.cycle_rows import STORED
+from warp_mca.phases.cycle_rows import SPENT, STORED
 from warp_mca.phases.every import METHOD
 from warp_mca.phases.pure_fem import PureRun
 from warp_mca.phases.stretch import Stretch, joined, phase_facts
@@ -66,7 +66,7 @@ def _phases(run: PureRun, t_contact: float, touch: int) -> list[dict[str, Any]]:
     for kind, start, row, ended_by in (("swing", 0.0, touch - 1, "touch"), ("impact", t_contact, -1, "duration")):
         end = run.begin + (len(ledger.kept.sums) - 1 if row < 0 else row) * run.fine.interval
         energy = {key: float(column[row]) for key, column in energies.items() if key in (*STORED, "external_work")}
-        energy |= {key: float(energies[key][row]) for key in ("friction", "contact_loss", "joint")}
+        energy |= {key: float(energies[key][row]) for key in SPENT}
         wall = place.wall.get(kind, 0.0)
         found.append({**phase_facts(kind, start, end, ended_by, energy), "wall": wall})
     return found

@@ -98,8 +98,8 @@ class Scene:
         validate.kind_of("Scene.loads", self.loads, (tuple, list), "give a tuple of loads")
         for k, load in enumerate(self.loads):
             if type(load) not in LOADS.values():
-                known = f"the kinds are {', '.join(LOADS)}" if LOADS else "the package has none of its own"
-                raise bad_value(f"Scene.loads[{k}]", validate.brief(load), f"{known}; list its class in LOADS")
+                remedy = f"the kinds are {', '.join(LOADS) or 'none'}; register others by warp_mca.register"
+                raise bad_value(f"Scene.loads[{k}]", validate.brief(load), remedy)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from warp_mca.accuracy.simulation import run
 from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.log import LOGGER
 from warp_mca.base.outside import import_named, imported
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.simulation import run
 from warp_mca.results.result import Result
 from warp_mca.results.storage import save
 from warp_mca.scene import Scene, catalogue, model_file

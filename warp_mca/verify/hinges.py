@@ -199,7 +199,7 @@ def pinned_double_pendulum(setup: Setup) -> list[Row]:
 
 def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
     """Tip, hinge A and kinetic energy at the end of a swing, for links of rising stiffness."""
-    from warp_mca.phases.simulation import mesh
+    from warp_mca.accuracy.simulation import mesh
     from warp_mca.physics.elements.cells import nodal_masses
 
     moduli = setup.choose((200e6, 800e6), (200e6, 800e6, 3200e6))

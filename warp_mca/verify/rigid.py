@@ -171,7 +171,7 @@ def chain_energy(setup: Setup) -> list[Row]:
 )
 def handoff_conservation(setup: Setup) -> list[Row]:
     """The two-link manipulator at contact with inertia="mesh"; then back, with and without a vibration on top."""
-    from warp_mca.phases.simulation import mesh
+    from warp_mca.accuracy.simulation import mesh
     from warp_mca.physics.elements.cells import nodal_masses
     from warp_mca.rigid.handback import hand_back
     from warp_mca.rigid.handoff import hand_off

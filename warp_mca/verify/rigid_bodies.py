@@ -170,7 +170,7 @@ def rigid_pendulum_period(setup: Setup) -> list[Row]:
 )
 def rigid_double_pendulum(setup: Setup) -> list[Row]:
     """The links of `fe_double_pendulum`, rigid: one of them has two hinges, which are solved together; 0.4 s."""
-    from warp_mca.phases.simulation import mesh
+    from warp_mca.accuracy.simulation import mesh
     from warp_mca.physics.elements.cells import nodal_masses
 
     start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}
