@@ -11,8 +11,8 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, lies_below, middle, neighbour
-from warp_mca.kernels.contact.nearest import ABOVE, Master, Nearest, edge_of, nearest_face, reachable
+from warp_mca.kernels.contact.edges import Surfaces, area_vector, lies_below, middle, neighbour
+from warp_mca.kernels.contact.nearest import ABOVE, Nearest, edge_of, nearest_face, reachable
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
@@ -54,20 +54,18 @@ def no_support() -> Support:
 
 @wp.func
 def lies_on(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    master: Master,
+    at: Surfaces,
     e: int,
     x: wp.vec3d,
     own: wp.vec3d,
     along: wp.vec3f,
 ) -> bool:
     """Whether the node of spring e, at x, lies on or just in front of a face of its side that `own` opposes."""
-    near = nearest_face(X, u, master, e, x, along)
+    near = nearest_face(at.X, at.u, at.master, e, x, along)
     f = wp.max(near.face, near.front_face)
     found = bool(False)
     if f >= 0:
-        across = area_vector(X, u, master.face, f)
+        across = area_vector(at.X, at.u, at.master.face, f)
         edge = wp.sqrt(wp.float64(0.5) * wp.length(across))
         found = wp.where(near.face >= 0, wp.abs(near.gap), near.front) < wp.float64(ABOVE) * edge
         found = found and -wp.dot(wp.normalize(own), wp.normalize(across)) > wp.float64(_FLAT)
@@ -77,8 +75,7 @@ def lies_on(
 @wp.func
 def meet_edge(
     v: wp.array(dtype=wp.vec3d),
-    master: Master,
-    slaves: SlaveFaces,
+    at: Surfaces,
     s: int,
     e: int,
     support: Support,
@@ -92,19 +89,19 @@ def meet_edge(
     An impact does not catch the crossing. It begins to rest only if it came into the side as slowly as nodes that slide
     there. It starts free of force and is pressed as the slave tips.
     """
-    i = slaves.node[s]
+    i = at.slaves.node[s]
     near = support.near
-    touch = meet(v, master.face, i, near, dt, spring.held[e], along)
+    touch = meet(v, at.master.face, i, near, dt, spring.held[e], along)
     touch.du += dt * (wp.float64(1.0) - support.share) * (v[support.inner] - v[i])
-    touch.own = slaves.stiffness[s]
-    touch.limit = master.stiffness[near.face]
+    touch.own = at.slaves.stiffness[s]
+    touch.limit = at.master.stiffness[near.face]
     touch.begins = wp.float64(0.0)
     edge = edge_of(near)
     approach = wp.dot(touch.du, near.normal)
     if spring.support[e] >= 0:
         touch.touches = reachable(-near.gap, touch.held, wp.float64(FAR), approach, edge)
     elif touch.held == wp.float64(0.0):
-        usual = usual_depth(master, slaves, s, near.face, near.normal, recent_force)
+        usual = usual_depth(at, s, near.face, near.normal, recent_force)
         slow = wp.abs(approach) <= wp.float64(_SLOW) * edge and wp.length(touch.du) < wp.float64(_SLIDES) * edge
         touch.touches = slow and slides_at(near.gap, usual, edge)
     return touch
@@ -132,10 +129,7 @@ def support_function(sides: int) -> Any:
 
     @wp.func
     def find_support(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slaves: SlaveFaces,
+        at: Surfaces,
         s: int,
         e: int,
         node: NodeSprings,
@@ -153,33 +147,33 @@ def support_function(sides: int) -> Any:
         if slid_off(e, spring):
             f = face_across(e, node.begin, front_gap, front_face, spring)
         if f >= 0:
-            i = slaves.node[s]
-            x = X[i] + u[i]
-            across = wp.normalize(area_vector(X, u, master.face, f))
-            at_edge = middle(X, u, master.face, f)
+            i = at.slaves.node[s]
+            x = at.X[i] + at.u[i]
+            across = wp.normalize(area_vector(at.X, at.u, at.master.face, f))
+            at_edge = middle(at.X, at.u, at.master.face, f)
             outside = wp.max(wp.dot(x - at_edge, across), wp.float64(0.0))
             most = wp.float64(0.0)
-            for j in range(slaves.offset[s], slaves.offset[s + 1]):
-                g = slaves.face_of_slave[j]
-                own = area_vector(X, u, slaves.face, g)
+            for j in range(at.slaves.offset[s], at.slaves.offset[s + 1]):
+                g = at.slaves.face_of_slave[j]
+                own = area_vector(at.X, at.u, at.slaves.face, g)
                 for back in range(2):
-                    other = neighbour(slaves.face, g, i, 1 + 2 * back)
-                    inside = wp.dot(at_edge - X[other] - u[other], across)
-                    e_other = wp.static(sides) * slaves.number[other] + e - node.begin
+                    other = neighbour(at.slaves.face, g, i, 1 + 2 * back)
+                    inside = wp.dot(at_edge - at.X[other] - at.u[other], across)
+                    e_other = wp.static(sides) * at.slaves.number[other] + e - node.begin
                     if inside > wp.float64(0.0) and spring.bears[e_other] == 1:
                         share = inside / (inside + outside)
-                        if share > most and lies_on(X, u, master, e_other, X[other] + u[other], own, along):
+                        if share > most and lies_on(at, e_other, at.X[other] + at.u[other], own, along):
                             most = share
                             support.edge = 2 * g + back
                             support.inner = other
             if support.edge >= 0:
-                start = X[support.inner] + u[support.inner]
+                start = at.X[support.inner] + at.u[support.inner]
                 support.share = most
-                support.near = nearest_face(X, u, master, e, start + most * (x - start), along)
-                own = area_vector(X, u, slaves.face, support.edge // 2)
+                support.near = nearest_face(at.X, at.u, at.master, e, start + most * (x - start), along)
+                own = area_vector(at.X, at.u, at.slaves.face, support.edge // 2)
                 rests = support.near.face >= 0 and wp.dot(own, support.near.normal) < wp.float64(0.0)
                 if rests:  # not `and`: Warp evaluates both of its sides
-                    rests = lies_below(X, u, master.face, f, support.near.face, support.near.normal)
+                    rests = lies_below(at.X, at.u, at.master.face, f, support.near.face, support.near.normal)
                 if not rests:  # a face across a fold stands above the side
                     support.edge = -1
                 else:
@@ -204,11 +198,8 @@ def release_function(friction: bool, sides: int, law: str) -> Any:
 
     @wp.func
     def release(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
+        at: Surfaces,
         v: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slaves: SlaveFaces,
         s: int,
         e: int,
         scene: int,
@@ -229,12 +220,12 @@ def release_function(friction: bool, sides: int, law: str) -> Any:
     ) -> wp.vec3d:
         support = no_support()
         if node.listed > 1 and (newcomer < 0 or newcomer == e):
-            support = find_support(X, u, master, slaves, s, e, node, front_gap, front_face, along, spring)
+            support = find_support(at, s, e, node, front_gap, front_face, along, spring)
         if support.edge < 0:
-            let_go(e, slaves.node[s], v, master.face, dt, near.front, spring.held[e], spring)
+            let_go(e, at.slaves.node[s], v, at.master.face, dt, near.front, spring.held[e], spring)
             note_way(e, bool(False), ends, spring)
             return wp.vec3d()
-        touch = meet_edge(v, master, slaves, s, e, support, dt, wp.vec3f(pressure(e, spring)), spring, recent_force)
+        touch = meet_edge(v, at, s, e, support, dt, wp.vec3f(pressure(e, spring)), spring, recent_force)
         force = settle(e, scene, support.near, touch, mu, per_newton, spring, normal_force_out, flag_out)
         note_way(e, touch.touches, ends, spring)
         if touch.touches:

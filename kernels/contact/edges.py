@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from warp_mca.kernels.contact.nearest import Master
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -24,6 +26,23 @@ class SlaveFaces:
     offset: wp.array(dtype=wp.int32)
     face_of_slave: wp.array(dtype=wp.int32)
     number: wp.array(dtype=wp.int32)
+
+
+@wp.struct
+class Surfaces:
+    """A slave and a master that has several sides.
+
+    Attributes:
+        X: reference positions [m], shape (node_count,), vec3d.
+        u: displacements [m], shape (node_count,), vec3d.
+        master: faces of the master.
+        slaves: nodes and faces of the slave.
+    """
+
+    X: wp.array(dtype=wp.vec3d)
+    u: wp.array(dtype=wp.vec3d)
+    master: Master
+    slaves: SlaveFaces
 
 
 @wp.func
@@ -104,12 +123,10 @@ def is_on_rim(slave_faces: SlaveFaces, s: int) -> bool:
 
 
 @wp.func
-def opposition(
-    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), slave_faces: SlaveFaces, s: int, normal: wp.vec3d
-) -> wp.float64:
+def opposition(at: Surfaces, s: int, normal: wp.vec3d) -> wp.float64:
     """Largest cosine between a reversed normal of the faces around slave node s and a normal of any length."""
     most = wp.float64(-1.0)
-    for j in range(slave_faces.offset[s], slave_faces.offset[s + 1]):
-        own = area_vector(X, u, slave_faces.face, slave_faces.face_of_slave[j])
+    for j in range(at.slaves.offset[s], at.slaves.offset[s + 1]):
+        own = area_vector(at.X, at.u, at.slaves.face, at.slaves.face_of_slave[j])
         most = wp.max(most, -wp.dot(wp.normalize(own), wp.normalize(normal)))
     return most

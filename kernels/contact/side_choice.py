@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, is_edge, opposition
-from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of
+from warp_mca.kernels.contact.edges import Surfaces, area_vector, is_edge, opposition
+from warp_mca.kernels.contact.nearest import Nearest, edge_of
 from warp_mca.kernels.contact.settle import Touch
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function
@@ -110,24 +110,19 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
     way_back = way_back_function(sides)
 
     @wp.func
-    def keeper(
-        X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, f: int, begin: int, spring: Spring
-    ):
+    def keeper(at: Surfaces, f: int, begin: int, spring: Spring):
         """Spring of a side that presses the node and meets face f at the edge of a solid, or -1."""
         found = int(-1)
         for e in range(begin, begin + wp.static(sides)):
             if spring.face[e] >= 0:  # not `and`: Warp evaluates both of its sides
                 g = spring.face[e]
-                if is_edge(X, u, master.face, f, g, area_vector(X, u, master.face, g)):
+                if is_edge(at.X, at.u, at.master.face, f, g, area_vector(at.X, at.u, at.master.face, g)):
                     found = e
         return found
 
     @wp.func
     def takes_over(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slave_faces: SlaveFaces,
+        at: Surfaces,
         s: int,
         near: Nearest,
         du: wp.vec3d,
@@ -135,18 +130,15 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         spring: Spring,
     ) -> bool:
         """Whether the nearest face takes the node over from spring `other`: no deeper in it, and not moving in."""
-        across = area_vector(X, u, master.face, spring.face[other])
-        better = opposition(X, u, slave_faces, s, near.normal) - opposition(X, u, slave_faces, s, across)
+        across = area_vector(at.X, at.u, at.master.face, spring.face[other])
+        better = opposition(at, s, near.normal) - opposition(at, s, across)
         enters = -wp.dot(du, near.normal) > -wp.dot(du, wp.normalize(across))
         shallower = -near.gap <= spring.held[other] and not near.beside
         return shallower and not enters and better > wp.float64(-OPPOSES)
 
     @wp.func
     def choose(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slave_faces: SlaveFaces,
+        at: Surfaces,
         s: int,
         e: int,
         near: Nearest,
@@ -168,9 +160,9 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         way.spring = -1
         if spring.face[e] < 0:
             if node.holding:
-                other = keeper(X, u, master, near.face, node.begin, spring)
+                other = keeper(at, near.face, node.begin, spring)
             if touches and other < 0:
-                way = way_back(X, u, master, slave_faces, s, node.begin, e, near, along, spring, recent_force)
+                way = way_back(at, s, node.begin, e, near, along, spring, recent_force)
         edge = edge_of(near)
         approach = -wp.dot(touch.du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
@@ -194,7 +186,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
                 chosen.face = near.face
                 chosen.normal = near.normal
         elif other >= 0:
-            if takes_over(X, u, master, slave_faces, s, near, touch.du, other, spring):
+            if takes_over(at, s, near, touch.du, other, spring):
                 chosen.newcomer = e
                 chosen.leaver = other
                 chosen.begins = spring.held[other] - spring.rest[other]
@@ -202,9 +194,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
 
     @wp.func
     def confirm(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
+        at: Surfaces,
         e: int,
         near: Nearest,
         touch: Touch,
@@ -222,7 +212,7 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
         elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
             found.touches = bool(False)
         elif spring.face[e] < 0 and choice.face >= 0:
-            if is_edge(X, u, master.face, near.face, choice.face, choice.normal):
+            if is_edge(at.X, at.u, at.master.face, near.face, choice.face, choice.normal):
                 found.touches = bool(False)
         return found
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector, lies_below, opposition
-from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.edges import Surfaces, area_vector, lies_below, opposition
+from warp_mca.kernels.contact.nearest import Nearest, edge_of, nearest_face, passes_by, reachable
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.contact.way_back import OPPOSES, slides_at, usual_depth
@@ -16,10 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def belongs_to_other_side(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    master: Master,
-    slave_faces: SlaveFaces,
+    at: Surfaces,
     s: int,
     near: Nearest,
     other: int,
@@ -27,16 +24,16 @@ def belongs_to_other_side(
     recent_force: wp.array(dtype=wp.vec3d),
 ) -> bool:
     """Whether slave node s meets face `other`, at `gap` in front of it, not the nearest face across an edge."""
-    across = area_vector(X, u, master.face, other)
+    across = area_vector(at.X, at.u, at.master.face, other)
     found = bool(False)
-    if lies_below(X, u, master.face, near.face, other, across):
-        mine = opposition(X, u, slave_faces, s, near.normal)
-        its = opposition(X, u, slave_faces, s, across)
+    if lies_below(at.X, at.u, at.master.face, near.face, other, across):
+        mine = opposition(at, s, near.normal)
+        its = opposition(at, s, across)
         if mine < wp.float64(OPPOSES) or (near.beside and mine < its + wp.float64(OPPOSES)):
             found = bool(True)
         elif its >= wp.float64(OPPOSES):
             edge = edge_of(near)
-            usual = usual_depth(master, slave_faces, s, other, wp.normalize(across), recent_force)
+            usual = usual_depth(at, s, other, wp.normalize(across), recent_force)
             found = slides_at(gap, usual, edge)
     return found
 
@@ -67,9 +64,7 @@ def front_functions(sides: int) -> tuple[Any, Any]:
 
     @wp.func
     def front_faces(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
+        at: Surfaces,
         node: NodeSprings,
         x: wp.vec3d,
         along: wp.vec3f,
@@ -81,7 +76,7 @@ def front_functions(sides: int) -> tuple[Any, Any]:
             gaps[p] = wp.float64(FAR)
         if node.listed > 1:
             for e in range(node.begin, node.begin + wp.static(sides)):
-                near = nearest_face(X, u, master, e, x, along)
+                near = nearest_face(at.X, at.u, at.master, e, x, along)
                 gaps[e - node.begin] = near.front
                 faces[e - node.begin] = near.front_face
                 front = wp.min(front, near.front)
@@ -89,10 +84,7 @@ def front_functions(sides: int) -> tuple[Any, Any]:
 
     @wp.func
     def may_press(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slave_faces: SlaveFaces,
+        at: Surfaces,
         s: int,
         near: Nearest,
         held: wp.float64,
@@ -108,7 +100,7 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         found = in_reach(near, node, held, fold, -wp.dot(du, near.normal))
         for p in range(wp.static(sides)):
             if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
-                if belongs_to_other_side(X, u, master, slave_faces, s, near, front_face[p], front_gap[p], recent_force):
+                if belongs_to_other_side(at, s, near, front_face[p], front_gap[p], recent_force):
                     found = bool(False)
         return found
 

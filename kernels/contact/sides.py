@@ -11,9 +11,9 @@ import warp as wp
 
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
-from warp_mca.kernels.contact.edges import SlaveFaces
+from warp_mca.kernels.contact.edges import Surfaces
 from warp_mca.kernels.contact.laws import LINEAR
-from warp_mca.kernels.contact.nearest import Master, nearest_face
+from warp_mca.kernels.contact.nearest import nearest_face
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.side_choice import (
@@ -49,12 +49,9 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
     def touch_sides(
         first: int,
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
+        at: Surfaces,
         v: wp.array(dtype=wp.vec3d),
         u_search: wp.array(dtype=wp.vec3d),
-        slaves: SlaveFaces,
-        master: Master,
         scene: Index,
         mu: Real,
         margin: Real,
@@ -69,43 +66,39 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
         wait_for_previous()
         let_next_begin()
         s = first + wp.tid()
-        i, k = slaves.node[s], of(scene, s)
-        x = X[i] + u[i]
-        node = springs_of_node(s, master.count, spring)
+        i, k = at.slaves.node[s], of(scene, s)
+        x = at.X[i] + at.u[i]
+        node = springs_of_node(s, at.master.count, spring)
         along = wp.vec3f(node.pressed)
-        fronts, front_face, front = front_faces(X, u, master, node, x, along)
+        fronts, front_face, front = front_faces(at, node, x, along)
         choice, total, scale = first_choice(node), wp.vec3d(), of(per_newton, k)
         for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
             for e in range(node.begin, node.begin + wp.static(sides)):
-                near = nearest_face(X, u, master, e, x, along)
+                near = nearest_face(at.X, at.u, at.master, e, x, along)
                 ends = way_ends(near, node.holding and spring.face[e] < 0)
                 front = wp.min(front, near.front)
                 near.front = front  # of every side so far
                 held, pressed = spring.held[e], spring.face[e] >= 0
                 if near.face >= 0:
-                    touch = meet(v, master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
-                    touches = may_press(
-                        X, u, master, slaves, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out
-                    )
+                    touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
+                    touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out)
                     if step == 0:
-                        choice = choose(
-                            X, u, master, slaves, s, e, near, touch, touches, along, node, choice, spring, recent_out
-                        )
+                        choice = choose(at, s, e, near, touch, touches, along, node, choice, spring, recent_out)
                     else:
-                        touch = confirm(X, u, master, e, near, touch, touches, node, choice, spring)
-                        touch.own = slaves.stiffness[s]
-                        touch.limit = master.stiffness[near.face]
+                        touch = confirm(at, e, near, touch, touches, node, choice, spring)
+                        touch.own = at.slaves.stiffness[s]
+                        touch.limit = at.master.stiffness[near.face]
                         total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
                         note_way(e, touch.touches, ends, spring)
                 elif step == 1:
                     total += release(
-                        X, u, v, master, slaves, s, e, k, near, node, choice.newcomer, ends, fronts, front_face, along,
+                        at, v, s, e, k, near, node, choice.newcomer, ends, fronts, front_face, along,
                         of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
                     )  # fmt: skip
         if node.active:
             nodal_force_out[i] = nodal_force_out[i] + total
             recent_out[i] = recent(recent_out[i], total)
-        if moved_too_far(u[i], u_search[i], of(margin, k)):
+        if moved_too_far(at.u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
     return begins_early(touch_sides)

@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import SlaveFaces, is_on_rim, lies_below, opposition
-from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Master, Nearest, edge_of, nearest_face
+from warp_mca.kernels.contact.edges import Surfaces, is_on_rim, lies_below, opposition
+from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, nearest_face
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
 wp.set_module_options({"enable_backward": False})
@@ -53,8 +53,7 @@ def along_normal(force: wp.vec3d, normal: wp.vec3d) -> wp.float64:
 
 @wp.func
 def usual_depth(
-    master: Master,
-    slave_faces: SlaveFaces,
+    at: Surfaces,
     s: int,
     face: int,
     normal: wp.vec3d,
@@ -65,10 +64,10 @@ def usual_depth(
     The force on the node may come from another master, flush with this one. If this node has not been touched yet, the
     forces on the corners of the face stand for those of other nodes of the slave.
     """
-    force = along_normal(recent_force[slave_faces.node[s]], normal)
+    force = along_normal(recent_force[at.slaves.node[s]], normal)
     for c in range(4):
-        force = wp.max(force, along_normal(-recent_force[master.face[face, c]], normal))
-    return force / wp.min(slave_faces.stiffness[s], master.stiffness[face])
+        force = wp.max(force, along_normal(-recent_force[at.master.face[face, c]], normal))
+    return force / wp.min(at.slaves.stiffness[s], at.master.stiffness[face])
 
 
 @wp.func
@@ -100,10 +99,7 @@ def way_back_function(sides: int) -> Any:
 
     @wp.func
     def way_back(
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        master: Master,
-        slave_faces: SlaveFaces,
+        at: Surfaces,
         s: int,
         begin: int,
         e: int,
@@ -120,27 +116,27 @@ def way_back_function(sides: int) -> Any:
         the side and if it lies no deeper below it than usual. If it slid off that side, or if no face of the slave
         opposes the face that it runs into, it may lie as deep as nodes in front of a face count as above it.
         """
-        i = slave_faces.node[s]
+        i = at.slaves.node[s]
         way = WayBack()
         way.spring = -1
         shallowest = wp.float64(FAR)
         edge = edge_of(near)
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
-                home = nearest_face(X, u, master, q, X[i] + u[i], along)
+                home = nearest_face(at.X, at.u, at.master, q, at.X[i] + at.u[i], along)
                 if home.face >= 0 and not home.beside:
-                    if lies_below(X, u, master.face, near.face, home.face, home.normal):
-                        usual = usual_depth(master, slave_faces, s, home.face, home.normal, recent_force)
+                    if lies_below(at.X, at.u, at.master.face, near.face, home.face, home.normal):
+                        usual = usual_depth(at, s, home.face, home.normal, recent_force)
                         left = spring.left[q]
-                        mine = opposition(X, u, slave_faces, s, near.normal)
+                        mine = opposition(at, s, near.normal)
                         slid = left > wp.float64(0.0)
                         limit = wp.float64(0.0)
                         if mine >= wp.float64(OPPOSES):
                             if slid:
                                 limit = wp.float64(ABOVE) * edge
-                        elif slid or not is_on_rim(slave_faces, s):
+                        elif slid or not is_on_rim(at.slaves, s):
                             limit = wp.float64(0.5) * edge
-                        its = opposition(X, u, slave_faces, s, home.normal)
+                        its = opposition(at, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)
                         if its >= wp.float64(OPPOSES) and within and -home.gap < shallowest:
                             shallowest = -home.gap

@@ -12,7 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.joining import offsets
-from warp_mca.kernels.contact import contact, nearest, search, sides
+from warp_mca.kernels.contact import contact, edges, nearest, search, sides
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
@@ -259,9 +259,9 @@ class ContactStage:
             inputs += [self.per_newton, dt, own.spring]
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
-        if self.edges:
-            slaves = [self.edges.faces]
         inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
+        if self.edges:
+            inputs = [self._surfaces(work, state), state.v, own.u_search]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
         split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
         inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
@@ -275,6 +275,14 @@ class ContactStage:
         found = nearest.Master()
         found.face, found.stiffness = self.face, self.face_stiffness
         found.count, found.candidate = own.count, own.candidate
+        return found
+
+    def _surfaces(self, work: Workspace, state: State) -> Any:
+        """Both surfaces, as the kernel of a master with several sides takes them."""
+        assert self.edges
+        found = edges.Surfaces()
+        found.X, found.u, found.slaves = work.X, state.u, self.edges.faces
+        found.master = self.faces_of(state.contacts[self.index])
         return found
 
     def rest_at(self, state: State, depth: NDArray[np.float64]) -> None:
