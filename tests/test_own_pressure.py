@@ -17,7 +17,7 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.scene import model_file
-from warp_mca.scene.loads import LOADS, Load
+from warp_mca.scene.loads import Load
 from warp_mca.step.stage import Step
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 
+@mca.register
 @dataclass(frozen=True, kw_only=True)
 class Pressure(Load):
     """Pressure on a surface by a table, linear between its times.
@@ -203,12 +204,6 @@ AREA = SIZE[1] * SIZE[2]
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
 BLOCK = mca.Body(name="block", geometry=mca.Box(size=SIZE, divisions=(8, 4, 4)), material=STEEL)
 PUSH = Pressure(body="block", nodes="xmin", times=(0.0, 0.4 * END, END), pressures=(0.0, PEAK, 0.0))
-
-
-@pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The one registration."""
-    monkeypatch.setitem(LOADS, "Pressure", Pressure)
 
 
 def pushed(**change: Any) -> mca.Scene:

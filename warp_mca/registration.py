@@ -57,6 +57,7 @@ TABLES = {
     "material": Table("warp_mca.scene.materials", "MATERIALS", ("warp_mca.scene.materials", "Elastic")),
     "contact law": Table("warp_mca.scene.contact_laws", "CONTACT_LAWS", ("warp_mca.scene.contact_laws", "ContactLaw")),
     "joint": Table("warp_mca.scene.joints", "JOINTS", ("warp_mca.scene.joints", "Joint")),
+    "load": Table("warp_mca.scene.loads", "LOADS", ("warp_mca.scene.loads", "Load")),
     "cell type": Table(
         "warp_mca.geometry.cell_types", "CELL_TYPES", ("warp_mca.geometry.cell_types", "CellType"), whole=False
     ),
@@ -66,15 +67,15 @@ TABLES = {
 
 
 def register(thing: Thing, *, kind: str | None = None) -> Thing:
-    """Add a material, contact law, joint, cell type, element or recorder to those that the package knows.
+    """Add a material, contact law, load, joint, cell type, element or recorder to those that the package knows.
 
     Its name is that of its class, or its attribute `name` where the table holds objects (elements, cell types). It can
     be used as a decorator of a class. A class that is read again from the same module replaces itself.
 
     Args:
-        thing: a class made of `scene.materials.Elastic`, `scene.contact_laws.ContactLaw` or `scene.joints.Joint`; a
-            class with the methods of `recorders.Recorder`; an object with the attributes of `physics.elements.Element`;
-            a `geometry.cell_types.CellType`.
+        thing: a class made of `scene.materials.Elastic`, `scene.contact_laws.ContactLaw`, `scene.loads.Load` or
+            `scene.joints.Joint`; a class with the methods of `recorders.Recorder`; an object with the attributes of
+            `physics.elements.Element`; a `geometry.cell_types.CellType`.
         kind: which of them it is, where that cannot be told from the object: a key of `TABLES`.
 
     Returns:
