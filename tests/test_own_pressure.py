@@ -266,9 +266,13 @@ def test_several_rates_give_the_same_impulse():
 
 
 def test_a_batch_gives_the_figures_of_the_scenes_alone():
-    scenes = [pushed(), pushed(loads=(PUSH, replace(PUSH, nodes="ymax")))]
+    """One of them has an absorbing side besides, whose columns stand behind those of the pressures."""
+    side = mca.Absorbing(body="block", nodes="xmax")
+    scenes = [pushed(absorbing=(side,)), pushed(loads=(PUSH, replace(PUSH, nodes="ymax")))]
     for result, scene in zip(mca.run_batch(scenes), scenes, strict=True):
         alone = mca.run(scene)
+        works = [found.summary["energy"]["external_work"] for found in (result, alone)]
+        assert works[0] == pytest.approx(works[1], rel=1e-9) and works[1] > 0.0
         for name in ("E_kinetic", "E_internal"):
             assert result[name] == pytest.approx(alone[name], rel=1e-9)
 
