@@ -19,7 +19,7 @@ from warp_mca.base.joining import AS_IS, joinable
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.scene import model_file
-from warp_mca.scene.loads import LOADS, Load
+from warp_mca.scene.loads import Load
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 
+@mca.register
 @dataclass(frozen=True, kw_only=True)
 class TorsionSpring(Load):
     """Torque -k (theta - rest) about z between a body and another one, or the ground.
@@ -210,12 +211,6 @@ MASS = STEEL.rho * L * H * H
 J = MASS * (L**2 + H**2) / 12.0
 BAR = mca.Box(size=(L, H, H), divisions=(16, 2, 1), origin=(0.0, -0.5 * H, 0.0))
 SPRING = TorsionSpring(body="bar", nodes="boundary", stiffness=K, rest=REST)
-
-
-@pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The one registration."""
-    monkeypatch.setitem(LOADS, "TorsionSpring", TorsionSpring)
 
 
 def swinging(duration: float, **change: Any) -> mca.Scene:

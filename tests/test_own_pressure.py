@@ -17,7 +17,7 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.scene import model_file
-from warp_mca.scene.loads import LOADS, Load
+from warp_mca.scene.loads import Load
 from warp_mca.step.stage import Step
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 
+@mca.register
 @dataclass(frozen=True, kw_only=True)
 class Pressure(Load):
     """Pressure on a surface by a table, linear between its times.
@@ -205,12 +206,6 @@ BLOCK = mca.Body(name="block", geometry=mca.Box(size=SIZE, divisions=(8, 4, 4)),
 PUSH = Pressure(body="block", nodes="xmin", times=(0.0, 0.4 * END, END), pressures=(0.0, PEAK, 0.0))
 
 
-@pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The one registration."""
-    monkeypatch.setitem(LOADS, "Pressure", Pressure)
-
-
 def pushed(**change: Any) -> mca.Scene:
     phase = mca.ImpactPhase(duration=4e-5, output_interval=1e-6, energy_tolerance=1e-4)
     return replace(mca.Scene(name="pushed", bodies=(BLOCK,), loads=(PUSH,), impact=phase), **change)
@@ -271,9 +266,13 @@ def test_several_rates_give_the_same_impulse():
 
 
 def test_a_batch_gives_the_figures_of_the_scenes_alone():
-    scenes = [pushed(), pushed(loads=(PUSH, replace(PUSH, nodes="ymax")))]
+    """One of them has an absorbing side besides, whose columns stand behind those of the pressures."""
+    side = mca.Absorbing(body="block", nodes="xmax")
+    scenes = [pushed(absorbing=(side,)), pushed(loads=(PUSH, replace(PUSH, nodes="ymax")))]
     for result, scene in zip(mca.run_batch(scenes), scenes, strict=True):
         alone = mca.run(scene)
+        works = [found.summary["energy"]["external_work"] for found in (result, alone)]
+        assert works[0] == pytest.approx(works[1], rel=1e-9) and works[1] > 0.0
         for name in ("E_kinetic", "E_internal"):
             assert result[name] == pytest.approx(alone[name], rel=1e-9)
 

@@ -1,7 +1,6 @@
 """Owns how the arrays of several scenes become those of one model: a rule for each field of a dataclass.
 
 A field names its rule as its metadata, `node: Index = field(metadata=of("nodes"))`.
-`Starts` holds the first node, pair, ... of each scene in the joined arrays and, last, the number of all.
 """
 
 from __future__ import annotations
@@ -13,7 +12,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+# The first node, pair, ... of each scene in the joined arrays and, last, the number of all.
 Starts = Mapping[str, NDArray[np.int32]]
+Metadata = dict[str, Any]
 T = TypeVar("T")
 _KEY = "join"
 
@@ -23,31 +24,19 @@ def offsets(counts: Sequence[int]) -> NDArray[np.int32]:
     return np.cumsum([0, *counts]).astype(np.int32)
 
 
+def _merged(values: Sequence[Any]) -> Any:
+    """Arrays concatenated, tuples one after the other, entries of mappings likewise."""
+    if isinstance(values[0], Mapping):
+        return {key: _merged([value[key] for value in values]) for key in values[0]}
+    return sum(values, ()) if isinstance(values[0], tuple) else np.concatenate(values)
+
+
 @dataclass(frozen=True)
 class _Rule:
-    """`move` gives a value of one scene as it stands in the joined model, from the scene's number and `Starts`."""
+    """`move` gives the value of a scene, of this number, as it stands in the joined model; `merge` makes one of all."""
 
     move: Callable[[Any, int, Starts], Any]
-
-    def join(self, values: Sequence[Any], starts: Starts) -> Any:
-        """Values of all scenes as one: arrays concatenated, tuples one after the other."""
-        moved = [self.move(value, k, starts) for k, value in enumerate(values)]
-        return sum(moved, ()) if isinstance(moved[0], tuple) else np.concatenate(moved)
-
-
-class _Offsets(_Rule):
-    """Of compressed rows, whose last entry is the number of all."""
-
-    def join(self, values: Sequence[Any], starts: Starts) -> Any:
-        moved = [self.move(value, k, starts) for k, value in enumerate(values)]
-        return np.concatenate([*(value[:-1] for value in moved[:-1]), moved[-1]]).astype(np.int32)
-
-
-class _Part(_Rule):
-    """A dataclass whose fields have rules."""
-
-    def join(self, values: Sequence[Any], starts: Starts) -> Any:
-        return join(values, starts)
+    merge: Callable[[Sequence[Any]], Any] = _merged
 
 
 def _raised(kind: str) -> Callable[[Any, int, Starts], Any]:
@@ -60,43 +49,47 @@ def _raised(kind: str) -> Callable[[Any, int, Starts], Any]:
     return move
 
 
-def _moved(item: Any, scene: int, starts: Starts) -> Any:
-    """A dataclass of one scene as it stands in the joined model."""
-    return type(item)(**{f.name: _rule(item, f).move(getattr(item, f.name), scene, starts) for f in _fields(item)})
+def _moved(part: Any, scene: int, starts: Starts) -> Any:
+    """A dataclass, or a tuple or mapping of these, as it stands in the joined model."""
+    if isinstance(part, tuple):
+        return tuple(_moved(item, scene, starts) for item in part)
+    if isinstance(part, Mapping):
+        return {key: _moved(item, scene, starts) for key, item in part.items()}
+    found = {f.name: _rule(part, f).move(getattr(part, f.name), scene, starts) for f in fields(part)}
+    return type(part)(**found)
 
 
-def _alone(value: Any, scene: int, starts: Starts) -> Any:
-    raise TypeError("a field that batches have not is joined by `join`")
+def _merged_parts(parts: Sequence[Any]) -> Any:
+    """Dataclasses as one, whose fields have rules."""
+    first = parts[0]
+    found = {f.name: _rule(first, f).merge([getattr(part, f.name) for part in parts]) for f in fields(first)}
+    return type(first)(**found)
 
 
-def of(kind: str) -> dict[str, Any]:
+def of(kind: str) -> Metadata:
     """Rule of numbers of nodes, pairs, ...: raised by the first one of their scene. Negative ones, as GROUND, stay."""
     return {_KEY: _Rule(_raised(kind))}
 
 
-def offsets_of(kind: str) -> dict[str, Any]:
-    """Rule of the offsets of compressed rows of table entries, faces, ...."""
-    return {_KEY: _Offsets(_raised(kind))}
+def offsets_of(kind: str) -> Metadata:
+    """Rule of the offsets of compressed rows of table entries, ..., of which the last is the number of all."""
+    return {_KEY: _Rule(_raised(kind), lambda values: np.concatenate([*(v[:-1] for v in values[:-1]), values[-1]]))}
 
 
-AS_IS: dict[str, Any] = {_KEY: _Rule(lambda value, scene, starts: value)}  # as they are, one scene after the other
+AS_IS: Metadata = {_KEY: _Rule(lambda value, scene, starts: value)}  # one scene after the other
+ITEMS: Metadata = {_KEY: _Rule(_moved)}  # tuples of dataclasses whose fields have rules, or mappings of such tuples
+PART: Metadata = {_KEY: _Rule(_moved, _merged_parts)}  # a dataclass whose fields have rules
+SCENE: Metadata = {_KEY: _Rule(lambda value, scene, starts: scene)}  # of an item: number of its scene
+ALONE: Metadata = {_KEY: "alone"}  # None in every model of a batch
+GIVEN: Metadata = {_KEY: "given"}  # `join` is given it
 
 
-class _Kinds(_Rule):
-    """Of tuples of dataclasses by kind, which all scenes have the same of."""
-
-    def join(self, values: Sequence[Any], starts: Starts) -> Any:
-        return {kind: ITEMS[_KEY].join([value[kind] for value in values], starts) for kind in values[0]}
-
-
-ITEMS: dict[str, Any] = {
-    _KEY: _Rule(lambda value, scene, starts: tuple(_moved(item, scene, starts) for item in value))
-}  # a tuple of dataclasses whose fields have rules
-KINDS: dict[str, Any] = {_KEY: _Kinds(_moved)}  # a mapping of such tuples
-PART: dict[str, Any] = {_KEY: _Part(_moved)}  # a dataclass whose fields have rules
-SCENE: dict[str, Any] = {_KEY: _Rule(lambda value, scene, starts: scene)}  # of an item: number of its scene
-ALONE: dict[str, Any] = {_KEY: _Rule(_alone)}  # None in every model of a batch
-GIVEN: dict[str, Any] = {_KEY: None}  # `join` is given it
+def _rule(owner: Any, field: Any) -> Any:
+    if _KEY not in field.metadata:
+        kind = owner if isinstance(owner, type) else type(owner)
+        remedy = "give it a rule of base/joining.py as its metadata"
+        raise TypeError(f"{kind.__name__}.{field.name}: a batch would lose it; {remedy}")
+    return field.metadata[_KEY]
 
 
 def joinable(cls: type[T]) -> type[T]:
@@ -105,41 +98,28 @@ def joinable(cls: type[T]) -> type[T]:
     Raises:
         TypeError: a field has none, so that what the scenes of a batch have there would be lost.
     """
-    for field in _fields(cls):
+    for field in fields(cls):  # pyright: ignore[reportArgumentType]
         _rule(cls, field)
     return cls
-
-
-def _fields(owner: Any) -> list[Any]:
-    return [field for field in fields(owner) if field.init]
-
-
-def _rule(owner: Any, field: Any) -> Any:
-    if _KEY not in field.metadata:
-        kind = owner if isinstance(owner, type) else type(owner)
-        raise TypeError(
-            f"{kind.__name__}.{field.name}: a batch would lose it; give it a rule of base/joining.py as its metadata"
-        )
-    return field.metadata[_KEY]
 
 
 def join(parts: Sequence[T], starts: Starts, **given: Any) -> T:
     """One dataclass of those of several scenes, of the same class, whose fields have rules; `given` are those of GIVEN.
 
     Raises:
-        TypeError: a field has no rule, or is not given.
+        TypeError: a field has no rule.
         ValueError: a scene has what no batch can.
     """
     first: Any = parts[0]
     found: dict[str, Any] = {}
-    for field in _fields(first):
+    for field in fields(first):
         rule, values = _rule(first, field), [getattr(part, field.name) for part in parts]
-        if field.name in given or rule is None:
+        if rule == "given":
             found[field.name] = given[field.name]
-        elif rule.move is _alone:
+        elif rule == "alone":
             if any(value is not None for value in values):
                 raise ValueError(f"{type(first).__name__}.{field.name}: models of a batch have none")
             found[field.name] = None
         else:
-            found[field.name] = rule.join(values, starts)
+            found[field.name] = rule.merge([rule.move(value, k, starts) for k, value in enumerate(values)])
     return type(first)(**found)

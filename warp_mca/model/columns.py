@@ -24,9 +24,12 @@ def pass_count(model: Model) -> int:
 
 
 def added_columns(model: Model) -> dict[str, Added]:
-    """Columns of each actor that adds some, by its name; loads are those of each kind."""
-    kinds = {"absorbing": model.absorbing.ENERGIES} if len(model.absorbing.node) else {}
-    kinds |= {kind: LOADS[kind].energies for kind in model.loads}
+    """Columns of each actor that adds some, by its name: each kind of loads, then absorbing boundaries.
+
+    All scenes of a batch have the same kinds of loads; those without absorbing boundaries read fewer columns.
+    """
+    kinds = {kind: LOADS[kind].energies for kind in model.loads}
+    kinds |= {"absorbing": model.absorbing.ENERGIES} if len(model.absorbing.node) else {}
     found, first = {}, PASS + PASS_COLUMNS * pass_count(model)
     for name, energies in kinds.items():
         found[name] = Added(first, energies)

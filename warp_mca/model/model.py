@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, KINDS, PART, joinable, of, offsets_of
+from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
 from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
@@ -116,7 +116,7 @@ class Model:
     rigid_pins: tuple[RigidPin, ...] = field(default=(), metadata=ITEMS)
     rigid_blocks: tuple[Block, ...] = field(default=(), metadata=GIVEN)
     rates: Rates | None = field(default=None, metadata=ALONE)
-    loads: Mapping[str, tuple[LoadedNodes, ...]] = field(default_factory=dict, metadata=KINDS)
+    loads: Mapping[str, tuple[LoadedNodes, ...]] = field(default_factory=dict, metadata=ITEMS)
     floating: FloatingFrames | None = field(default=None, metadata=ALONE)
 
     def owner(self, element: int) -> tuple[str, int]:

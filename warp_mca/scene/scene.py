@@ -90,16 +90,8 @@ class Scene:
         validate.texts("Scene", name=self.name)
         for name, kind in _PARTS.items():
             validate.members("Scene", kind, **{name: getattr(self, name)})
-        validate.kind_of("Scene.joints", self.joints, (tuple, list), "give a tuple of joints")
-        for k, joint in enumerate(self.joints):
-            if type(joint) not in JOINTS.values():  # others are not registered
-                remedy = f"give a {' or a '.join(JOINTS)}; register other classes by warp_mca.register"
-                raise bad_value(f"Scene.joints[{k}]", validate.brief(joint), remedy)
-        validate.kind_of("Scene.loads", self.loads, (tuple, list), "give a tuple of loads")
-        for k, load in enumerate(self.loads):
-            if type(load) not in LOADS.values():
-                remedy = f"the kinds are {', '.join(LOADS) or 'none'}; register others by warp_mca.register"
-                raise bad_value(f"Scene.loads[{k}]", validate.brief(load), remedy)
+        self._check_kinds("joints", JOINTS)
+        self._check_kinds("loads", LOADS)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()
@@ -145,6 +137,18 @@ class Scene:
         for section in self.sections:
             if section.body in self.rigid_names:
                 raise bad_value(f"{section.title}.body", section.body, "it is rigid, without stress; cut another body")
+
+    def _check_kinds(self, name: str, table: Mapping[str, type]) -> None:
+        """Refuse what is not of a class in a table.
+
+        Raises:
+            RequestError: there is such an object.
+        """
+        validate.kind_of(f"Scene.{name}", getattr(self, name), (tuple, list), f"give a tuple of {name}")
+        for k, item in enumerate(getattr(self, name)):
+            if type(item) not in table.values():
+                remedy = f"give a {' or a '.join(table) or 'Load'}; register other classes by warp_mca.register"
+                raise bad_value(f"Scene.{name}[{k}]", validate.brief(item), remedy)
 
     def _check_t_end(self) -> None:
         """Refuse an end that no cycle of swings and impacts can reach.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from warp_mca.physics.absorbing.stage import AbsorbingStage
 from warp_mca.physics.actor import Actor
@@ -17,6 +17,7 @@ from warp_mca.physics.loads.stage import LoadStage
 from warp_mca.physics.rigid.stage import RigidStage
 from warp_mca.physics.ties.stage import TieStage
 from warp_mca.scene.loads import LOADS
+from warp_mca.step.node_stage import NodeStage
 from warp_mca.step.rated_nodes import node_stage
 from warp_mca.step.record_stage import RecordStage
 
@@ -43,3 +44,32 @@ def actors_of(model: Model) -> dict[str, Callable[[Solver], Actor]]:
     """All of ACTORS, and behind them the kinds of loads that a model has."""
     loads = {kind: partial(LOADS[kind].stage(), name=kind) for kind in model.loads}
     return ACTORS | loads
+
+
+class Made:
+    """Actors as attributes by their names, each made at its first use: whatever it reads of others is made before it.
+
+    Attributes:
+        kinds: what makes them, by name.
+    """
+
+    kinds: dict[str, Callable[[Solver], Actor]]
+    elements: Elements
+    contacts: Contacts
+    constraints: ConstraintStage
+    couplings: CouplingStage
+    loads: LoadStage
+    absorbing: AbsorbingStage
+    rigid: RigidStage
+    ties: TieStage
+    floating: FloatingStage
+    nodes: NodeStage
+    records: RecordStage
+
+    def __getattr__(self, name: str) -> Any:
+        """An actor, which stays."""
+        kinds = self.__dict__.get("kinds", {})
+        if name not in kinds:
+            raise AttributeError(name)
+        self.__dict__[name] = found = kinds[name](self)
+        return found

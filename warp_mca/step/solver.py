@@ -22,7 +22,7 @@ from warp_mca.model.model import Model
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.stage import has_sides
 from warp_mca.physics.elements.stage import gather_lists
-from warp_mca.step.actors import actors_of
+from warp_mca.step.actors import Made, actors_of
 from warp_mca.step.device import check_device
 from warp_mca.step.rate_chains import Chains
 from warp_mca.step.records import SceneRecords
@@ -37,23 +37,12 @@ from warp_mca.step.threads import Split, whole
 from warp_mca.step.workspace import Workspace
 
 if TYPE_CHECKING:
-    from warp_mca.physics.absorbing.stage import AbsorbingStage
-    from warp_mca.physics.contact.actor import Contacts
-    from warp_mca.physics.elements.actor import Elements
-    from warp_mca.physics.floating.stage import FloatingStage
-    from warp_mca.physics.joints.constraint_stage import ConstraintStage
-    from warp_mca.physics.joints.coupling_stage import CouplingStage
-    from warp_mca.physics.loads.stage import LoadStage
-    from warp_mca.physics.rigid.stage import RigidStage
-    from warp_mca.physics.ties.stage import TieStage
-    from warp_mca.step.node_stage import NodeStage
     from warp_mca.step.output import Output
-    from warp_mca.step.record_stage import RecordStage
 
 BESIDE = 5  # steps that follow a record in its graph at least: a GPU goes on with them while it sums the record
 
 
-class Solver:
+class Solver(Made):
     """Advances states of a model on one device; it owns nothing that changes from step to step.
 
     Attributes:
@@ -62,23 +51,11 @@ class Solver:
         dt: time step [s]; with `Model.rates` that of their substeps together.
         threads: that compute; one on a GPU, and for a model that is too small to gain from more.
         common_dt: time step of contacts and joints [s].
-        actors: all that acts, in the order of `step.actors.actors_of`; each is an attribute, too, by its name there.
+        actors: all that acts, in the order of `step.actors.actors_of`.
         output: what is read off the state for paths and recorders, or None.
         sensors: probes and sections.
         replay: graphs of what is launched.
     """
-
-    elements: Elements
-    contacts: Contacts
-    constraints: ConstraintStage
-    couplings: CouplingStage
-    loads: LoadStage
-    absorbing: AbsorbingStage
-    rigid: RigidStage
-    ties: TieStage
-    floating: FloatingStage
-    nodes: NodeStage
-    records: RecordStage
 
     def __init__(self, model: Model, *, device: str, precision: str, dt: float, threads: int = 1) -> None:
         """Allocate.
@@ -96,14 +73,6 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self._allocate()
         self.replay = Replay(self.device, self.threads)
-
-    def __getattr__(self, name: str) -> Any:
-        """An actor, made at its first use: whatever it reads of others is made before it."""
-        kinds = self.__dict__.get("kinds", {})
-        if name not in kinds:
-            raise AttributeError(name)
-        self.__dict__[name] = found = kinds[name](self)
-        return found
 
     @cached_property
     def work(self) -> Workspace:
