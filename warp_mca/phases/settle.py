@@ -130,7 +130,7 @@ class HalfSteps:
         kept, state = scene_run.ledger.kept, self.state
         at_rest = self.look()
         self._give(self.initial, False)
-        before = np.array(state.v.numpy())
+        before = np.array(state.v.numpy(), dtype=np.float64)
         given = self._kinetic(before, 2.0 * self.initial[0] - before, self.waiting[0])
         kept.initial_energy += given
         kept.initial_kinetic = at_rest + given
@@ -141,10 +141,10 @@ class HalfSteps:
     def _half_steps(self) -> tuple[list[Array], list[Array]]:
         """Velocities and momenta half a step before and after the present time."""
         self.trial.assign(self.state)
-        before = [np.array(array.numpy()) for array in self._arrays(self.state)]
+        before = [np.array(array.numpy(), dtype=np.float64) for array in self._arrays(self.state)]
         with wp.ScopedDevice(self.solver.device):
             self.solver.step(self.trial, 1)
-        return before, [np.array(array.numpy()) for array in self._arrays(self.trial)]
+        return before, [np.array(array.numpy(), dtype=np.float64) for array in self._arrays(self.trial)]
 
     def _give(self, wanted: list[Array], everything: bool) -> None:
         """Give velocities at the present time to bodies that wait, or to all, and book what the others lose."""
