@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pytest
 import warp as wp
-from impacts import begun, finished, result_of
+from impacts import finished, result_of
 from numpy.typing import NDArray
+from outside import goes_on
 
 import warp_mca as mca
 from warp_mca.base.joining import AS_IS, joinable
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.scene import model_file
 from warp_mca.scene.loads import Load
 
 if TYPE_CHECKING:
@@ -260,18 +260,7 @@ def test_a_spring_between_two_bodies_gives_no_momentum_and_no_spin():
 
 
 def test_a_model_file_and_a_checkpoint_go_on_to_the_same_bits(tmp_path: Path):
-    scene = swinging(1e-4)
-    impact = begun(scene)
-    model_file.save(tmp_path / "swinging.mca", scene, impact.ready[0].meshes)
-    stored = model_file.load(tmp_path / "swinging.mca")
-    assert stored.scene.loads == scene.loads
-    impact.advance(until=impact.steps.per_interval * 20)
-    impact.save(tmp_path / "middle.state")
-    impact.advance()
-    later = begun(stored.scene, meshes=stored.meshes)
-    later.load(tmp_path / "middle.state")
-    later.advance()
-    assert later.state.differences(impact.state) == []
+    goes_on(swinging(1e-4), tmp_path)
 
 
 def test_a_batch_gives_the_figures_of_the_scenes_alone():

@@ -11,12 +11,12 @@ import pytest
 import warp as wp
 from impacts import begun, finished, momentum, result_of
 from numpy.typing import NDArray
+from outside import goes_on
 
 import warp_mca as mca
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.scene import model_file
 from warp_mca.scene.loads import Load
 from warp_mca.step.stage import Step
 
@@ -238,18 +238,7 @@ def test_the_pressure_follows_the_surface():
 
 
 def test_a_model_file_and_a_checkpoint_go_on_to_the_same_bits(tmp_path: Path):
-    scene = pushed()
-    impact = begun(scene)
-    model_file.save(tmp_path / "pushed.mca", scene, impact.ready[0].meshes)
-    stored = model_file.load(tmp_path / "pushed.mca")
-    assert stored.scene.loads == scene.loads
-    impact.advance(until=impact.steps.per_interval * 20)
-    impact.save(tmp_path / "middle.state")
-    impact.advance()
-    later = begun(stored.scene, meshes=stored.meshes)
-    later.load(tmp_path / "middle.state")
-    later.advance()
-    assert later.state.differences(impact.state) == []
+    goes_on(pushed(), tmp_path)
 
 
 def test_several_rates_give_the_same_impulse():

@@ -76,11 +76,6 @@ class Loads:
         return np.unique(np.concatenate(tables)) if tables else np.zeros(0)
 
     @cached_property
-    def dissipates(self) -> bool:
-        """Whether any joint has friction."""
-        return bool(self.friction.any() or self.damping.any())
-
-    @cached_property
     def greatest_torque(self) -> float:
         """Sum over the joints of their greatest torque [N m], viscous damping aside."""
         driven = sum(float(np.abs(table.values).max()) for table in self.torques if table is not None)
