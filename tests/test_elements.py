@@ -38,9 +38,16 @@ def held_of(mesh: Mesh, element: str, kinematics: str, precision: str = "float64
     return Displaced(Solver(model, device="cpu", precision=precision, dt=1e-9))
 
 
+def settled(held: Displaced, u: np.ndarray) -> np.ndarray:
+    """The forces at u [N], when internal vectors of elements that keep them have come to rest."""
+    for _ in range(25):
+        force = held.forces(u)
+    return force
+
+
 def energy(held: Displaced, u: np.ndarray) -> float:
     """Elastic and hourglass energy [J]."""
-    held.forces(u)
+    settled(held, u)
     return float(held.energies()[[0, 4]].sum())
 
 
@@ -58,7 +65,7 @@ def test_forces_are_the_slope_of_the_energy(element: str, kinematics: str, cube:
     held = held_of(cube, element, kinematics)
     size = 0.2 if kinematics == "finite" else 1e-3
     u = cube.points @ rng.uniform(-size, size, (3, 3)) + size * 0.3 * rng.uniform(-1, 1, cube.points.shape)
-    force = held.forces(u)
+    force = settled(held, u)
     for _ in range(3):
         way = rng.normal(size=u.shape)
         h = 1e-6 * size
@@ -79,8 +86,8 @@ def test_rotation_leaves_no_force_and_turns_those_there_are(element, kinematics,
     assert np.abs(held.forces(rigid)).max() < tolerance * STEEL.E
     rng = np.random.default_rng(1)
     u = 0.05 * rng.uniform(-1, 1, cube.points.shape)
-    force = held.forces(u)
-    turned = held.forces((cube.points + u) @ turn.T - cube.points)
+    force = settled(held, u)
+    turned = settled(held, (cube.points + u) @ turn.T - cube.points)
     assert turned == pytest.approx(force @ turn.T, abs=30 * tolerance * np.abs(force).max() + tolerance * STEEL.E)
 
 

@@ -40,6 +40,7 @@ class Formulation:
         slope: (struct, g, a) -> volume times gradient of the shape function of node a at point g [m^2]; for
             `force_kernel` only.
         place: g -> number of point g in the history.
+        enriched: (struct, e, m, flag, law, history) -> struct with what the history adds; None if nothing does.
         modes: (struct, K, G, flag, history, e) -> (stored, dissipated) energy of what deforms without strain at the
             points [J]; None where nothing does.
     """
@@ -56,6 +57,7 @@ class Formulation:
     corner_of: Any
     slope: Any = None
     place: Any = None
+    enriched: Any = None
     modes: Any = None
 
 
@@ -65,6 +67,31 @@ Maker = Callable[[str, str, bool], Formulation]  # of a precision, a law, and wh
 @wp.func
 def same_place(g: int):
     return g
+
+
+@cache
+def load_function(maker: Maker, precision: str, law_name: str, finite: bool) -> Any:
+    """The function (X, u, conn, e, m, flag, law, history) -> struct of a formulation, with what the history adds."""
+    form, R = maker(precision, law_name, finite), scalars(precision).real
+    load_shape, enriched, adds = form.load, form.enriched or form.load, form.enriched is not None
+
+    @wp.func
+    def load(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        e: int,
+        m: int,
+        flag: int,
+        law: wp.array2d(dtype=R),
+        history: wp.array2d(dtype=R),
+    ):
+        shape = load_shape(X, u, conn, e)
+        if wp.static(adds):
+            shape = enriched(shape, e, m, flag, law, history)
+        return shape
+
+    return load
 
 
 def parts_of(maker: Maker, precision: str, law_name: str, finite: bool) -> tuple[Formulation, Any, Any]:

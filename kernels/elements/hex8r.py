@@ -12,38 +12,44 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.formulation import OWN, Formulation
-from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
-from warp_mca.kernels.elements.hourglass import AMPLITUDE_ROWS, KEPT, amplitude_functions, hourglass_functions
-from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_frame, mean_functions, pattern_functions
+from warp_mca.kernels.elements.hourglass import AMPLITUDE_ROWS, KEPT, amplitude_functions, hourglass_function
+from warp_mca.kernels.elements.patterns import (
+    VOLUME_SCALE,
+    amplitude_function,
+    corner_force_function,
+    mean_frame,
+    mean_functions,
+    pattern_functions,
+    pattern_strain_function,
+)
 from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
-from warp_mca.kernels.materials.laws import law_functions
+from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.materials.point import material_point
 from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-__all__ = ["KEPT", "element_functions", "energy_kernel", "force_kernel", "stress_kernel"]
+__all__ = ["energy_kernel", "force_kernel", "kept", "stress_function", "stress_kernel"]
+
+
+def kept(law: Law, finite: bool) -> tuple[str, ...]:
+    """What an element keeps behind the history of its point."""
+    return KEPT if law.history or law.general else ()
 
 
 @cache
-def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, Any, Any]:
-    """Functions (shape and strain of an element; its stress and hourglass forces, with plastic flow; corner forces).
-
-    The first also gives the volume ratio J, the second keeps the greatest strain.
+def stress_function(precision: str, law_name: str, finite: bool) -> Any:
+    """The function that gives stress and hourglass forces of an element, with plastic flow; it keeps the strain.
 
     A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
     """
     t = scalars(precision)
-    R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
-    add_product, add_matrices = fused(precision).add_product, fused(precision).add_matrices
-    _, to_corners = pattern_functions(precision)
-    rotated = mean_frame(precision, finite)
-    mean_gradients, mean_gradient_of = mean_functions(precision)
-    amplitudes, hourglass = hourglass_functions(precision)
+    R, mat33, mat43, mat73 = t.real, t.mat33, t.mat43, t.mat73
+    hourglass = hourglass_function(precision)
     point = material_point(precision, law_name, finite, points=1)
     plastic, general, update = bool(law_name), point.general, point.update
     read_amplitudes, write_amplitudes = amplitude_functions(precision, point.size)
@@ -51,14 +57,6 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
     keep_strain, _, _ = keep_functions(R)
     k = kinematics(precision, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
-
-    @wp.func
-    def shape_and_strain(x: mat73, du: mat73):
-        b, scaled_volume = mean_gradients(x)
-        H_world = mean_gradient_of(du, b, scaled_volume)
-        W, H = rotated(H_world)
-        J = wp.determinant(wp.identity(n=3, dtype=R) + H_world)
-        return b, R(VOLUME_SCALE) * scaled_volume, W, H, J, amplitudes(x, du, H_world, W)
 
     @wp.func
     def stress_and_flow(
@@ -108,22 +106,7 @@ def element_functions(precision: str, law_name: str, finite: bool) -> tuple[Any,
             Q = kept * Q
         return P, Q
 
-    @wp.func
-    def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
-        share = R(-1.0) / volume
-        for n in range(4):  # amplitudes depend on the mean gradient, too
-            P = P + wp.outer(Q[n], share * x[3 + n])
-        P = -R(VOLUME_SCALE) * add_matrices(P, W, P)
-        f = mat73()
-        for n in range(3):
-            f[n] = P * b[n]
-        for n in range(4):
-            f[3 + n] = -add_product(Q[n], W, Q[n])
-        for n in range(3):
-            f[3 + n] = add_product(f[3 + n], P, b[3 + n])
-        return to_corners(f)
-
-    return shape_and_strain, stress_and_flow, corner_forces
+    return stress_and_flow
 
 
 @cache
@@ -133,7 +116,8 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     R, vec3 = t.real, t.vec3
     load_element = load_function(precision)
     to_patterns, _ = pattern_functions(precision)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, finite)
+    shape_and_strain, corner_forces = pattern_strain_function(precision, finite), corner_force_function(precision)
+    stress_and_flow = stress_function(precision, law_name, finite)
     store_force = store_function(precision)
     _, keep_volume, _ = keep_functions(R)
 
@@ -175,7 +159,7 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
     rotated = mean_frame(precision, finite)
     load_element = load_function(precision)
     mean_gradients, mean_gradient_of = mean_functions(precision)
-    amplitudes, hourglass = hourglass_functions(precision)
+    amplitudes, hourglass = amplitude_function(precision), hourglass_function(precision)
     first = law_functions(law_name, precision).size
     read_amplitudes, _ = amplitude_functions(precision, first)
     plastic, lost = bool(law_name), first + AMPLITUDE_ROWS

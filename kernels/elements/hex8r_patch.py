@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.hex8r import element_functions
+from warp_mca.kernels.elements.hex8r import stress_function
 from warp_mca.kernels.elements.patch import (
     POINT,
     RESIDENT,
@@ -19,7 +19,7 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import load_functions, load_pattern_function, material_of, sum_functions
 from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
-from warp_mca.kernels.elements.patterns import pattern_functions
+from warp_mca.kernels.elements.patterns import corner_force_function, pattern_functions, pattern_strain_function
 from warp_mca.kernels.hardware.early_launch import begins_early
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
@@ -50,7 +50,8 @@ def force_kernel(precision: str, law_name: str) -> Any:
     clear_nowhere, keep_forces, sum_patch, _ = sum_functions(precision)
     to_patterns, _ = pattern_functions(precision)
     _, keep_volume, _ = keep_functions(R)
-    shape_and_strain, stress_and_flow, corner_forces = element_functions(precision, law_name, False)
+    shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
+    stress_and_flow = stress_function(precision, law_name, False)
 
     @wp.kernel(
         enable_backward=False,

@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.fused import NOTHING, fused
+from warp_mca.kernels.elements.fused import NOTHING
 from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
@@ -20,23 +20,10 @@ AMPLITUDE_ROWS = 12
 
 
 @cache
-def hourglass_functions(precision: str) -> tuple[Any, Any]:
-    """Functions (hourglass amplitudes; generalised forces and energy)."""
+def hourglass_function(precision: str) -> Any:
+    """The function of amplitudes, see `patterns.amplitude_function`, that gives generalised forces and energy."""
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
-    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
-
-    @wp.func
-    def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
-        """Sums over the patterns less the part of the mean displacement gradient H, one row for each, in frame W.
-
-        Eight times the amplitudes of docs/theory.md; forces are conjugate to these.
-        """
-        q = mat43()
-        for m in range(4):
-            left = add_product(u[3 + m], H, -x[3 + m])
-            q[m] = add_transposed(left, W, left)
-        return q
 
     @wp.func
     def hourglass(q: mat43, x: mat73, volume: R, K: R, G: R):
@@ -80,7 +67,7 @@ def hourglass_functions(precision: str) -> tuple[Any, Any]:
             F[k] = F[k] + along[k] * y[k]
         return F, energy
 
-    return amplitudes, hourglass
+    return hourglass
 
 
 @cache

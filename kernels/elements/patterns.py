@@ -145,3 +145,77 @@ def mean_frame(precision: str, finite: bool = False) -> Any:
         return W, add_matrices(H, wp.transpose(W), F)  # Q^T F - I, without cancellation
 
     return rotated
+
+
+@cache
+def amplitude_function(precision: str) -> Any:
+    """The function (x, u, H, W) -> hourglass amplitudes: sums over the last four patterns less the part of H, in W.
+
+    Eight times the amplitudes of docs/theory.md, one row for each pattern; forces are conjugate to these. x and u are
+    patterns of positions and displacements, H the mean displacement gradient.
+    """
+    t = scalars(precision)
+    mat33, mat43, mat73 = t.mat33, t.mat43, t.mat73
+    add_product, add_transposed = fused(precision).add_product, fused(precision).add_transposed
+
+    @wp.func
+    def amplitudes(x: mat73, u: mat73, H: mat33, W: mat33):
+        q = mat43()
+        for m in range(4):
+            left = add_product(u[3 + m], H, -x[3 + m])
+            q[m] = add_transposed(left, W, left)
+        return q
+
+    return amplitudes
+
+
+@cache
+def pattern_strain_function(precision: str, finite: bool) -> Any:
+    """The function of patterns of positions and displacements -> what forces and strains of an element need.
+
+    (Mean gradients times volume; volume [m^3]; rotation W = Q - I; mean displacement gradient H in the rotated frame;
+    volume ratio J; hourglass amplitudes in that frame [m].)
+    """
+    t = scalars(precision)
+    R, mat73 = t.real, t.mat73
+    rotated, amplitudes = mean_frame(precision, finite), amplitude_function(precision)
+    mean_gradients, mean_gradient_of = mean_functions(precision)
+
+    @wp.func
+    def shape_and_strain(x: mat73, du: mat73):
+        b, scaled_volume = mean_gradients(x)
+        H_world = mean_gradient_of(du, b, scaled_volume)
+        W, H = rotated(H_world)
+        J = wp.determinant(wp.identity(n=3, dtype=R) + H_world)
+        return b, R(VOLUME_SCALE) * scaled_volume, W, H, J, amplitudes(x, du, H_world, W)
+
+    return shape_and_strain
+
+
+@cache
+def corner_force_function(precision: str) -> Any:
+    """The function (x, b, volume, W, P, Q) -> forces on the corners [N], out of frame W.
+
+    P is the mean stress [Pa], Q the forces conjugate to the hourglass amplitudes [N], one row for each pattern.
+    """
+    t = scalars(precision)
+    R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
+    add_product, add_matrices = fused(precision).add_product, fused(precision).add_matrices
+    _, to_corners = pattern_functions(precision)
+
+    @wp.func
+    def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
+        share = R(-1.0) / volume
+        for n in range(4):  # amplitudes depend on the mean gradient, too
+            P = P + wp.outer(Q[n], share * x[3 + n])
+        P = -R(VOLUME_SCALE) * add_matrices(P, W, P)
+        f = mat73()
+        for n in range(3):
+            f[n] = P * b[n]
+        for n in range(4):
+            f[3 + n] = -add_product(Q[n], W, Q[n])
+        for n in range(3):
+            f[3 + n] = add_product(f[3 + n], P, b[3 + n])
+        return to_corners(f)
+
+    return corner_forces

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, parts_of
+from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS
@@ -56,7 +56,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
     """
     form, point, place = parts_of(maker, precision, law_name, finite)
-    load_shape, gradient, rotation, modes, points = form.load, form.gradient, form.rotation, form.modes, form.points
+    load = load_function(maker, precision, law_name, finite)
+    gradient, rotation, modes, points = form.gradient, form.rotation, form.modes, form.points
     shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
     plastic, general, has_modes, read = bool(law_name), point.general, form.modes is not None, point.read
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
@@ -80,13 +81,13 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         energy_out: wp.array2d(dtype=R),
     ):
         e = wp.tid()
-        shape = load_shape(X, u, conn, e)
         m = material[e]
         K = law[m, 0]
         G = law[m, 1]
         flag = int(0)
         if wp.static(plastic):
             flag = yielded[e]
+        shape = load(X, u, conn, e, m, flag, law, history)
         identity = wp.identity(n=3, dtype=R)
         theta = R(0.0)
         elastic = R(0.0)
@@ -136,7 +137,8 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     A point's values go to the slots of the corners that show them: rows xx, yy, zz, xy, yz, xz, p.
     """
     form, point, place = parts_of(maker, precision, law_name, finite)
-    load_shape, gradient, rotation, corner_of = form.load, form.gradient, form.rotation, form.corner_of
+    load = load_function(maker, precision, law_name, finite)
+    gradient, rotation, corner_of = form.gradient, form.rotation, form.corner_of
     points, corners, shown = form.points, form.corners, form.shown
     shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
     plastic, general, read = bool(law_name), point.general, point.read
@@ -160,12 +162,12 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     ):
         item = wp.tid()
         e = element[item]
-        shape = load_shape(X, u, conn, e)
         m = material[e]
         K = law[m, 0]
         flag = int(0)
         if wp.static(plastic):
             flag = yielded[e]
+        shape = load(X, u, conn, e, m, flag, law, history)
         Q = wp.identity(n=3, dtype=R) + rotation(shape)
         theta, mean_pressure, _energy = shared(shape, e, K, group, dilatation)
         for g in range(wp.static(points)):

@@ -6,31 +6,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.base.chunks import chunks
-from warp_mca.geometry.hexahedron import CORNERS, gradients
-from warp_mca.physics.elements.element import Array, largest
-from warp_mca.physics.elements.hexahedron import lumped_masses
+from warp_mca.physics.elements.element import Array
+from warp_mca.physics.elements.hexahedron import (
+    congruent,
+    lumped_masses,
+    mean_and_modes_bounds,
+    mean_parts,
+    mean_stiffness,
+)
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Block
     from warp_mca.physics.elements.stage import ElementStage
 
-# Signs of the patterns eta zeta, zeta xi, xi eta, xi eta zeta at the corners, shape (4, 8).
-_PATTERNS = np.array(
-    [CORNERS[:, 1] * CORNERS[:, 2], CORNERS[:, 2] * CORNERS[:, 0], CORNERS[:, 0] * CORNERS[:, 1], CORNERS.prod(axis=1)]
-)
 
-
-def _parts(x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Mean gradients b (n, 8, 3), volumes, hourglass vectors (n, 4, 8), edge directions (n, 3, 3), half lengths."""
-    point, weight = gradients(x)
-    volume = weight.sum(axis=1)
-    b = np.einsum("eg,egai->eai", weight, point, optimize=True) / volume[:, None, None]
-    sums = np.einsum("ma,eai->emi", _PATTERNS, x)
-    gamma = 0.125 * (_PATTERNS - np.einsum("emi,eai->ema", sums, b, optimize=True))
-    mean = np.einsum("ak,eai->eki", CORNERS, x) / 8.0
-    length = np.linalg.norm(mean, axis=2)
-    return b, volume, gamma, mean / length[..., None], length
+def _lengths(tangents: Array) -> tuple[Array, Array]:
+    """Directions of the mean edges (n, 3, 3) and half their lengths [m] (n, 3)."""
+    length = np.linalg.norm(tangents, axis=2)
+    return tangents / length[..., None], length
 
 
 def _hourglass_stiffness(volume: Array, a: Array, K: Array, G: Array) -> Array:
@@ -60,20 +53,12 @@ def stiffness(x: Array, K: Array, G: Array, scale: Array | None = None) -> Array
         x: corners [m], shape (element_count, 8, 3). K, G: moduli [Pa], shape (element_count,).
         scale: factors on the displacements of the corners [-], shape (element_count, 8).
     """
-    n = len(x)
-    b, volume, gamma, directions, a = _parts(x)
+    b, volume, gamma, tangents = mean_parts(x)
+    directions, a = _lengths(tangents)
     if scale is not None:
         b, gamma = b * scale[..., None], gamma * scale[:, None, :]
-    same = np.einsum("eai,ebi->eab", b, b)
-    cross = np.einsum("eai,ebj->eaibj", b, b)
-    matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
-    found = (volume * G)[:, None, None] * matrix.reshape(n, 24, 24)
-    flat = b.reshape(n, 24)
-    found += (K * volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
-    amplitude = np.einsum("ema,eki->emkai", gamma, directions, optimize=True).reshape(n, 12, 24)
-    D = _hourglass_stiffness(volume, a, K, G)
-    found += np.einsum("epx,epq,eqy->exy", amplitude, D, amplitude, optimize=True)
-    return found
+    amplitude = np.einsum("ema,eki->emkai", gamma, directions, optimize=True).reshape(len(x), 12, 24)
+    return mean_stiffness(b, volume, K, G) + congruent(amplitude, _hourglass_stiffness(volume, a, K, G))
 
 
 class Hex8r:
@@ -86,17 +71,11 @@ class Hex8r:
 
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
         """Sum of bounds of the mean strain's part, as for hex8 with 3 x 3 problems, and of the hourglass part."""
-        bound = np.empty(len(x))
-        for part in chunks(len(x), 20000):
-            b, volume, gamma, _, a = _parts(x[part])
-            root = 1.0 / np.sqrt(mass[part])
-            b, gamma = b * root[..., None], gamma * root[:, None, :]
-            tensor = np.einsum("eai,eaj->eij", b, b, optimize=True)
-            modes = np.einsum("ema,ena->emn", gamma, gamma, optimize=True)
-            mean = K[part] * np.trace(tensor, axis1=1, axis2=2) + 2.0 * G[part] * largest(tensor, coarse)
-            stiff = largest(_hourglass_stiffness(volume, a, K[part], G[part]), coarse)
-            bound[part] = volume * mean + stiff * largest(modes, coarse)
-        return bound
+
+        def modes(volume: Array, tangents: Array, K: Array, G: Array) -> Array:
+            return _hourglass_stiffness(volume, _lengths(tangents)[1], K, G)
+
+        return mean_and_modes_bounds(modes, x, K, G, mass, coarse)
 
     def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
         """Of the 24 x 24 problem."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.geometry.hexahedron import (
+    CORNERS,
     GRID,
     SLOPE,
     by_element,
@@ -15,12 +18,17 @@ from warp_mca.geometry.hexahedron import (
     interpolated,
     tangents,
 )
-from warp_mca.physics.elements.element import Array
+from warp_mca.physics.elements.element import Array, largest
 
 # A Laplacian's entries are sums of those of the metric cofactor_k . cofactor_j / det at the points, times slopes.
 _ROW, _COLUMN = np.triu_indices(8)
 _TWICE = np.where(_ROW == _COLUMN, 1.0, 2.0)  # how often an entry stands in the matrix
 _PAIRS = [(k, j) for k in range(3) for j in range(k, 3)]
+
+# Signs of the patterns eta zeta, zeta xi, xi eta, xi eta zeta at the corners, shape (4, 8).
+PATTERNS = np.array(
+    [CORNERS[:, 1] * CORNERS[:, 2], CORNERS[:, 2] * CORNERS[:, 0], CORNERS[:, 0] * CORNERS[:, 1], CORNERS.prod(axis=1)]
+)
 
 
 def _metric_slopes() -> Array:
@@ -113,3 +121,62 @@ def largest_eigenvalues(x: Array, K: Array, G: Array, mass: Array) -> Array:
     stiffness = G[:, None, None] * matrix.reshape(n, 24, 24)
     stiffness += (K / volume)[:, None, None] * mean[:, :, None] * mean[:, None, :]
     return np.linalg.eigvalsh(stiffness)[:, -1].astype(np.float64)
+
+
+def mean_parts(x: Array) -> tuple[Array, Array, Array, Array]:
+    """What elements of mean gradients and hourglass modes share, of corners x [m], shape (n, 8, 3), float64.
+
+    Returns:
+        (Mean gradients of the shape functions [1/m], shape (n, 8, 3); volumes [m^3]; hourglass vectors, which turn
+        displacements into amplitudes [-], shape (n, 4, 8); tangents along the natural coordinates at the centroid [m],
+        shape (n, 3, 3).)
+    """
+    point, weight = gradients(x)
+    volume = weight.sum(axis=1)
+    b = np.einsum("eg,egai->eai", weight, point, optimize=True) / volume[:, None, None]
+    sums = np.einsum("ma,eai->emi", PATTERNS, x)
+    gamma = 0.125 * (PATTERNS - np.einsum("emi,eai->ema", sums, b, optimize=True))
+    return b, volume, gamma, np.einsum("ak,eai->eki", CORNERS, x) / 8.0
+
+
+def mean_stiffness(b: Array, volume: Array, K: Array, G: Array) -> Array:
+    """Stiffness of the mean strain [N/m], shape (n, 24, 24); arguments as `mean_parts` gives them."""
+    n = len(b)
+    same = np.einsum("eai,ebi->eab", b, b)
+    cross = np.einsum("eai,ebj->eaibj", b, b)
+    matrix = np.einsum("eab,ij->eaibj", same, np.eye(3)) + cross.transpose(0, 1, 4, 3, 2) - (2.0 / 3.0) * cross
+    flat = b.reshape(n, 24)
+    found = (volume * G)[:, None, None] * matrix.reshape(n, 24, 24)
+    return found + (K * volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+
+
+def congruent(B: Array, D: Array) -> Array:
+    """B^T D B of each element: shapes (n, p, 24), (n, p, p) -> (n, 24, 24)."""
+    return np.einsum("epx,epq,eqy->exy", B, D, B, optimize=True)
+
+
+def mean_and_modes_bounds(
+    modes_stiffness: Callable[[Array, Array, Array, Array], Array],
+    x: Array,
+    K: Array,
+    G: Array,
+    mass: Array,
+    coarse: bool,
+) -> Array:
+    """Bounds omega^2 [1/s^2] of elements of mean gradients and hourglass modes: those of both parts, added.
+
+    Args:
+        modes_stiffness: (volume, tangents, K, G) -> matrices of the amplitudes [N/m], shape (n, 12, 12).
+        x, K, G, mass, coarse: as `eigenvalue_bounds`.
+    """
+    bound = np.empty(len(x))
+    for part in chunks(len(x), 20000):
+        b, volume, gamma, tangents = mean_parts(x[part])
+        root = 1.0 / np.sqrt(mass[part])
+        b, gamma = b * root[..., None], gamma * root[:, None, :]
+        tensor = np.einsum("eai,eaj->eij", b, b, optimize=True)
+        modes = np.einsum("ema,ena->emn", gamma, gamma, optimize=True)
+        mean = K[part] * np.trace(tensor, axis1=1, axis2=2) + 2.0 * G[part] * largest(tensor, coarse)
+        stiff = largest(modes_stiffness(volume, tangents, K[part], G[part]), coarse)
+        bound[part] = volume * mean + stiff * largest(modes, coarse)
+    return bound

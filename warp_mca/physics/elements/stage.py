@@ -69,8 +69,8 @@ class ElementStage:
         Args:
             block: the elements.
             precision: as in `warp_mca.run`.
-            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says in KEPT what follows the
-                history of the points, if anything does.
+            kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says by `kept(law, finite)`
+                what follows the history of the points, if anything does.
             points: integration points that keep a history.
         """
         self.block, self.corners, self.index = block, block.conn.shape[0], 0
@@ -81,7 +81,8 @@ class ElementStage:
         self.slot_level: Index = np.tile(levels_of(block.level_ends), self.corners)
         self.slot, self.dt, self.points = 0, 0.0, points
         self.law = law_functions(block.law, precision)
-        self.kept: tuple[str, ...] = points * self.law.history + getattr(kernels, "KEPT", ())
+        more = kernels.kept(self.law, block.finite) if hasattr(kernels, "kept") else ()
+        self.kept: tuple[str, ...] = points * self.law.history + more
         self.real = scalars(precision).real
         self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
         kind = (precision, block.law, block.finite)
@@ -102,11 +103,10 @@ class ElementStage:
         return []
 
     def new_state(self) -> ElementState:
-        """State of elements that have never flowed, on the current device; an elastic block keeps no history."""
-        kept = self.count if self.block.plastic else 0
+        """State of elements that have never flowed, on the current device."""
         return ElementState(
-            yielded=wp.zeros(kept, dtype=wp.int32),
-            history=wp.zeros((row_count(self.kept), kept), dtype=self.real),
+            yielded=wp.zeros(self.count if self.block.plastic else 0, dtype=wp.int32),
+            history=wp.zeros((row_count(self.kept), self.count if self.kept else 0), dtype=self.real),
             extreme=wp.zeros((2, self.count), dtype=self.real),
         )
 
@@ -129,9 +129,8 @@ class ElementStage:
 
     def _history(self, own: ElementState, part: slice) -> list[Any]:
         """Yield flags and history of a range of elements."""
-        if not self.block.plastic:
-            return [own.yielded, own.history]
-        return [own.yielded[part], own.history[:, part] if self.kept else own.history]
+        yielded = own.yielded[part] if self.block.plastic else own.yielded
+        return [yielded, own.history[:, part] if self.kept else own.history]
 
     def make_room(self, blocks: int) -> None:
         """Called where contact is computed beside the elements: leave room on the device for its blocks of threads."""

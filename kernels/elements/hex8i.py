@@ -1,0 +1,188 @@
+"""Owns the hexahedron of 2 x 2 x 2 points that bends right with one element across: `internal_modes` says how.
+
+Strain is measured in the rotated frame of the mean deformation, from reference coordinates, as in `hex8`.
+"""
+
+from functools import cache, partial
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements import hex8i_points
+from warp_mca.kernels.elements.formulation import OWN, Formulation
+from warp_mca.kernels.elements.hex8i_small import internal_function, plastic_tractions_function, stress_function
+from warp_mca.kernels.elements.hexahedron import load_function, store_function
+from warp_mca.kernels.elements.internal_modes import mode_functions
+from warp_mca.kernels.elements.patterns import corner_force_function, pattern_functions, pattern_strain_function
+from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.laws import Law, law_functions
+from warp_mca.kernels.records.extremes import keep_functions
+
+wp.set_module_options({"enable_backward": False})
+
+
+def keeps_vectors(law: Law, finite: bool) -> bool:
+    """Whether the internal vectors are part of the history: where they have no closed form."""
+    return finite or law.general
+
+
+@cache
+def force_kernel(points: int, precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes [N], and the history."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    load_element, store_force = load_function(precision), store_function(precision)
+    to_patterns, _ = pattern_functions(precision)
+    shape_and_strain, corner_forces = pattern_strain_function(precision, finite), corner_force_function(precision)
+    frame = mode_functions(precision).frame
+    keep_strain, keep_volume, strain_square = keep_functions(R)
+    by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
+    of_points = hex8i_points.stress_function(precision, law_name, finite, points)
+    small_stress = stress_function(precision, law_name, points)
+
+    # fast math would lose the digits of ln(1 + x) of small x
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
+    def hex8i_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        count: int,
+        dt: R,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        e = wp.tid()
+        x = to_patterns(load_element(X, conn, e))
+        du = to_patterns(load_element(u, conn, e))
+        b, volume, W, H, J, q = shape_and_strain(x, du)
+        y = frame(x)
+        m = material[e]
+        if wp.static(by_points):
+            P, Q, largest = of_points(x, volume, H, q, y, e, m, law, dt, yielded_out, history_out)
+            keep_strain(e, largest, extreme_out)
+        else:
+            if wp.static(plastic):
+                P, Q, largest = small_stress(
+                    x, volume, H, q, y, law[m, 0], law[m, 1], e, m, law, yielded_out, history_out
+                )
+            else:
+                P, Q, largest = small_stress(x, volume, H, q, y, law[m, 0], law[m, 1])
+            keep_strain(e, strain_square(largest, law[m, 1]), extreme_out)
+        keep_volume(e, R(1.0) - J, extreme_out)
+        f = corner_forces(x, b, volume, W, P, Q)
+        for a in range(8):
+            store_force(force_out, slot + a * count + e, f, a)
+
+    return hex8i_force
+
+
+@cache
+def formulation(points: int, precision: str, law_name: str, finite: bool) -> Formulation:
+    """Its points, of which the outermost show their stress at the corners that lie nearest."""
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    to_patterns, _ = pattern_functions(precision)
+    load_element, shape_and_strain = load_function(precision), pattern_strain_function(precision, finite)
+    modes, place = mode_functions(precision), hex8i_points.place_function(precision, points)
+    frame, gradients, normals = modes.frame, modes.gradients, modes.normals
+    gradient_at = hex8i_points.gradient_function(precision)
+    by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
+    read_vectors, _, vector_of = hex8i_points.vector_functions(precision, law_name, points)
+    plastic_tractions = plastic_tractions_function(precision, law_name, points)
+    internal_vector, doubled_gradient = internal_function(precision), modes.doubled_gradient
+    count = points // 4
+
+    @wp.struct
+    class Hex8i:
+        """Volume [m^3], W = Q - I, mean gradient H and natural frame y, linear parts G of the gradient, amounts z."""
+
+        volume: R
+        W: mat33
+        H: mat33
+        y: mat33
+        G0: mat33
+        G1: mat33
+        G2: mat33
+        z: vec3
+
+    @wp.func
+    def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+        x = to_patterns(load_element(X, conn, e))
+        _b, volume, W, H, _J, q = shape_and_strain(x, to_patterns(load_element(u, conn, e)))
+        shape = Hex8i()
+        shape.volume = volume
+        shape.W = W
+        shape.H = H
+        y = frame(x)
+        shape.y = y
+        G0, G1, G2 = gradients(q, y)
+        shape.G0 = G0
+        shape.G1 = G1
+        shape.G2 = G2
+        shape.z = normals(q, x)
+        return shape
+
+    @wp.func
+    def enriched(shape: Hex8i, e: int, m: int, flag: int, law: wp.array2d(dtype=R), history: wp.array2d(dtype=R)):
+        y = shape.y
+        K = law[m, 0]
+        G = law[m, 1]
+        if wp.static(by_points):
+            F = wp.identity(n=3, dtype=R)
+            if wp.static(finite):
+                F = F + shape.H
+            inverse = wp.inverse(F)
+            c, share = read_vectors(history, e)
+            a0 = vector_of(shape.G0, inverse, F, y[0], c[0], share, K, G)
+            a1 = vector_of(shape.G1, inverse, F, y[1], c[1], share, K, G)
+            a2 = vector_of(shape.G2, inverse, F, y[2], c[2], share, K, G)
+        else:
+            n0 = vec3()
+            n1 = vec3()
+            n2 = vec3()
+            if wp.static(plastic):
+                if flag != 0:
+                    n0, n1, n2 = plastic_tractions(y, e, history)
+            a0 = internal_vector(doubled_gradient(shape.G0), y[0], n0, K, G)
+            a1 = internal_vector(doubled_gradient(shape.G1), y[1], n1, K, G)
+            a2 = internal_vector(doubled_gradient(shape.G2), y[2], n2, K, G)
+        shape.G0 = shape.G0 + wp.outer(y[0], a0)
+        shape.G1 = shape.G1 + wp.outer(y[1], a1)
+        shape.G2 = shape.G2 + wp.outer(y[2], a2)
+        return shape
+
+    @wp.func
+    def gradient(shape: Hex8i, g: int):
+        xi, weight = place(g)
+        H = gradient_at(shape.H, shape.G0, shape.G1, shape.G2, shape.y, shape.z, xi)
+        return weight * shape.volume, H
+
+    @wp.func
+    def rotation(shape: Hex8i):
+        return shape.W
+
+    @wp.func
+    def corner_of(g: int, j: int):
+        """Outer points come last in each half of a column, so that they are the ones shown."""
+        column = g // wp.static(count)
+        return (column ^ (column >> 1)) + 4 * ((g % wp.static(count)) // wp.static(count // 2))
+
+    return Formulation("hex8i", 8, points, OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of, enriched=enriched)
+
+
+def kernels(points: int) -> SimpleNamespace:
+    """What `ElementStage` asks of a module of kernels, for elements of so many points."""
+    maker = partial(formulation, points)
+    return SimpleNamespace(
+        force_kernel=partial(force_kernel, points),
+        energy_kernel=partial(energy_kernel, maker),
+        stress_kernel=partial(stress_kernel, maker),
+        kept=lambda law, finite: hex8i_points.KEPT if keeps_vectors(law, finite) else (),
+    )
