@@ -11,9 +11,9 @@ import warp as wp
 
 from warp_mca.kernels.elements import hex8i_points
 from warp_mca.kernels.elements.formulation import OWN, Formulation
-from warp_mca.kernels.elements.hex8i_small import internal_function, plastic_tractions_function, stress_function
+from warp_mca.kernels.elements.hex8i_small import plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
-from warp_mca.kernels.elements.internal_modes import mode_functions
+from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
 from warp_mca.kernels.elements.patterns import corner_force_function, pattern_functions, pattern_strain_function
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.hardware.scalars import scalars
@@ -87,82 +87,73 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
 def formulation(points: int, precision: str, law_name: str, finite: bool) -> Formulation:
     """Its points, of which the outermost show their stress at the corners that lie nearest."""
     t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    R, mat33, mat43, mat73 = t.real, t.mat33, t.mat43, t.mat73
     to_patterns, _ = pattern_functions(precision)
     load_element, shape_and_strain = load_function(precision), pattern_strain_function(precision, finite)
-    modes, place = mode_functions(precision), hex8i_points.place_function(precision, points)
-    frame, gradients, normals = modes.frame, modes.gradients, modes.normals
-    gradient_at = hex8i_points.gradient_function(precision)
+    modes, varying = mode_functions(precision), hex8i_points.varying_function(precision, finite)
+    frame, solve = modes.frame, modes.solve
+    column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
     by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
-    read_vectors, _, vector_of = hex8i_points.vector_functions(precision, law_name, points)
+    read_vectors, _ = hex8i_points.vector_functions(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
-    internal_vector, doubled_gradient = internal_function(precision), modes.doubled_gradient
-    count = points // 4
 
     @wp.struct
     class Hex8i:
-        """Volume [m^3], W = Q - I, mean gradient H and natural frame y, linear parts G of the gradient, amounts z."""
+        """Patterns x, amplitudes q, volume [m^3], W = Q - I, mean gradient H, and parts L, N that vary."""
 
+        x: mat73
+        q: mat43
         volume: R
         W: mat33
         H: mat33
-        y: mat33
-        G0: mat33
-        G1: mat33
-        G2: mat33
-        z: vec3
+        L0: mat33
+        L1: mat33
+        L2: mat33
+        N0: mat33
+        N1: mat33
+        N2: mat33
 
     @wp.func
     def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
+        shape = Hex8i()
         x = to_patterns(load_element(X, conn, e))
         _b, volume, W, H, _J, q = shape_and_strain(x, to_patterns(load_element(u, conn, e)))
-        shape = Hex8i()
+        shape.x = x
+        shape.q = q
         shape.volume = volume
         shape.W = W
         shape.H = H
-        y = frame(x)
-        shape.y = y
-        G0, G1, G2 = gradients(q, y)
-        shape.G0 = G0
-        shape.G1 = G1
-        shape.G2 = G2
-        shape.z = normals(q, x)
         return shape
 
     @wp.func
     def enriched(shape: Hex8i, e: int, m: int, flag: int, law: wp.array2d(dtype=R), history: wp.array2d(dtype=R)):
-        y = shape.y
+        y = frame(shape.x)
         K = law[m, 0]
         G = law[m, 1]
+        c = mat33()
+        share = R(1.0)
         if wp.static(by_points):
-            F = wp.identity(n=3, dtype=R)
-            if wp.static(finite):
-                F = F + shape.H
-            inverse = wp.inverse(F)
             c, share = read_vectors(history, e)
-            a0 = vector_of(shape.G0, inverse, F, y[0], c[0], share, K, G)
-            a1 = vector_of(shape.G1, inverse, F, y[1], c[1], share, K, G)
-            a2 = vector_of(shape.G2, inverse, F, y[2], c[2], share, K, G)
-        else:
-            n0 = vec3()
-            n1 = vec3()
-            n2 = vec3()
-            if wp.static(plastic):
-                if flag != 0:
-                    n0, n1, n2 = plastic_tractions(y, e, history)
-            a0 = internal_vector(doubled_gradient(shape.G0), y[0], n0, K, G)
-            a1 = internal_vector(doubled_gradient(shape.G1), y[1], n1, K, G)
-            a2 = internal_vector(doubled_gradient(shape.G2), y[2], n2, K, G)
-        shape.G0 = shape.G0 + wp.outer(y[0], a0)
-        shape.G1 = shape.G1 + wp.outer(y[1], a1)
-        shape.G2 = shape.G2 + wp.outer(y[2], a2)
+        if wp.static(plastic and not by_points):
+            n0, n1, n2 = plastic_tractions(y, e, history)
+            c[0] = solve(G * n0, y[0], K, G)
+            c[1] = solve(G * n1, y[1], K, G)
+            c[2] = solve(G * n2, y[2], K, G)
+        _F, _i, _Y, _a, L0, L1, L2, N0, N1, N2, _l, _z = varying(shape.x, shape.H, shape.q, y, c, share, K, G)
+        shape.L0 = L0
+        shape.L1 = L1
+        shape.L2 = L2
+        shape.N0 = N0
+        shape.N1 = N1
+        shape.N2 = N2
         return shape
 
     @wp.func
     def gradient(shape: Hex8i, g: int):
-        xi, weight = place(g)
-        H = gradient_at(shape.H, shape.G0, shape.G1, shape.G2, shape.y, shape.z, xi)
-        return weight * shape.volume, H
+        xi, eta = column_place(g // wp.static(layer_count))
+        zeta, weight = layer_place(g % wp.static(layer_count))
+        middle = (shape.H + xi * shape.L0) + eta * (shape.L1 + xi * shape.N2)
+        return weight * shape.volume, middle + zeta * ((shape.L2 + xi * shape.N1) + eta * shape.N0)
 
     @wp.func
     def rotation(shape: Hex8i):
@@ -171,8 +162,8 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     @wp.func
     def corner_of(g: int, j: int):
         """Outer points come last in each half of a column, so that they are the ones shown."""
-        column = g // wp.static(count)
-        return (column ^ (column >> 1)) + 4 * ((g % wp.static(count)) // wp.static(count // 2))
+        column = g // wp.static(layer_count)
+        return (column ^ (column >> 1)) + 4 * ((g % wp.static(layer_count)) // wp.static(layer_count // 2))
 
     return Formulation("hex8i", 8, points, OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of, enriched=enriched)
 

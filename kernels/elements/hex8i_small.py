@@ -5,9 +5,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, place_function
+from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.materials.point import flow_function, history_functions, plastic_strain_functions
+from warp_mca.kernels.materials.point import flow_function, history_functions
 
 wp.set_module_options({"enable_backward": False})
 
@@ -152,6 +152,8 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
     Where there is a law, all points take its return map. The internal vectors come before, with the plastic strain of
     the step before: in closed form, and the forces lag by one step's flow.
     """
+    if not law_name:
+        return elastic_function(precision)
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
     tensor = wp.types.vector(6, R)
@@ -167,11 +169,13 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
         modes.twice,
         modes.whole,
     )
-    if not law_name:
-        return elastic_function(precision)
     flow_at = flow_function(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
-    place = place_function(precision, points)
+    column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
+
+    @wp.func
+    def tensor_of(S: mat33):
+        return tensor(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2])
 
     @wp.func
     def settled(S: tensor, p: R, y: vec3, K: R, G: R):
@@ -199,42 +203,40 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
     ):
         flag = yielded_out[e]
         flag_new = flag
-        n0 = vec3()
-        n1 = vec3()
-        n2 = vec3()
-        if flag != 0:
-            n0, n1, n2 = plastic_tractions(y, e, history_out)
+        n0, n1, n2 = plastic_tractions(y, e, history_out)
         S, S0, S1, S2, N0, N1, N2, pressure, p = stress_modes(x, H, q, y, n0, n1, n2, K, G)
         mean = tensor()
         R0 = tensor()
         R1 = tensor()
         R2 = tensor()
-        w = vec3()
+        M0 = tensor()
+        M1 = tensor()
+        M2 = tensor()
         largest = R(0.0)
-        for g in range(wp.static(points)):
-            xi, share = place(g)
-            T = (S + xi[0] * S0) + xi[1] * (S1 + xi[0] * N2) + xi[2] * ((S2 + xi[0] * N1) + xi[1] * N0)
-            largest = wp.max(largest, invariant(T))
-            flowing, dp = flow_at(whole(T, R(0.0)), G, g, e, m, flag, law, history_out)
-            if dp > R(0.0):
-                flag_new = int(1)
-            T = tensor(
-                share * flowing[0, 0],
-                share * flowing[1, 1],
-                share * flowing[2, 2],
-                share * flowing[0, 1],
-                share * flowing[1, 2],
-                share * flowing[0, 2],
-            )
-            mean = mean + T
-            R0 = R0 + xi[0] * T
-            R1 = R1 + xi[1] * T
-            R2 = R2 + xi[2] * T
-            w = w + vec3(
-                xi[1] * xi[2] * wp.dot(y[0], product(T, y[0])),
-                xi[2] * xi[0] * wp.dot(y[1], product(T, y[1])),
-                xi[0] * xi[1] * wp.dot(y[2], product(T, y[2])),
-            )
+        for column in range(4):
+            xi, eta = column_place(column)
+            middle = (S + xi * S0) + eta * (S1 + xi * N2)
+            slope = (S2 + xi * N1) + eta * N0
+            total = tensor()
+            moment = tensor()
+            for k in range(wp.static(layer_count)):
+                zeta, share = layer_place(k)
+                T = middle + zeta * slope
+                largest = wp.max(largest, invariant(T))
+                g = wp.static(layer_count) * column + k
+                flowing, dp = flow_at(whole(T, R(0.0)), G, g, e, m, flag, law, history_out)
+                if dp > R(0.0):
+                    flag_new = int(1)
+                total = total + share * tensor_of(flowing)
+                moment = moment + (share * zeta) * tensor_of(flowing)
+            mean = mean + total
+            R0 = R0 + xi * total
+            R1 = R1 + eta * total
+            R2 = R2 + moment
+            M0 = M0 + eta * moment
+            M1 = M1 + xi * moment
+            M2 = M2 + (xi * eta) * total
+        w = vec3(wp.dot(y[0], product(M0, y[0])), wp.dot(y[1], product(M1, y[1])), wp.dot(y[2], product(M2, y[2])))
         if flag_new != flag:
             yielded_out[e] = flag_new
         p = R(THIRD) * p
@@ -250,23 +252,28 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
 def plastic_tractions_function(precision: str, law_name: str, points: int) -> Any:
     """The function (y, e, history) -> 6 sum_g w_g xi_k eps_p y_k of the kept plastic strain, for k = 0 to 2."""
     t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    R, mat33, tensor = t.real, t.mat33, wp.types.vector(6, t.real)
     read_history, _ = history_functions(precision, law_name, points)
-    plastic_strain, _ = plastic_strain_functions(precision, law_name)
-    place = place_function(precision, points)
+    product = mode_functions(precision).product
+    column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
 
     @wp.func
     def plastic_tractions(y: mat33, e: int, history: wp.array2d(dtype=R)):
-        n0 = vec3()
-        n1 = vec3()
-        n2 = vec3()
-        for g in range(wp.static(points)):
-            xi, weight = place(g)
-            eps_p, _p = plastic_strain(read_history(history, g, e))
-            share = R(6.0) * weight
-            n0 = n0 + (share * xi[0]) * (eps_p * y[0])
-            n1 = n1 + (share * xi[1]) * (eps_p * y[1])
-            n2 = n2 + (share * xi[2]) * (eps_p * y[2])
-        return n0, n1, n2
+        m0 = tensor()
+        m1 = tensor()
+        m2 = tensor()
+        for column in range(4):
+            xi, eta = column_place(column)
+            total = tensor()
+            for k in range(wp.static(layer_count)):
+                zeta, share = layer_place(k)
+                h = read_history(history, wp.static(layer_count) * column + k, e)
+                strain = tensor(h[0], h[1], -h[0] - h[1], h[2], h[3], h[4])
+                total = total + share * strain
+                m2 = m2 + (share * zeta) * strain
+            m0 = m0 + xi * total
+            m1 = m1 + eta * total
+        six = R(6.0)
+        return six * product(m0, y[0]), six * product(m1, y[1]), six * product(m2, y[2])
 
     return plastic_tractions

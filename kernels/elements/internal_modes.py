@@ -47,23 +47,26 @@ def layers(points: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 @cache
-def place_function(precision: str, points: int) -> Any:
-    """The function g -> natural coordinates of point g, and its weight."""
-    t = scalars(precision)
-    R, vec3 = t.real, t.vec3
-    count = points // 4
+def place_functions(precision: str, points: int) -> tuple[Any, Any]:
+    """Functions: column of points, 0 to 3 -> its first two natural coordinates; layer -> the third one, weight.
+
+    Point number k of a column c is point c points / 4 + k of the element.
+    """
+    R, count = scalars(precision).real, points // 4
     row = wp.types.vector(count, R)
     at, weight = (row(*values) for values in layers(points))
 
     @wp.func
-    def place(g: int):
+    def column_place(column: int):
+        return R(PLANE) * R(2 * (column & 1) - 1), R(PLANE) * R(2 * (column >> 1) - 1)
+
+    @wp.func
+    def layer_place(k: int):
         zetas = wp.static(at)
         weights = wp.static(weight)
-        xi = R(PLANE) * R(2 * ((g // wp.static(count)) & 1) - 1)
-        eta = R(PLANE) * R(2 * (g // wp.static(2 * count)) - 1)
-        return vec3(xi, eta, zetas[g % wp.static(count)]), weights[g % wp.static(count)]
+        return zetas[k], weights[k]
 
-    return place
+    return column_place, layer_place
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ class Modes:
         gradients: (q, y) -> G_0, G_1, G_2, the parts of the gradient that are linear in a natural coordinate.
         doubled: (q, y) -> G_k + G_k^T, k = 0 to 2, as symmetric tensors.
         normals: (q, x) -> amounts z of normal strain z_k n_k n_k along the natural axes.
+        normal: y_k -> deviator of y_k y_k.
         deviator: D -> its deviator.
         whole: (S, pressure) -> the matrix S + pressure I.
         invariant: S -> S : S / 2 of a traceless S.
@@ -92,6 +96,7 @@ class Modes:
     gradients: Any
     doubled: Any
     normals: Any
+    normal: Any
     deviator: Any
     whole: Any
     invariant: Any
@@ -161,6 +166,14 @@ def mode_functions(precision: str) -> Modes:
         return vec3(wp.dot(x[0], q[3]), wp.dot(x[1], q[3]), wp.dot(x[2], q[3]))
 
     @wp.func
+    def normal(y: vec3):
+        N = wp.outer(y, y)
+        mean = R(THIRD) * wp.dot(y, y)
+        for i in range(3):
+            N[i, i] = N[i, i] - mean
+        return N
+
+    @wp.func
     def deviator(D: tensor):
         mean = R(THIRD) * (D[0] + D[1] + D[2])
         return tensor(D[0] - mean, D[1] - mean, D[2] - mean, D[3], D[4], D[5])
@@ -190,5 +203,5 @@ def mode_functions(precision: str) -> Modes:
         return (inverse / G) * (traction - share * y)
 
     return Modes(
-        frame, twice, doubled_gradient, gradients, doubled, normals, deviator, whole, invariant, product, solve
+        frame, twice, doubled_gradient, gradients, doubled, normals, normal, deviator, whole, invariant, product, solve
     )

@@ -86,7 +86,7 @@ class ElementStage:
         self.real = scalars(precision).real
         self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
         kind = (precision, block.law, block.finite)
-        self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite)
+        self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite or points > 1)
         self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
         self.stress_kernel = vectorised(kernels.stress_kernel(*kind), large=block.finite)
 
