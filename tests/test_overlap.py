@@ -9,7 +9,7 @@ import pytest
 import warp as wp
 
 from warp_mca.kernels.contact import contact, edge_shares, sides
-from warp_mca.kernels.elements import hex8_patch, hex8r_patch, patch, tet4
+from warp_mca.kernels.elements import hex8_patch, hex8i_patch, hex8r_patch, patch, tet4
 from warp_mca.kernels.hardware.early_launch import EARLY, MIN_ARCH
 from warp_mca.kernels.nodes import absorbing, constraint, floating, node
 from warp_mca.kernels.nodes.gather import Kind
@@ -21,6 +21,7 @@ KERNELS = Path(node.__file__).parents[1]
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
 TWO = (("mixed", False), ("float64", True))
 LAWS = {False: Elastic.law, True: J2Bilinear.law}
+PATCHES = [hex8_patch, hex8r_patch, hex8i_patch.kernels(8)]
 VARIANTS = {
     "integrate": [
         *(node.integrate_kernel(Kind(p, not m, m, False, not m), True, m, m) for p, m in TWO),
@@ -37,12 +38,11 @@ VARIANTS = {
     "tet4_dilatation": [tet4.dilatation_kernel(p, m) for p, m in TWO],
     "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],
     "tet4_force": [tet4.force_kernel(p, LAWS[m], False) for p, m in TWO],
-    "hex8_patch_force": [hex8_patch.force_kernel(p, LAWS[not m]) for p, m in TWO],
-    "hex8r_patch_force": [hex8r_patch.force_kernel(p, LAWS[not m]) for p, m in TWO],
+    "patch_force": [own.force_kernel(p, LAWS[not m]) for own in PATCHES for p, m in TWO],
 }
 # Reads ahead of the wait: the first two slots and the mass of a node, its number where it is listed, or its place and
 # frame; head, corners and points of patches.
-READS = {"integrate": 3, "integrate_rated": 4, "see_nodes": 4, "hex8_patch_force": 15, "hex8r_patch_force": 15}
+READS = {"integrate": 3, "integrate_rated": 4, "see_nodes": 4, "patch_force": 15}
 WAIT = "griddepcontrol.wait"
 READ = re.compile(r"\b(?:ld\.(?!param|shared|local|const)|cp\.async\.c)")
 WRITE = re.compile(r"\b(?:st\.(?!param|shared|local)|red\.|atom\.(?!shared))")
@@ -103,7 +103,7 @@ class Driver:
 
 def changed(monkeypatch, arch=MIN_ARCH, driver=(13, 0)):
     """Edges that `launch_early` asks the driver to change, in a graph of two steps with a copy behind the first."""
-    patches = VARIANTS["hex8_patch_force"][0].key
+    patches = VARIANTS["patch_force"][0].key
     keys = [patch.schedule.key, patches, patches, VARIANTS["integrate"][0].key, None, patches]
     names = [key and f"{key}_1a2b3c4d_cuda_kernel_forward" for key in keys]
     fake = Driver(names, [(0, 1), (1, 2), (2, 3), (3, 4), (3, 5), (4, 5)])

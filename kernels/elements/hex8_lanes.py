@@ -11,11 +11,10 @@ import warp as wp
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hex8_small import stress_functions
 from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
-from warp_mca.kernels.elements.patch import POINT, Patches, exponent_of, from_start
+from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
-from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.hardware.shared_memory import ROW, barrier, row_functions, shared_functions, warp_barrier
+from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import FLOW_HISTORY, law_functions, row_count
 from warp_mca.kernels.records.extremes import keep_functions
 
@@ -149,11 +148,8 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
-    """The functions (list the element of a thread; compute the listed elements of a patch; compute one of a patch).
-
-    Four lanes compute an element. A list of shape (PATCH + 1,) begins with its length.
-    """
+def flow_function(precision: str, law_name: str) -> Any:
+    """The function by which four lanes compute an element of a patch."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     point = POINT[precision]
@@ -227,40 +223,4 @@ def flow_functions(precision: str, law_name: str) -> tuple[Any, Any, Any]:
                 force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = f1[i]
         return flows
 
-    @wp.func
-    def list_element(W: mat33, thread: int, listed_out: wp.array(dtype=wp.int32), force_out: wp.array(dtype=R)):
-        """List the element of a thread, and store its rotation in the place of its forces."""
-        listed_out[1 + wp.atomic_add(listed_out, 0, 1)] = thread
-        for i in range(9):
-            force_out[i * wp.static(ROW) + thread] = W[i // 3, i % 3]
-
-    @wp.func
-    def flow_listed(
-        points: wp.array(dtype=point),
-        pool: wp.array(dtype=wp.vec3d),
-        first: int,
-        head: wp.vec4i,
-        lane: int,
-        patches: Patches,
-        law: wp.array2d(dtype=R),
-        listed_out: wp.array(dtype=wp.int32),
-        history_out: wp.array2d(dtype=R),
-        extreme_out: wp.array2d(dtype=R),
-        force_out: wp.array(dtype=R),
-    ):
-        """Compute the listed elements, then clear the list."""
-        listed = listed_out[0]
-        for batch in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
-            item = (batch * wp.static(PATCH) + lane) >> 2
-            thread = listed_out[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
-            mine = from_start(head[0] + thread)
-            valid = item < listed
-            grid = exponent_of(head)
-            q = lane & 3
-            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
-        if listed > 0:
-            barrier()
-            if lane == 0:
-                listed_out[0] = 0
-
-    return list_element, flow_listed, flow
+    return flow

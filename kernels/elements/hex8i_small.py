@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, place_functions
+from warp_mca.kernels.elements.internal_modes import PLANE, layers, mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.point import flow_function, history_functions
 
@@ -103,7 +103,26 @@ def conjugate_function(precision: str) -> Any:
 
 
 @cache
-def elastic_function(precision: str) -> Any:
+def settled_function(precision: str) -> Any:
+    """The function (S, p, y_k, K, G) -> S, p less the stress of an elastic strain s y_k that takes all their traction.
+
+    S + p I is the part of the stress that is linear in coordinate k. So the forces are conjugate to the closed form of
+    the internal vectors.
+    """
+    R, vec3, tensor = scalars(precision).real, scalars(precision).vec3, wp.types.vector(6, scalars(precision).real)
+    modes = mode_functions(precision)
+    product, solve, twice = modes.product, modes.solve, modes.twice
+
+    @wp.func
+    def settled(S: tensor, p: R, y: vec3, K: R, G: R):
+        D = twice(solve(product(S, y) + p * y, y, K, G), y)
+        return S - G * D, p - (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2])
+
+    return settled
+
+
+@cache
+def elastic_function(precision: str, points: int) -> Any:
     """The function (x, volume, H, q, y, K, G) -> (mean stress P, hourglass forces Q, greatest S : S / 2 of a point)."""
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
@@ -114,10 +133,11 @@ def elastic_function(precision: str) -> Any:
         conjugate_function(precision),
     )
     invariant, product, whole = modes.invariant, modes.product, modes.whole
+    outermost = max(layers(points)[0])
 
     @wp.func
     def greatest(S: tensor, S0: tensor, S1: tensor, S2: tensor, N0: tensor, N1: tensor, N2: tensor):
-        """Over the eight points, where coordinates are +-1."""
+        """Over the outermost points, where coordinates are +-1."""
         largest = R(0.0)
         for i in range(2):
             s = R(2 * i - 1)
@@ -139,7 +159,8 @@ def elastic_function(precision: str) -> Any:
         w = vec3(wp.dot(y[0], product(N0, y[0])), wp.dot(y[1], product(N1, y[1])), wp.dot(y[2], product(N2, y[2])))
         Q = conjugate(x, third * volume, y, S0, S1, S2, p, third * w)
         r = R(PLANE)
-        largest = greatest(S, r * S0, r * S1, r * S2, third * N0, third * N1, third * N2)
+        outer = R(wp.static(outermost))
+        largest = greatest(S, r * S0, r * S1, outer * S2, (r * outer) * N0, (r * outer) * N1, third * N2)
         return whole(S, pressure), Q, largest
 
     return elastic_stress
@@ -153,7 +174,7 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
     the step before: in closed form, and the forces lag by one step's flow.
     """
     if not law_name:
-        return elastic_function(precision)
+        return elastic_function(precision, points)
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
     tensor = wp.types.vector(6, R)
@@ -162,29 +183,15 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
         stress_modes_function(precision),
         conjugate_function(precision),
     )
-    invariant, product, solve, twice, whole = (
-        modes.invariant,
-        modes.product,
-        modes.solve,
-        modes.twice,
-        modes.whole,
-    )
+    invariant, product, whole = modes.invariant, modes.product, modes.whole
     flow_at = flow_function(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
     column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
+    settled = settled_function(precision)
 
     @wp.func
     def tensor_of(S: mat33):
         return tensor(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2])
-
-    @wp.func
-    def settled(S: tensor, p: R, y: vec3, K: R, G: R):
-        """The stress S + p I that is linear in a coordinate, less that of an elastic s y which takes all its traction.
-
-        So the forces are conjugate to the closed form of the internal vectors.
-        """
-        D = twice(solve(product(S, y) + p * y, y, K, G), y)
-        return S - G * D, p - (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2])
 
     @wp.func
     def flow_stress(

@@ -13,6 +13,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
+from warp_mca.kernels.hardware.block import from_start
 from warp_mca.kernels.hardware.early_launch import let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.shared_memory import (
     HEADS,
@@ -92,12 +93,6 @@ def schedule(
             before += 1
         else:
             turn_out[total + patch - before] = head[patch]
-
-
-@wp.func
-def from_start(i: int):
-    """The same index, known not to be negative: Warp checks others for counting from the end."""
-    return i & 0x7FFFFFFF
 
 
 @wp.func

@@ -8,9 +8,10 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.patch import POINT, SLOTS_OF_THREAD, Patches, from_start, slot_count
+from warp_mca.kernels.elements.patch import POINT, SLOTS_OF_THREAD, Patches, slot_count
 from warp_mca.kernels.elements.patch_layout import MATERIAL_BITS, NOWHERE, PATCH, SECOND_SLOT, SLOT_BITS, SLOTS
 from warp_mca.kernels.elements.patterns import pattern_functions, pattern_sum_function
+from warp_mca.kernels.hardware.block import from_start
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, place_of, power_of_two
 
@@ -121,14 +122,18 @@ def load_functions(precision: str) -> tuple[Any, Any, Any]:
 
 
 @cache
-def load_pattern_function(precision: str) -> Any:
-    """The function that loads the pattern sums of an element's points, see `patterns.pattern_functions` [m]."""
+def pattern_load_functions(precision: str) -> tuple[Any, Any]:
+    """Functions that load pattern sums of an element's points and displacements [m], see `patterns`."""
     t = scalars(precision)
     R, mat73, point = t.real, t.mat73, POINT[precision]
     to_patterns, _ = pattern_functions(precision)
     sums_of_places = pattern_sum_function(wp.int32)
     places8 = wp.types.matrix((8, 3), wp.int32)
-    load_points, _, _ = load_functions(precision)
+    load_points, load_displacements, _ = load_functions(precision)
+
+    @wp.func
+    def load_displacement_patterns(pool: wp.array(dtype=wp.vec3d), corners: wp.vec4ui, first: int):
+        return to_patterns(load_displacements(pool, corners, first))
 
     @wp.func
     def load_patterns(
@@ -147,7 +152,7 @@ def load_pattern_function(precision: str) -> Any:
             return p
         return to_patterns(load_points(points, pool, corners, first, exponent))
 
-    return load_patterns
+    return load_patterns, load_displacement_patterns
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Owns what the threads of a block do together; on a CPU a block is one thread."""
+"""Owns what the threads of a block do together, and their indices; on a CPU a block is one thread."""
 
 from typing import Any
 
@@ -22,3 +22,9 @@ __syncthreads();
 def wait_for_block():
     """Wait for all threads of the block."""
     ...
+
+
+@wp.func
+def from_start(i: int):
+    """The same index, known not to be negative: Warp checks others for counting from the end."""
+    return i & 0x7FFFFFFF

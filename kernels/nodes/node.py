@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import from_start
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, lets_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind
 from warp_mca.kernels.hardware.scalars import scalars
@@ -65,10 +66,10 @@ def integrate_kernel(
     ):
         if wp.static(early):
             let_next_begin()
-        i = first + wp.tid()
+        i = from_start(first + wp.tid())
         beyond = i - end
         if wp.static(own.pushed):
-            i = wp.min(i, end - 1)
+            i = from_start(wp.min(i, end - 1))
         span = drift
         push = kick
         if wp.static(own.rated):

@@ -8,9 +8,6 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.hex8_lanes import flow_functions
-from warp_mca.kernels.elements.hex8_patch import element_functions
-from warp_mca.kernels.elements.hexahedron import frame_functions
 from warp_mca.kernels.elements.patch import (
     POINT,
     Patches,
@@ -19,15 +16,15 @@ from warp_mca.kernels.elements.patch import (
     corners_of,
     element_count,
     exponent_of,
-    from_start,
     slot_count,
 )
-from warp_mca.kernels.elements.patch_element import load_functions, material_of, sum_functions
+from warp_mca.kernels.elements.patch_element import material_of, sum_functions
+from warp_mca.kernels.elements.patch_kernel import Maker
 from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
+from warp_mca.kernels.hardware.block import from_start
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import FORCES as POOL
 from warp_mca.kernels.hardware.shared_memory import (
-    ROW,
     barrier,
     copy_vector,
     shared_functions,
@@ -35,7 +32,6 @@ from warp_mca.kernels.hardware.shared_memory import (
     wait_for_copies,
 )
 from warp_mca.kernels.nodes.floating import seen
-from warp_mca.kernels.records.extremes import keep_functions
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes
 
@@ -47,34 +43,21 @@ ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread
 
 
 @cache
-def element_role(precision: str, law_name: str) -> Any:
+def element_role(maker: Maker, precision: str, law_name: str) -> Any:
     """The function that computes the elements of a patch by all threads of a block.
 
     Elements with a plastic law are computed by four lanes each, whether they yield or not.
     """
     t = scalars(precision)
     R, point = t.real, POINT[precision]
-    plastic = bool(law_name)
-    load_points, load_displacements, _ = load_functions(precision)
-    element_rotation, _ = frame_functions(precision)
-    _, keep_volume, _ = keep_functions(R)
-    _, elastic_element = element_functions(precision, law_name)
-    _, _, flow = flow_functions(precision, law_name)
-
-    @wp.func
-    def rotate_element(
-        lane: int,
-        head: wp.vec4i,
-        corners: wp.vec4ui,
-        points: wp.array(dtype=point),
-        pool: wp.array(dtype=wp.vec3d),
-        extreme_out: wp.array2d(dtype=R),
-    ):
-        Xl = load_points(points, pool, corners, 0, exponent_of(head))
-        ul = load_displacements(pool, corners, 0)
-        W, J = element_rotation(Xl, ul)
-        keep_volume(from_start(head[0] + lane), R(1.0) - J, extreme_out)
-        return W, Xl, ul
+    plastic, own = bool(law_name), maker(precision, law_name)
+    load_points, load_displacements, compute, prepare, flow = (
+        own.load_points,
+        own.load_displacements,
+        own.compute,
+        own.prepare,
+        own.flow,
+    )
 
     @wp.func
     def compute_elements(
@@ -90,17 +73,18 @@ def element_role(precision: str, law_name: str) -> Any:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Compute the forces, and store them as `hex8_patch` does."""
+        """Compute the forces, and store them as `patch_kernel` does."""
         count = element_count(head)
         if lane < count:
-            W, Xl, ul = rotate_element(lane, head, corners, points, pool, extreme_out)
+            e = from_start(head[0] + lane)
+            Xl = load_points(points, pool, corners, 0, exponent_of(head))
+            ul = load_displacements(pool, corners, 0)
             if wp.static(plastic):
-                for i in range(9):
-                    force_out[i * wp.static(ROW) + lane] = W[i // 3, i % 3]
+                prepare(Xl, ul, e, lane, extreme_out, force_out)
             else:
                 m = material_of(corners[0], corners[1])
-                e = from_start(head[0] + lane)
-                elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
+                none = wp.array(ptr=wp.uint64(0), shape=(0,), dtype=wp.int32)  # of elements that yield
+                compute(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, none, force_out)
         if wp.static(plastic):
             barrier()
             for batch in range((4 * count + wp.static(THREADS - 1)) // wp.static(THREADS)):
@@ -142,8 +126,8 @@ def see_function(precision: str, turned: bool) -> Any:
 
 
 @cache
-def patch_role(precision: str, law_name: str, turned: bool) -> Any:
-    """The function that computes the forces of a patch of `hex8` in each of the kernel's steps.
+def patch_role(maker: Maker, precision: str, law_name: str, turned: bool) -> Any:
+    """The function that computes the forces of a patch in each of the kernel's steps.
 
     `turned`, in `mixed`: elements compute in floating frames.
     """
@@ -154,7 +138,7 @@ def patch_role(precision: str, law_name: str, turned: bool) -> Any:
     point, slots, mixed = POINT[precision], SLOTS[precision], precision == "mixed"
     copy_points = copy_functions(precision)[3]
     clear_nowhere, _, _, sum_slot = sum_functions(precision)
-    compute_elements, see_slots = element_role(precision, law_name), see_function(precision, turned)
+    compute_elements, see_slots = element_role(maker, precision, law_name), see_function(precision, turned)
 
     @wp.func
     def compute_patch(

@@ -13,6 +13,7 @@ import warp as wp
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.elements.patch import POINT, Patches
+from warp_mca.kernels.elements.patch_kernel import Maker
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.constraint import Bonds
@@ -51,6 +52,7 @@ class Roles:
 
 @cache
 def resident_kernel(
+    maker: Maker,
     precision: str,
     law_name: str,
     turned: bool,
@@ -61,15 +63,15 @@ def resident_kernel(
     partial: bool,
     coupled: bool,
 ) -> Any:
-    """Kernel: take `steps` steps of a model of one block of `hex8`, with contact if `contact`, pins if `coupled`.
+    """Kernel: take `steps` steps of a model of one block of hexahedra, with contact if `contact`, pins if `coupled`.
 
-    Arguments are those of the kernels that take the same steps one by one: `hex8_patch`, `contact`, `nodes.node`,
+    Arguments are those of the kernels that take the same steps one by one: `patch_kernel`, `contact`, `nodes.node`,
     `nodes.constraint`, `nodes.couple`. `turned`: elements compute in floating frames. count_out are the counts of
-    `meeting`, zero before and after.
+    `meeting`, zero before and after. `maker` makes the element, see `patch_kernel.PatchElement`.
     """
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
-    compute_patch, move_free = patch_role(precision, law_name, turned), free_role(precision, contact, turned)
+    compute_patch, move_free = patch_role(maker, precision, law_name, turned), free_role(precision, contact, turned)
     touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision, turned)
     move_bound, move_pinned = bound_role(precision, partial, turned), pin_role(precision, turned)
 

@@ -65,7 +65,7 @@ def is_known(solver: Solver) -> bool:
     if not stages <= STAGES or solver.layout.count > 1 or len(solver.elements) > 1 or len(solver.contacts) > 1:
         return False
     (elements,) = solver.elements
-    if not isinstance(elements, PatchStage) or elements.block.element != "hex8":
+    if not isinstance(elements, PatchStage) or not elements.lanes:
         return False
     if _tied(solver) + solver.constraints.driven > MOST_BOUND or not _pins_fit(solver):
         return False
@@ -110,6 +110,7 @@ class Resident:
         item = contact.items[0] if contact else None
         friction, stress_free = (item.mu > 0.0, contact.stress_free) if item and contact else (False, False)
         self.kernel = resident_kernel(
+            solver.elements[0].maker,
             solver.precision,
             block.law,
             solver.nodes.kind.turned,

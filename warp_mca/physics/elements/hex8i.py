@@ -95,7 +95,8 @@ class Hex8i:
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
-        from warp_mca.kernels.elements import hex8i
-        from warp_mca.physics.elements.stage import ElementStage
+        from warp_mca.kernels.elements import hex8i, hex8i_patch
+        from warp_mca.physics.elements.patch_stage import hexahedral_stage
 
-        return ElementStage(block, precision, hex8i.kernels(self.points), self.points)
+        kernels, patch_kernels = hex8i.kernels(self.points), hex8i_patch.kernels(self.points)
+        return hexahedral_stage(block, X, precision, kernels, patch_kernels, self.points)

@@ -35,6 +35,8 @@ class PatchStage(ElementStage):
         point: what `kernels.elements.patch.POINT` says of each slot.
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where no
             order of patches is kept.
+        maker: of the element in a patch.
+        lanes: whether several threads compute an element that yields.
         most: blocks of threads that the device holds.
         chains: patches of elements up to a level and of one chain, by these two numbers, where there are any.
         beside: blocks of threads of one chain beside that of the fastest nodes.
@@ -50,9 +52,11 @@ class PatchStage(ElementStage):
         patch_kernels: Any,
         points: int,
     ) -> None:
-        """Allocate; `patch_kernels` is the module that makes the force kernel, other arguments as `ElementStage`."""
+        """Allocate; `patch_kernels` makes the force kernel and the element, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
+        self.maker = patch_kernels.element
+        self.lanes = self.maker(precision, block.law).flow is not None
         mixed = precision == "mixed"
         ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
         halved = self._halved(size)
@@ -70,7 +74,7 @@ class PatchStage(ElementStage):
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
         patches_of_levels = np.searchsorted(host.start[:-1], block.level_ends)
         self.slot_level = levels_of(host.slot_start[patches_of_levels].tolist())
-        self.scheduled = block.plastic and points > 1
+        self.scheduled = block.plastic and self.lanes
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
@@ -84,7 +88,7 @@ class PatchStage(ElementStage):
 
     def _halved(self, size: int) -> int:
         """Elements of level 0 if they yield, and patches of half the size would still find places at once."""
-        if not self.block.level_ends or not self.block.plastic or self.points == 1:
+        if not self.block.level_ends or not self.block.plastic or not self.lanes:
             return 0
         count = self.block.level_ends[0]
         return count if count <= patch.HALVED * wp.get_device().sm_count * (size // 2) else 0
@@ -99,7 +103,7 @@ class PatchStage(ElementStage):
     def new_state(self) -> ElementState:
         """As for elements one by one, but lanes read the points of one element together."""
         found = super().new_state()
-        if self.points > 1:
+        if self.lanes:
             found.history = wp.zeros(found.history.shape[::-1], dtype=self.real).transpose()
         return found
 
@@ -139,7 +143,7 @@ class PatchStage(ElementStage):
         most = min(self.blocks, self.beside) if chain else self.blocks
         blocks = min(most, len(patches.head))
         inputs = [work.X, self.point, patches, work.law, work.displacements(state), self.slot, blocks]
-        outputs = [own.yielded, own.history, own.extreme, *([self.flowing] if self.points > 1 else []), work.force]
+        outputs = [own.yielded, own.history, own.extreme, self.flowing, work.force]
         wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
 
 

@@ -1,0 +1,309 @@
+"""Owns how four lanes of a GPU compute an element of `hex8i` that yields, each a column of its points.
+
+Bits 0 and 1 of a lane are xi and eta of its corners and points.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.hex8_lanes import HISTORY_SIZE
+from warp_mca.kernels.elements.hex8i_small import (
+    conjugate_function,
+    settled_function,
+    stress_modes_function,
+)
+from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
+from warp_mca.kernels.elements.patch import POINT, Patches
+from warp_mca.kernels.elements.patch_element import load_functions, material_of
+from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions, pattern_force_function
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, shared_functions, warp_barrier
+from warp_mca.kernels.materials.laws import law_functions
+from warp_mca.kernels.records.extremes import keep_functions
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def keep_function(precision: str) -> Any:
+    """The function (H, q, W, lane, force_out) that keeps what lanes need of an element in the place of its forces.
+
+    Twelve rows of amplitudes, six of H + H^T, and two rows of W = Q - I, of which the third follows.
+    """
+    t = scalars(precision)
+    R, mat33, mat43 = t.real, t.mat33, t.mat43
+    doubled_gradient = mode_functions(precision).doubled_gradient
+
+    @wp.func
+    def keep(H: mat33, q: mat43, W: mat33, lane: int, force_out: wp.array(dtype=R)):
+        D = doubled_gradient(H)
+        for i in range(12):
+            force_out[i * wp.static(ROW) + lane] = q[i // 3, i % 3]
+        for i in range(6):
+            force_out[(12 + i) * wp.static(ROW) + lane] = D[i]
+            force_out[(18 + i) * wp.static(ROW) + lane] = W[i // 3, i % 3]
+
+    return keep
+
+
+@cache
+def kept_function(precision: str) -> Any:
+    """The function (lane, pool) -> (H, q, W) that `keep_function` kept; of H the symmetric part."""
+    t = scalars(precision)
+    R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
+
+    @wp.func
+    def kept(lane: int, pool: wp.array(dtype=R)):
+        q = mat43()
+        for i in range(12):
+            q[i // 3, i % 3] = pool[i * wp.static(ROW) + lane]
+        first = 12 * wp.static(ROW) + lane
+        xy = R(0.5) * pool[first + 3 * wp.static(ROW)]
+        yz = R(0.5) * pool[first + 4 * wp.static(ROW)]
+        xz = R(0.5) * pool[first + 5 * wp.static(ROW)]
+        H = mat33(
+            R(0.5) * pool[first], xy, xz,
+            xy, R(0.5) * pool[first + wp.static(ROW)], yz,
+            xz, yz, R(0.5) * pool[first + 2 * wp.static(ROW)],
+        )  # fmt: skip
+        first = 18 * wp.static(ROW) + lane
+        a = vec3(pool[first], pool[first + wp.static(ROW)], pool[first + 2 * wp.static(ROW)])
+        b = vec3(pool[first + 3 * wp.static(ROW)], pool[first + 4 * wp.static(ROW)], pool[first + 5 * wp.static(ROW)])
+        # (e_x + a) x (e_y + b) - e_z, with rounding as small as W
+        c = wp.cross(a, b) + vec3(-a[2], -b[2], a[0] + b[1])
+        W = mat33(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+        return H, q, W
+
+    return kept
+
+
+@cache
+def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
+    """Functions over the four lanes of an element, each of which knows its signs xi and eta.
+
+    They take its lower and upper corners to the patterns of all; a tensor to its sums over the lanes, by itself and
+    times xi, eta and xi eta; and a vector and a scalar to their sum and maximum.
+    """
+    t = scalars(precision)
+    R, vec3, mat73 = t.real, t.vec3, t.mat73
+    tensor = wp.types.vector(6, R)
+    _, exchange = shared_functions(precision)
+
+    @wp.func
+    def other(x: vec3, mask: int):
+        return vec3(exchange(x[0], mask), exchange(x[1], mask), exchange(x[2], mask))
+
+    @wp.func
+    def patterns(lower: vec3, upper: vec3, xi: R, eta: R):
+        s = upper + lower
+        d = upper - lower
+        s1 = other(s, 1)
+        d1 = other(d, 1)
+        ss = s + s1
+        sx = xi * (s - s1)
+        ds = d + d1
+        dx = xi * (d - d1)
+        ss1 = other(ss, 2)
+        sx1 = other(sx, 2)
+        ds1 = other(ds, 2)
+        dx1 = other(dx, 2)
+        p = mat73()
+        p[0] = sx + sx1
+        p[1] = eta * (ss - ss1)
+        p[2] = ds + ds1
+        p[3] = eta * (ds - ds1)
+        p[4] = dx + dx1
+        p[5] = eta * (sx - sx1)
+        p[6] = eta * (dx - dx1)
+        return p
+
+    @wp.func
+    def sums(S: tensor, xi: R, eta: R):
+        total = tensor()
+        along = tensor()
+        across = tensor()
+        both = tensor()
+        for i in range(6):
+            if i != 2:  # zz of a traceless tensor follows
+                s = exchange(S[i], 1)
+                a = S[i] + s
+                b = xi * (S[i] - s)
+                a1 = exchange(a, 2)
+                b1 = exchange(b, 2)
+                total[i] = a + a1
+                across[i] = eta * (a - a1)
+                along[i] = b + b1
+                both[i] = eta * (b - b1)
+        total[2] = -total[0] - total[1]
+        across[2] = -across[0] - across[1]
+        along[2] = -along[0] - along[1]
+        both[2] = -both[0] - both[1]
+        return total, along, across, both
+
+    @wp.func
+    def vector_sum(x: vec3):
+        x = x + other(x, 1)
+        return x + other(x, 2)
+
+    @wp.func
+    def lane_max(value: R):
+        value = wp.max(value, exchange(value, 1))
+        return wp.max(value, exchange(value, 2))
+
+    return patterns, sums, vector_sum, lane_max
+
+
+@cache
+def column_functions(points: int, precision: str, law_name: str) -> tuple[Any, Any]:
+    """Functions of a lane's column of points.
+
+    (history row, y, xi, eta) -> its part of the tractions of plastic strain; (elastic stress at the middle and its
+    slope, history row, law, m) -> sum and moment of the stress, new history row, greatest elastic S : S / 2, flow.
+    """
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    tensor, count = wp.types.vector(6, R), points // 4
+    row = wp.types.vector(count * HISTORY_SIZE, R)
+    modes = mode_functions(precision)
+    invariant, product, whole = modes.invariant, modes.product, modes.whole
+    _, layer_place = place_functions(precision, points)
+    functions = law_functions(law_name, precision)
+    read_parameters, return_map = functions.parameters, functions.return_map
+    size = HISTORY_SIZE
+
+    @wp.func
+    def plastic_strain(history: row, first: int):
+        h0 = history[first]
+        h1 = history[first + 1]
+        return tensor(h0, h1, -h0 - h1, history[first + 2], history[first + 3], history[first + 4])
+
+    @wp.func
+    def plastic_parts(history: row, y: mat33, xi: R, eta: R):
+        total = tensor()
+        moment = tensor()
+        for k in range(wp.static(count)):
+            zeta, share = layer_place(k)
+            strain = plastic_strain(history, wp.static(size) * k)
+            total = total + (R(6.0) * share) * strain
+            moment = moment + (R(6.0) * share * zeta) * strain
+        return xi * product(total, y[0]), eta * product(total, y[1]), product(moment, y[2])
+
+    @wp.func
+    def flow_column(middle: tensor, slope: tensor, history: row, G: R, law: wp.array2d(dtype=R), m: int):
+        total = tensor()
+        moment = tensor()
+        largest = R(0.0)
+        flows = bool(False)
+        for k in range(wp.static(count)):
+            zeta, share = layer_place(k)
+            first = wp.static(size) * k
+            T = middle + zeta * slope
+            largest = wp.max(largest, invariant(T))
+            p = history[first + 5]
+            eps_p = whole(plastic_strain(history, first), R(0.0))
+            S, eps_new, p_new = return_map(whole(T, R(0.0)), eps_p, p, G, read_parameters(law, m, R(1.0)))
+            flows = flows or p_new > p
+            history[first] = eps_new[0, 0]
+            history[first + 1] = eps_new[1, 1]
+            history[first + 2] = eps_new[0, 1]
+            history[first + 3] = eps_new[1, 2]
+            history[first + 4] = eps_new[0, 2]
+            history[first + 5] = p_new
+            flowing = tensor(S[0, 0], S[1, 1], S[2, 2], S[0, 1], S[1, 2], S[0, 2])
+            total = total + share * flowing
+            moment = moment + (share * zeta) * flowing
+        return total, moment, history, largest, flows
+
+    return plastic_parts, flow_column
+
+
+@cache
+def flow_function(points: int, precision: str, law_name: str) -> Any:
+    """The function by which four lanes compute an element of a patch."""
+    t = scalars(precision)
+    R, vec3 = t.real, t.vec3
+    point = POINT[precision]
+    _, _, load_corners = load_functions(precision)
+    patterns, sums, vector_sum, lane_max = lane_functions(precision)
+    column_place, _ = place_functions(precision, points)
+    plastic_parts, flow_column = column_functions(points, precision, law_name)
+    modes = mode_functions(precision)
+    frame, product, whole = modes.frame, modes.product, modes.whole
+    stress_modes, conjugate = stress_modes_function(precision), conjugate_function(precision)
+    settled, kept = settled_function(precision), kept_function(precision)
+    mean_gradients, _ = mean_functions(precision)
+    pattern_forces = pattern_force_function(precision)
+    size = points // 4 * HISTORY_SIZE
+    read_row, write_row = row_functions(precision, size)
+    keep_strain, _, strain_square = keep_functions(R)
+
+    @wp.func
+    def flow(
+        points: wp.array(dtype=point),
+        pool: wp.array(dtype=wp.vec3d),
+        first: int,
+        exponent: int,
+        patches: Patches,
+        e: int,
+        law: wp.array2d(dtype=R),
+        thread: int,
+        lane: int,
+        valid: bool,
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=R),
+    ):
+        """Four lanes, 0 to 3, compute the element of a thread. Returns whether a lane's points flow."""
+        a = lane ^ (lane >> 1)  # corners run around the faces
+        x0, _d0, x1, _d1 = load_corners(points, pool, patches, e, a, first, exponent)
+        m = material_of(patches.corner[0, e], patches.corner[1, e])
+        H, q, W = kept(thread, force_out)
+        warp_barrier()
+        history = read_row(history_out, wp.static(size) * lane, e)
+        right = wp.where((lane & 1) != 0, R(1.0), R(-1.0))
+        far = wp.where(lane > 1, R(1.0), R(-1.0))
+        xi, eta = column_place(lane)
+        x = patterns(x0, x1, right, far)
+        y = frame(x)
+        K = law[m, 0]
+        G = law[m, 1]
+        n0, n1, n2 = plastic_parts(history, y, xi, eta)
+        S, S0, S1, S2, N0, N1, N2, pressure, p = stress_modes(
+            x, H, q, y, vector_sum(n0), vector_sum(n1), vector_sum(n2), K, G
+        )
+        middle = (S + xi * S0) + eta * (S1 + xi * N2)
+        slope = (S2 + xi * N1) + eta * N0
+        total, moment, history, largest, flows = flow_column(middle, slope, history, G, law, m)
+        largest = lane_max(largest)
+        if valid and lane == 0:
+            keep_strain(e, strain_square(largest, G), extreme_out)
+        flows = flows and valid
+        if flows:
+            write_row(history, wp.static(size) * lane, e, history_out)
+        plane = R(wp.static(3.0**-0.5))
+        mean, R0, R1, M2 = sums(total, right, far)
+        R2, M1, M0, _both = sums(moment, right, far)
+        third = R(THIRD)
+        R0, p0 = settled(plane * R0, third * p[0], y[0], K, G)
+        R1, p1 = settled(plane * R1, third * p[1], y[1], K, G)
+        R2, p2 = settled(R2, third * p[2], y[2], K, G)
+        w = vec3(
+            plane * wp.dot(y[0], product(M0, y[0])),
+            plane * wp.dot(y[1], product(M1, y[1])),
+            third * wp.dot(y[2], product(M2, y[2])),
+        )
+        b, scaled_volume = mean_gradients(x)
+        volume = R(VOLUME_SCALE) * scaled_volume
+        Q = conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w)
+        F = pattern_forces(x, b, volume, W, whole(mean, pressure), Q)
+        base = right * F[0] + far * F[1] + (right * far) * F[5]
+        top = F[2] + far * F[3] + right * F[4] + (right * far) * F[6]
+        if valid:
+            for i in range(3):
+                force_out[(3 * a + i) * wp.static(ROW) + thread] = base[i] - top[i]
+                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = base[i] + top[i]
+        return flows
+
+    return flow

@@ -1,0 +1,78 @@
+"""Owns what a thread of a GPU does with its `hex8i` element of a patch, at small strain."""
+
+from functools import cache, partial
+from types import SimpleNamespace
+
+import warp as wp
+
+from warp_mca.kernels.elements.hex8i_lanes import flow_function, keep_function
+from warp_mca.kernels.elements.hex8i_small import elastic_function
+from warp_mca.kernels.elements.internal_modes import mode_functions
+from warp_mca.kernels.elements.patch_element import pattern_load_functions, sum_functions
+from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
+from warp_mca.kernels.elements.patterns import corner_force_function, pattern_strain_function
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.records.extremes import keep_functions
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def element(points: int, precision: str, law_name: str) -> PatchElement:
+    """A thread's element as if elastic, and listed if it yields."""
+    t = scalars(precision)
+    R, mat73 = t.real, t.mat73
+    plastic, flow = bool(law_name), flow_function(points, precision, law_name)
+    load_patterns, load_displacement_patterns = pattern_load_functions(precision)
+    shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
+    frame, elastic_stress = mode_functions(precision).frame, elastic_function(precision, points)
+    keep = keep_function(precision)
+    _, keep_forces, *_ = sum_functions(precision)
+    keep_strain, keep_volume, strain_square = keep_functions(R)
+
+    @wp.func
+    def prepare(x: mat73, du: mat73, e: int, lane: int, extreme_out: wp.array2d(dtype=R), force_out: wp.array(dtype=R)):
+        _b, _volume, W, H, J, q = shape_and_strain(x, du)
+        keep_volume(e, R(1.0) - J, extreme_out)
+        keep(H, q, W, lane, force_out)
+
+    @wp.func
+    def compute_element(
+        x: mat73,
+        du: mat73,
+        e: int,
+        m: int,
+        lane: int,
+        law: wp.array2d(dtype=R),
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        listed_out: wp.array(dtype=wp.int32),
+        force_out: wp.array(dtype=R),
+    ):
+        b, volume, W, H, J, q = shape_and_strain(x, du)
+        keep_volume(e, R(1.0) - J, extreme_out)
+        flows = bool(False)
+        if wp.static(plastic):
+            flows = yielded_out[e] != 0
+        if not flows:
+            G = law[m, 1]
+            P, Q, largest = elastic_stress(x, volume, H, q, frame(x), law[m, 0], G)
+            keep_forces(force_out, lane, corner_forces(x, b, volume, W, P, Q))
+            keep_strain(e, strain_square(largest, G), extreme_out)
+            if wp.static(plastic):
+                if R(3.0) * largest > law[m, 2] * law[m, 2]:
+                    flows = bool(True)
+                    yielded_out[e] = 1
+        if wp.static(plastic):
+            if flows:
+                list_element(lane, listed_out)
+                keep(H, q, W, lane, force_out)
+
+    return PatchElement("hex8i", load_patterns, load_displacement_patterns, compute_element, prepare, flow)
+
+
+def kernels(points: int) -> SimpleNamespace:
+    """What `PatchStage` asks of a module of kernels, for elements of so many points."""
+    maker = partial(element, points)
+    return SimpleNamespace(element=maker, force_kernel=partial(patch_force_kernel, maker))
