@@ -82,6 +82,16 @@ def test_the_ledger_closes_over_both_phases_and_books_the_damping():
     assert np.abs(result["E_total_error"]).max() < 1e-4 * scale
 
 
+def test_the_ledger_of_a_phase_is_that_of_its_end():
+    """However far its rows are apart: those of a phase that may last 3 s are 6 ms apart, and it rests before."""
+    phase = mca.run(scene(phases=(mca.Settle(duration=3.0),)), precision="float64", threads=1).summary["phases"][0]
+    energy, exact = phase["energy"], settled().summary["phases"][0]["energy"]
+    assert phase["end"] - phase["start"] < 6e-3
+    for name in ("elastic", "contact", "damping", "external_work"):
+        assert energy[name] == pytest.approx(exact[name], rel=1e-3)
+    assert abs(energy["initial"]) < 1e-9 and energy["kinetic"] < 1e-3 * energy["damping"]
+
+
 def test_bodies_at_rest_need_no_time():
     result = mca.run(scene(gravity=(0.0, 0.0, 0.0), impact=mca.ImpactPhase(duration=2e-5)), threads=1)
     assert result.summary["energy"]["damping"] == 0.0
@@ -139,6 +149,13 @@ REFUSED: tuple[tuple[dict[str, Any], Callable[[mca.Scene], Any], type[Exception]
     ({}, lambda made: mca.run_batch([made]), mca.RequestError, "leave phases out"),
     ({"phases": (mca.Settle(duration=5e-5),)}, mca.run, mca.GuardError, "do not rest after Settle.duration = 5e-05 s"),
     ({"contacts": (), "phases": (mca.Settle(duration=1e-3),)}, mca.run, mca.GuardError, "hold what falls"),
+    (
+        {"phases": (mca.Settle(duration=1e-9),)},
+        mca.run,
+        mca.RequestError,
+        "Settle.duration = 1e-09: give a time of more",
+    ),
+    ({"phases": (mca.Settle(duration=1e9),)}, mca.run, mca.RequestError, "Settle.duration = 1000000000.0: give a time"),
 )
 
 
