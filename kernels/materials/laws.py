@@ -85,8 +85,8 @@ def law_functions(name: str, precision: str) -> Law:
         module = import_module(name)
         general = hasattr(module, "stress")
         made = {key: getattr(module, key)(precision) for key in (GENERAL if general else FLOW)}
-    except (ImportError, AttributeError) as error:
-        remedy = f"name a module that makes {', '.join(FLOW)}, or {', '.join(GENERAL)}: {error}"
+    except Exception as error:  # it may be of the user
+        remedy = f"name a module that makes {', '.join(FLOW)}, or {', '.join(GENERAL)}: {type(error).__name__}: {error}"
         raise bad_value("law of a material", name, remedy) from error
     if not general:
         return Law(**made, history=FLOW_HISTORY, plastic_row=row_count(FLOW_HISTORY) - 1)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from warp_mca.base import validate
 from warp_mca.physics.absorbing.stage import AbsorbingStage
 from warp_mca.physics.actor import Actor
 from warp_mca.physics.contact.actor import Contacts
@@ -42,8 +43,8 @@ ACTORS: dict[str, Callable[[Solver], Actor]] = {
 
 def actors_of(model: Model) -> dict[str, Callable[[Solver], Actor]]:
     """All of ACTORS, and behind them the kinds of loads that a model has."""
-    loads = {kind: partial(LOADS[kind].stage(), name=kind) for kind in model.loads}
-    return ACTORS | loads
+    stages = {kind: validate.call("Scene.loads", kind, "stage()", LOADS[kind].stage) for kind in model.loads}
+    return ACTORS | {kind: partial(stage, name=kind) for kind, stage in stages.items()}
 
 
 class Made:
