@@ -145,7 +145,7 @@ def test_a_model_file_keeps_the_phases(tmp_path: Path):
 
 FINE = (block(), replace(scene().bodies[1], geometry=mca.Box(size=3 * (0.01,), divisions=(8, 8, 8))))
 REFUSED: tuple[tuple[dict[str, Any], Callable[[mca.Scene], Any], type[Exception], str], ...] = (
-    ({"bodies": FINE}, lambda made: mca.run(made, multi_rate=2), mca.RequestError, "multi_rate = 2: bodies settle"),
+    ({"bodies": FINE}, lambda made: mca.run(made, multi_rate=2), mca.RequestError, "multi_rate = 2: phases before"),
     ({}, lambda made: mca.run_batch([made]), mca.RequestError, "leave phases out"),
     ({"phases": (mca.Settle(duration=5e-5),)}, mca.run, mca.GuardError, "do not rest after Settle.duration = 5e-05 s"),
     ({"contacts": (), "phases": (mca.Settle(duration=1e-3),)}, mca.run, mca.GuardError, "hold what falls"),
@@ -165,6 +165,19 @@ def test_what_cannot_settle_is_refused(
 ):
     with pytest.raises(kind, match=words):
         run(scene(**change))
+
+
+def test_multi_rate_auto_takes_one_rate():
+    """Cells that grow along the bar give four groups without the phase."""
+    bar = mca.Box(size=(0.01, 0.04, 0.01), divisions=(2, 40, 2)).build()
+    y = bar.points[:, 1] / 0.04
+    bar.points[:, 1] = 0.04 * (0.1 * y + 0.9 * y**3)
+    held = mca.Fixed(body="bar", nodes="ymax")
+    body = mca.Body(name="bar", geometry=bar, material=mca.Elastic(E=1e8, nu=0.3, rho=1e3))
+    phase = mca.ImpactPhase(duration=1e-3, output_interval=2e-5)
+    made = scene(bodies=(body,), contacts=(), fixed=(held,), impact=phase)
+    assert "rate_groups" not in mca.run(made, multi_rate="auto").summary
+    assert len(mca.run(replace(made, phases=()), multi_rate="auto").summary["rate_groups"]) > 1
 
 
 def test_a_phase_that_is_not_known_is_refused():

@@ -36,13 +36,11 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     """Advance an impact phase that has not begun until its bodies rest; `tell` gets the share of the time.
 
     Raises:
-        RequestError: its elements have steps of their own.
+        RequestError: its duration holds too few steps, or too many.
         GuardError: a guard stopped it, or the bodies do not rest in time.
     """
     solver, state, fine = impact.solver, impact.state, impact.steps
     model = solver.model
-    if model.rates:
-        raise bad_value("multi_rate", model.rates.top + 1, "bodies settle with one time step; leave it or Settle out")
     if not 2 * STEPS < phase.duration / fine.dt < MAX_STEPS:
         remedy = f"give a time of more than {2 * STEPS} and fewer than {MAX_STEPS:.0e} steps of {fine.dt:.3g} s"
         raise bad_value("Settle.duration", phase.duration, remedy)
