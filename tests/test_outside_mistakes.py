@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.cli.main import main
+from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.phases.settle import HalfSteps
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.registration import TABLES
@@ -18,6 +23,33 @@ from warp_mca.scene.joints import Joint
 from warp_mca.scene.loads import Load
 from warp_mca.scene.ties import Ties
 
+UNTYPED = '''"""A block whose contact law multiplies a float64 by a float32."""
+from dataclasses import dataclass
+
+import warp as wp
+
+import warp_mca as mca
+from warp_mca.kernels.contact.penalty import energy
+from warp_mca.scene.contact_laws import Penalty
+
+
+@wp.func
+def force(depth: wp.float64, k: wp.float64, parameters: wp.array2d(dtype=wp.float64), s: int) -> wp.float64:
+    return k * depth * 2.0
+
+
+@mca.register
+@dataclass(frozen=True, kw_only=True)
+class Untyped(Penalty):
+    law = __name__
+
+
+def build() -> mca.Scene:
+    metal = mca.Elastic(E=1e9, nu=0.3, rho=1e3)
+    block = mca.Body(name="block", geometry=mca.Box(size=3 * (0.01,), divisions=(2, 2, 2)), material=metal)
+    contact = mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=mca.RigidPlane(), law=Untyped())
+    return mca.Scene(name="block", bodies=(block,), contacts=(contact,), impact=mca.ImpactPhase(duration=1e-5))
+'''
 KIND = dataclass(frozen=True, kw_only=True)
 
 
@@ -101,6 +133,33 @@ MISTAKES: tuple[tuple[Callable[[], mca.Scene], str], ...] = (
 def test_what_it_returns_is_checked(make: Callable[[], mca.Scene], words: str):
     with pytest.raises(mca.RequestError, match=f"^{words}"):
         mca.run(make(), threads=1)
+
+
+@pytest.mark.parametrize(
+    ("constants", "words"),
+    [
+        ({}, "AttributeError: .*HISTORY"),
+        ({"HISTORY": ("tensors",)}, "KeyError: 'tensors'"),
+        ({"HISTORY": ("tensor",), "PLASTIC_ROW": 6}, "PLASTIC_ROW = 6 is none of the 6 rows"),
+    ],
+)
+def test_the_history_of_a_law_is_checked(constants: dict[str, Any], words: str, monkeypatch: pytest.MonkeyPatch):
+    name = f"own_law_{len(constants)}_{len(words)}"
+    law = {key: lambda precision: None for key in ("parameters", "stress", "energies")} | constants
+    monkeypatch.setitem(sys.modules, name, SimpleNamespace(**law))  # pyright: ignore[reportArgumentType]
+    with pytest.raises(mca.RequestError, match=f"^law of a material = '{name}': name a module that .*{words}"):
+        law_functions(name, "mixed")
+
+
+def test_a_function_that_warp_cannot_compile_ends_a_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    Path("block.py").write_text(UNTYPED)
+    assert main(["run", "block.py", "--out", "a"]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("warp-mca: error: Warp cannot compile a function, mend it or leave out what needs it: Error")
+    assert "block.py" in said and not Path("a").exists()
 
 
 @pytest.mark.parametrize(
