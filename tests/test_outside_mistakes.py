@@ -179,6 +179,13 @@ def test_parameters_of_a_material_are_checked(attributes: dict[str, Any], words:
         scene(material=kind(mca.Elastic, **attributes)(E=1e9, nu=0.3, rho=1e3))
 
 
+def test_a_load_with_the_name_of_a_part_of_the_solver_is_refused():
+    """Its stage would take the place of that part."""
+    own = type("contacts", (Load,), {"__module__": __name__, "build": lambda *_: LoadedNodes(node=nodes(1))})
+    with pytest.raises(mca.RequestError, match=r"^Scene.loads = 'contacts': the solver has a part of this name"):
+        mca.run(scene(loads=(mca.register(KIND(own))(body="block"),)), threads=1)
+
+
 def test_a_phase_is_a_dataclass():
     """A model file and a checkpoint must be able to hold it."""
     own = type("Own", (), {"advance": lambda *_: None})
