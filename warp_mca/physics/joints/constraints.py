@@ -138,7 +138,7 @@ def _ties_of(joint: Joint, side: Side, other: Side | None) -> Ties | Rails | Clu
         for nodes in lists:
             if (nodes is None) != (owner is None):
                 raise TypeError("it gives nodes of a second body just where the joint has none")
-            if owner and not np.isin(nodes, np.arange(len(owner.X))).all():
+            if owner and nodes is not None and not np.isin(nodes, np.arange(len(owner.X))).all():
                 raise IndexError(f"it names other nodes of {owner.body} than 0 to {len(owner.X) - 1}")
     return ties
 
