@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from warp_mca.base.errors import RequestError
+from warp_mca.base import validate
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.log import warn
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.paths import Found
@@ -130,7 +131,13 @@ def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) ->
 def _before(phase: Any, impact: Impact, tell: Callable[[float], None]) -> Stretch:
     """Carry out a phase that comes before the impact: one of `DRIVERS`, or of the user's own, which has `advance`."""
     driver = DRIVERS.get(type(phase))
-    return driver(phase, impact, tell) if driver else phase.advance(impact, tell)
+    if driver:
+        return driver(phase, impact, tell)
+    kind = type(phase).__name__
+    found = validate.call("Scene.phases", kind, "advance()", phase.advance, impact, tell)
+    if not isinstance(found, Stretch):
+        raise bad_value("Scene.phases", kind, f"its advance() must return a Stretch, not a {type(found).__name__}")
+    return found
 
 
 def _prepare(

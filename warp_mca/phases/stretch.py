@@ -99,8 +99,8 @@ def joined(found: Result, scene_run: SceneRun, stretches: Sequence[Stretch], ori
     paths = [*(path_histories(ready.probes, item.records.path_stress) for item in stretches if item.records.count)]
     records = [row for item in (*(s.records for s in stretches), scene_run.ledger.kept) for row in item.sensors]
     phases, start = [], 0.0
-    for item, ledger in zip(stretches, ledgers, strict=True):
-        phases.append(phase_facts(item.kind, start, start + item.time, item.ended_by, ledger.energy()))
+    for item, ledger, after in zip(stretches, ledgers, [*ledgers[1:], scene_run.ledger], strict=True):
+        phases.append(phase_facts(item.kind, start, start + item.time, item.ended_by, _end_energy(ledger, after)))
         start += item.time
     end = start + found.summary["simulated_time"]
     phases.append(phase_facts("impact", start, end, "duration", scene_run.ledger.energy()))
@@ -117,6 +117,18 @@ def joined(found: Result, scene_run: SceneRun, stretches: Sequence[Stretch], ori
         probes=probes,
         sections=sections,
     )
+
+
+def _end_energy(ledger: Ledger, after: Ledger) -> dict[str, float]:
+    """The ledger at the end of a phase [J]: the first row `after` it, without what bodies that waited gain there.
+
+    Its own last row may be as long before its end as its rows are apart.
+    """
+    if not after.kept.sums:
+        return ledger.energy()
+    found = after.energy(0)
+    given = after.initial_energy - ledger.initial_energy if ledger.kept.sums else 0.0
+    return {**found, "initial": found["initial"] - given, "kinetic": found["kinetic"] - given}
 
 
 def _one_contact(parts: Sequence[ContactHistory]) -> ContactHistory:
