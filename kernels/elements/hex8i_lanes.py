@@ -257,12 +257,12 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         force_out: wp.array(dtype=R),
     ):
         """Four lanes, 0 to 3, compute the element of a thread. Returns whether a lane's points flow."""
+        history = read_row(history_out, wp.static(size) * lane, e)  # first, because it takes longest
         a = lane ^ (lane >> 1)  # corners run around the faces
         x0, _d0, x1, _d1 = load_corners(points, pool, patches, e, a, first, exponent)
         m = material_of(patches.corner[0, e], patches.corner[1, e])
         H, q, W = kept(thread, force_out)
         warp_barrier()
-        history = read_row(history_out, wp.static(size) * lane, e)
         right = wp.where((lane & 1) != 0, R(1.0), R(-1.0))
         far = wp.where(lane > 1, R(1.0), R(-1.0))
         xi, eta = column_place(lane)

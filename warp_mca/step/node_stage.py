@@ -135,11 +135,15 @@ class NodeStage(Actor):
         self, kernel: Any, count: int, inputs: list[Any], state: State, split: Split, records: bool, pressed: bool
     ) -> None:
         """Launch a kernel for ranges of nodes; where these are `pressed`, it also keeps the greatest normal force."""
+        first, data, *others = inputs
+        read = [data.inverse_mass, data.first_slots, data.more_slots, data.role, data.frames]
         moved = self.moved(state, records)
+        written = [moved.nodal_force, moved.u, moved.v, moved.v_before, moved.speed_square]
 
         def launch(part: slice) -> None:
             keepers = node.KEEPERS if pressed and len(state.normal_force) and part.start == 0 else 0
-            outputs, threads = [moved, state.normal_force if keepers else None], part.stop - part.start + keepers
-            wp.launch(kernel, threads, inputs=[part.start, part.stop, *inputs], outputs=outputs, block_dim=BLOCK_DIM)
+            outputs, threads = [*written, state.normal_force if keepers else None], part.stop - part.start + keepers
+            given = [part.start, part.stop, first, *read, *others]
+            wp.launch(kernel, threads, inputs=given, outputs=outputs, block_dim=BLOCK_DIM)
 
         split(count, launch, NODES)
