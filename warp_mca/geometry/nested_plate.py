@@ -57,9 +57,7 @@ class NestedPlate:
         validate.plain(self)
         name = "NestedPlate"
         validate.positive(name, length=self.length, width=self.width, height=self.height, core_size=self.core_size)
-        validate.entries(name, 2, core=self.core)
-        for value in self.core:
-            validate.counts(name, core=value)
+        validate.entries(name, 2, validate.counts, core=self.core)
         validate.counts(name, core_depth=self.core_depth, ratio=self.ratio, shell=self.shell, extension=self.extension)
         if self.ratio < 2:
             raise bad_value(f"{name}.ratio", self.ratio, "give 2 or more")

@@ -72,8 +72,7 @@ class Body:
             check_law(material)
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
-        if self.kinematics not in ("corotational", "finite"):
-            raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
+        validate.choice(f"Body {self.name}", ("corotational", "finite"), kinematics=self.kinematics)
         validate.flags(f"Body {self.name}", rigid=self.rigid, exact_mass=self.exact_mass)
         validate.vectors(
             f"Body {self.name}",
