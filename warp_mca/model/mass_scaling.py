@@ -105,9 +105,8 @@ class _Slow:
 
     def __init__(self, parts: Assembly, k: int, contact: Array, limit: float) -> None:
         cells, self.mass, self.limit = parts.cells[k], parts.element_mass[k], limit
-        moduli = parts.K[cells.index], parts.G[cells.index]
-        touched = at_elements(cells.conn, contact)
-        self.mine, self.own = exact_or_bound(cells.element, parts.X, cells.conn, *moduli, self.mass, touched, limit)
+        elements = parts.elements(cells.element, cells.conn, self.mass, contact, cells.index)
+        self.mine, self.own = exact_or_bound(elements, limit)
         self.conn, self.index = cells.conn[self.mine], cells.index[self.mine]
         self.factor = np.ones(len(self.mine))
         self.contact = self.excess = np.zeros(len(self.mine))
