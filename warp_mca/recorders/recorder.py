@@ -201,6 +201,19 @@ class Recorder(Protocol):
         ...
 
 
+class FramesOnly:
+    """Base of recorders that leave out the rows of the history, and need not start or finish."""
+
+    def start(self, info: RunInfo) -> None:
+        """Nothing is to be opened."""
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Nothing is kept of it."""
+
+    def finish(self, ok: bool) -> None:
+        """Nothing is open."""
+
+
 def apart(names: Iterable[str]) -> list[str]:
     """The names, made unique by underscores appended to repeated ones."""
     found: list[str] = []

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.recorders import Cadence
+from warp_mca.recorders.recorder import Cadence, FramesOnly
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.vibration import fitted_frequencies
 
@@ -113,7 +113,7 @@ def rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[A
     return travel(1), travel(0), chain.kinetic_energy(end.theta, end.theta_dot)
 
 
-class _Ends:
+class _Ends(FramesOnly):
     """A recorder that keeps how far the end of each link has travelled.
 
     The sum of the history's velocities would not do: links vibrate faster than rows are written, in mixed precision at
@@ -145,12 +145,6 @@ class _Ends:
         for link, nodes in self._nodes.items():
             here = frame.points[link][nodes].astype(np.float64).mean(axis=0)
             self.travel[link] = here - self._first.setdefault(link, here)
-
-    def history(self, rows: object) -> None:
-        """Not used."""
-
-    def finish(self, succeeded: bool) -> None:
-        """Nothing to close."""
 
 
 @case(

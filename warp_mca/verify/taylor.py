@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.recorders import Cadence
+from warp_mca.recorders.recorder import Cadence, FramesOnly
 from warp_mca.verify.case import Row, Setup, case
 
 if TYPE_CHECKING:
-    from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.recorders.recorder import Frame
 
 
-class _Foot:
+class _Foot(FramesOnly):
     """A recorder that keeps the final shape of `taylor_bar`.
 
     Attributes:
@@ -32,9 +32,6 @@ class _Foot:
         self._nodes: NDArray[np.intp] | None = None
         self.length = self.radius = math.nan
 
-    def start(self, info: RunInfo) -> None:
-        """Nothing to prepare."""
-
     def frame(self, frame: Frame) -> None:
         """Choose the rim in the first frame, measure in each."""
         x, y, z = np.asarray(frame.points["bar"], dtype=np.float64).T
@@ -42,12 +39,6 @@ class _Foot:
         if self._nodes is None:
             self._nodes = np.flatnonzero((x > 0.9999 * self._end) & (distance > 0.999 * self._rim))
         self.length, self.radius = float(np.ptp(x)), float(distance[self._nodes].mean())
-
-    def history(self, rows: object) -> None:
-        """Not used."""
-
-    def finish(self, succeeded: bool) -> None:
-        """Nothing to close."""
 
 
 @case(
