@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.blocks import growth
 from warp_mca.geometry.box import Box
@@ -19,7 +20,6 @@ from warp_mca.geometry.recipe import check_size
 from warp_mca.geometry.refinement import refined_count
 from warp_mca.geometry.shape_volume import with_volumes
 
-Array = NDArray[np.float64]
 Axes = tuple[Array, Array, Array]
 
 

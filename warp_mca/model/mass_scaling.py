@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.stable_step import StableStep, at_elements, exact_or_bound, switching
 from warp_mca.scene import Scene, Surface
-
-Array = NDArray[np.float64]
 
 # Relative error of the first force peak over the mass added where bodies strike, as a share of the lightest of them;
 # measured, see docs/decisions.md.

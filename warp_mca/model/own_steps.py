@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import chunks
 from warp_mca.model.stable_step import BATCH, KEY, Elements, step_of
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
 
-Array = NDArray[np.float64]
 
 ALIKE = 1e-6  # of its extent, within which elements are of one shape
 MARGIN = 1e-3  # share by which elements of one shape may differ in their step, up to an aspect ratio of 1 / 1000

@@ -9,12 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.physics.elements import Element
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
 MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem takes 50 us
@@ -52,10 +50,10 @@ class Elements:
         element: their formulation.
         X: positions of the nodes [m], shape (node_count, 3), float64.
         conn: nodes of each element, shape (element_count, corners), int32.
-        K, G: moduli [Pa], shape (element_count,).
-        mass: lumped masses [kg], shape (element_count, corners).
-        contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,).
-        index: number that each element goes by, shape (element_count,).
+        K, G: moduli [Pa], shape (element_count,), float64.
+        mass: lumped masses [kg], shape (element_count, corners), float64.
+        contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,), float64.
+        index: number that each element goes by, shape (element_count,), int32.
     """
 
     element: Element

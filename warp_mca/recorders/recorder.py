@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from warp_mca.scene import Scene
 
 Float = NDArray[np.float32]
-Index = NDArray[np.int32]
 
 DISK_RESERVE = 64 << 20  # disk space that recorders leave free for the results [byte]
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.vibration import fitted_frequencies
 from warp_mca.verify.waves import frequency
-
-Array = NDArray[np.float64]
 
 E, NU, RHO = 200e9, 0.3, 7800.0  # of the beam [Pa], [-], [kg/m^3]
 SIDE, LENGTH = 0.02, 0.1  # [m]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.recorders.recorder import Cadence, FramesOnly
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.vibration import fitted_frequencies
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.recorders.recorder import Frame, RunInfo
 
-Array = NDArray[np.float64]
 
 E, RHO, LENGTH, SIDE = 70e9, 2700.0, 1.0, 0.01  # of the spinning rod [Pa], [kg/m^3], [m], [m]
 PACE = math.sqrt(E / RHO) / LENGTH  # of waves along it [1/s]

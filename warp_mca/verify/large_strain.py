@@ -6,13 +6,11 @@ import dataclasses
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.material import NU, SIGMA_Y, SIZE, E, imposed_course, integrated_stress
-
-Array = NDArray[np.float64]
 
 STRAIN = 0.08  # greatest axial strain [-]
 

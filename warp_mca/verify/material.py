@@ -6,12 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
-
-Array = NDArray[np.float64]
 
 E, NU, SIGMA_Y, E_T = 200e9, 0.3, 400e6, 20e9  # the defaults of the scenes
 H = E * E_T / (E - E_T)

@@ -6,15 +6,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
     from warp_mca.rigid.swing import Swing
 
-Array = NDArray[np.float64]
 
 SPAN = 1.0  # of the free swings [s]
 ROUND_OFF = 1e-12

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.scenes.spinning_top import inertia
 from warp_mca.verify.case import Row, Setup, case, crossings
 from warp_mca.verify.hinges import LENGTH, SPAN, THETA, THETA_DOT, rigid_pendulum
 from warp_mca.verify.impact import FINITE, HERTZ, STEEL, hertz, peak_and_duration
-
-Array = NDArray[np.float64]
 
 RATE = 20.0  # of the tops' precession [rad/s]
 ROUND_OFF = 1e-12

@@ -7,12 +7,10 @@ import math
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
-
-Array = NDArray[np.float64]
 
 ALUMINIUM = mca.Elastic(E=70e9, nu=0.0, rho=2700.0)
 

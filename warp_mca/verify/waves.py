@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case, crossings
-
-Array = NDArray[np.float64]
 
 
 def _stress(result: mca.Result, position: float, component: int = 0) -> Array:
