@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import pytest
 from flying_bars import FlyingBars
 
@@ -17,6 +19,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if not warp.is_cuda_available():
         for item in marked:
             item.add_marker(pytest.mark.skip(reason="needs a CUDA device"))
+
+
+@pytest.fixture
+def register() -> Iterator[Callable[..., object]]:
+    """`warp_mca.register`; after the test the tables of kinds are as they were before it."""
+    from warp_mca.registration import TABLES, register
+
+    tables = [table.entries for table in TABLES.values()]
+    before = [dict(table) for table in tables]
+    yield register
+    for table, entries in zip(tables, before, strict=True):
+        table.clear()
+        table.update(entries)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements import hex8
 from warp_mca.kernels.elements.rotation import nearest_rotation
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.model.stable_step import stable_step
+from warp_mca.model.stable_step import Elements, stable_step
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.scene.materials import Elastic, J2Bilinear
@@ -183,7 +183,9 @@ def test_eigenvalues_bound_each_other_and_meet_the_cubes_closed_form():
     exact = largest_eigenvalues(x, *moduli, mass)
     assert (eigenvalue_bounds(x, *moduli, mass) >= exact).all()
     conn = np.arange(1600).reshape(200, 8)
-    found = stable_step(ELEMENTS["hex8"], x.reshape(-1, 3), conn, *moduli, mass, np.zeros(200), np.arange(200))
+    found = stable_step(
+        Elements(ELEMENTS["hex8"], x.reshape(-1, 3), conn, *moduli, mass, np.zeros(200), np.arange(200))
+    )
     assert found.element == exact.argmax()
     assert found.dt == pytest.approx(2.0 / np.sqrt(exact.max()), rel=1e-12)
     cube = 1e-3 * CUBE[None]  # uniform dilatation is its fastest mode: energy 9 K / 2 on masses of 1/8 rho h^3

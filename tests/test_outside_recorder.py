@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -102,8 +103,8 @@ def test_it_sees_a_model_file_with_steps_of_several_rates():
     assert table("peak.csv")[:, 1].max() > 1e5
 
 
-def test_a_registered_one_goes_by_its_name(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules["warp_mca.recorders"].RECORDERS, "Peak", Peak)
+def test_a_registered_one_goes_by_its_name(register: Callable[..., object]):
+    register(Peak)
     assert main(["run", "block.py", "--out", "a", "--recorder", "Peak"]) == 0
     assert len(table("peak.csv")) > 2
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -50,10 +51,10 @@ class Again(ContactLaw):
 
 
 @pytest.fixture
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object], monkeypatch: pytest.MonkeyPatch) -> None:
     """The one registration of each."""
-    monkeypatch.setitem(CONTACT_LAWS, "Stiffening", Stiffening)
-    monkeypatch.setitem(CONTACT_LAWS, "Again", Again)
+    register(Stiffening)
+    register(Again)
     monkeypatch.setitem(sys.modules, "again", SimpleNamespace(force=penalty.force, energy=penalty.energy))
 
 

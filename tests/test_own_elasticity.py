@@ -3,6 +3,7 @@
 The energy lambda tr(e)^2 / 2 + mu e : e + E_f (a . e a)^2 / 2 with fibres along a = (1, 0, 0) of the reference.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -16,7 +17,6 @@ from test_own_element import registered as plain_tetrahedra  # noqa: F401 (a fix
 
 import warp_mca as mca
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.scene.materials import MATERIALS
 from warp_mca.step.output import NodalStress
 from warp_mca.step.state_figures import max_plastic_strain
 
@@ -101,9 +101,9 @@ def cube() -> mca.Mesh:
 
 
 @pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object]) -> None:
     """The one registration."""
-    monkeypatch.setitem(MATERIALS, "Fibred", Fibred)
+    register(Fibred)
 
 
 @pytest.mark.parametrize(("element", "kinematics", "tolerance"), KINDS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -15,7 +16,6 @@ from test_elements import STEEL, energy, held_of
 import warp_mca as mca
 from warp_mca.geometry.cell_types import TETRAHEDRON
 from warp_mca.geometry.degenerate import tetrahedral
-from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.cells import body_cells
 from warp_mca.recorders import UsdFile, VtkHdfFile
 from warp_mca.step.output import NodalStress
@@ -28,9 +28,9 @@ LENGTH, SIDE, SPEED = 0.1, 0.005, 2.0  # of the bar [m], [m/s]
 
 
 @pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object]) -> None:
     """The one registration."""
-    monkeypatch.setitem(ELEMENTS, NAME, LinearTet())
+    register(LinearTet())
 
 
 @pytest.mark.parametrize("kinematics", ["corotational", "finite"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from test_joint import BAR, HEAVY, SOFT
 
 import warp_mca as mca
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.joints import JOINTS, Joint
+from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Side, Ties, coincident
 
 NORMAL = np.array([0.0, 0.8, 0.6])
@@ -33,9 +34,9 @@ class Planar(Joint):
 
 
 @pytest.fixture
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object]) -> None:
     """The one registration."""
-    monkeypatch.setitem(JOINTS, "Planar", Planar)
+    register(Planar)
 
 
 def pair(normal: Vec3 = tuple(NORMAL), **change) -> mca.Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
@@ -58,9 +59,9 @@ KINDS = [
 
 
 @pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object]) -> None:
     """The one registration."""
-    monkeypatch.setitem(MATERIALS, "Voce", Voce)
+    register(Voce)
 
 
 def step(e: float, eps_p: float, p: float) -> tuple[float, float]:

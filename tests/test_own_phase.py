@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,6 @@ from warp_mca.phases.impact import Impact
 from warp_mca.phases.settle import HalfSteps
 from warp_mca.phases.stretch import Stretch, stretch_ended
 from warp_mca.scene import model_file
-from warp_mca.scene.phases import PHASES
 
 LOOK = 10  # steps
 
@@ -46,10 +45,8 @@ class Viscous:
 
 
 @pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    mca.register(Viscous)
-    yield
-    PHASES.pop("Viscous")
+def registered(register: Callable[..., object]) -> None:
+    register(Viscous)
 
 
 def damped() -> mca.Scene:

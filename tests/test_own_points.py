@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -17,7 +18,6 @@ import warp_mca as mca
 from warp_mca.kernels.elements.formulation import Formulation, force_kernel
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.materials.laws import FLOW_HISTORY, row_count
-from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import ElementStage
 
 METAL = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=50e6, E_t=1e9)
@@ -42,7 +42,7 @@ KERNELS = SimpleNamespace(
 )
 
 
-def scene(monkeypatch: pytest.MonkeyPatch, points: int) -> mca.Scene:
+def scene(register: Callable[..., object], points: int) -> mca.Scene:
     """A bar that flows where it strikes a wall, of elements with so many points."""
 
     class Own(LinearTet):
@@ -51,7 +51,7 @@ def scene(monkeypatch: pytest.MonkeyPatch, points: int) -> mca.Scene:
         def stage(self, block, X, precision):
             return ElementStage(block, precision, KERNELS, points=points)
 
-    monkeypatch.setitem(ELEMENTS, Own.name, Own())
+    register(Own())
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(8, 2, 2))
     bar = mca.Body(name="bar", geometry=box, material=METAL, element=Own.name, velocity=(30.0, 0.0, 0.0))
     wall = mca.RigidPlane(point=(0.02, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -60,9 +60,9 @@ def scene(monkeypatch: pytest.MonkeyPatch, points: int) -> mca.Scene:
     return mca.Scene(name="bar", bodies=(bar,), contacts=(contact,), impact=impact)
 
 
-def test_a_point_has_rows_of_its_own(monkeypatch: pytest.MonkeyPatch):
+def test_a_point_has_rows_of_its_own(register: Callable[..., object]):
     """However many points there are besides; all that reads the history finds it there."""
-    impacts = [finished(scene(monkeypatch, points)) for points in (LAST + 1, 27)]
+    impacts = [finished(scene(register, points)) for points in (LAST + 1, 27)]
     summaries = [result_of(impact).summary for impact in impacts]
     first, second = (impact.state.elements[0].history.numpy() for impact in impacts)
     rows = slice(LAST * HISTORY_SIZE, (LAST + 1) * HISTORY_SIZE)
@@ -76,14 +76,14 @@ def test_a_point_has_rows_of_its_own(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize("points", [1, LAST])
-def test_a_point_without_rows_stops_the_run(points: int, monkeypatch: pytest.MonkeyPatch):
+def test_a_point_without_rows_stops_the_run(points: int, register: Callable[..., object]):
     with pytest.raises(mca.GuardError, match="not a number"):
-        mca.run(scene(monkeypatch, points))
+        mca.run(scene(register, points))
 
 
-def test_plastic_strains_of_all_points_turn_with_the_element(monkeypatch: pytest.MonkeyPatch):
+def test_plastic_strains_of_all_points_turn_with_the_element(register: Callable[..., object]):
     """A quarter turn about z exchanges xx and yy, and yz takes the place of xz."""
-    stage = begun(scene(monkeypatch, 3)).solver.elements[0]
+    stage = begun(scene(register, 3)).solver.elements[0]
     history = np.arange(1.0, 3.0 * HISTORY_SIZE + 1.0)[:, None] * [[1.0, 2.0]]
     turned = stage.rotated(history, np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]] * 2))
     xx, yy, xy, yz, xz, p = history.reshape(3, HISTORY_SIZE, 2).transpose(1, 0, 2)

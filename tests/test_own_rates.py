@@ -5,6 +5,7 @@ sigma_y (1 + (rate / D)^(1 / q)), Cowper and Symonds, Brown University Applied M
 stress of the whole strain, a history of its own, and the time step.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -18,7 +19,6 @@ from test_own_element import registered as linear_tets  # noqa: F401 (the plain 
 
 import warp_mca as mca
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.scene.materials import MATERIALS
 
 HISTORY = ("deviator", "scalar", "scalar", "scalar")  # plastic strain, its equivalent, plastic work, yield stress
 PLASTIC_ROW = 5
@@ -118,9 +118,9 @@ ELEMENTS = ["hex8", "hex8r", "linear_tet"]
 
 
 @pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object]) -> None:
     """The one registration."""
-    monkeypatch.setitem(MATERIALS, "CowperSymonds", STEEL.__class__)
+    register(CowperSymonds)
 
 
 def sheared(rate: float, element: str = "hex8", kinematics: str = "corotational") -> mca.Scene:

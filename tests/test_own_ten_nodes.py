@@ -5,6 +5,7 @@ consistent ones, scaled (Hinton, Rock and Zienkiewicz, Earthquake Engng Struct. 
 in the reference; the strain is linear, taken at the four points of Hammer, Marlowe and Stroud (1956).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -21,14 +22,13 @@ from test_elements import STEEL, energy, held_of
 
 import warp_mca as mca
 from warp_mca.geometry import tetrahedron
-from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, TETRAHEDRON, CellType
+from warp_mca.geometry.cell_types import HEXAHEDRON, TETRAHEDRON, CellType
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.kernels.elements.formulation import OWN, Formulation, force_kernel
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.patterns import mean_frame
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.element import largest
 from warp_mca.recorders import VtkHdfFile
 from warp_mca.step.output import NodalStress
@@ -223,10 +223,10 @@ class Tet10:
 
 
 @pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def registered(register: Callable[..., object]) -> None:
     """The registrations."""
-    monkeypatch.setitem(CELL_TYPES, TEN_NODES.name, TEN_NODES)
-    monkeypatch.setitem(ELEMENTS, Tet10.name, Tet10())
+    register(TEN_NODES)
+    register(Tet10())
 
 
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]

@@ -56,9 +56,8 @@ def build(v: float = 1.0) -> mca.Scene:
 
 
 @pytest.fixture(autouse=True)
-def tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Tables as they were before; a folder with a module and a scene file of the user's own; no figures."""
-    before = {kind: dict(table.entries) for kind, table in TABLES.items()}
+def tables(register: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Tables that are restored; a folder with a module and a scene file of the user's own; no figures."""
     for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)
     monkeypatch.chdir(tmp_path)
@@ -67,16 +66,16 @@ def tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     Path("own_kinds.py").write_text(OWN)
     Path("block.py").write_text(SCENE)
     yield
-    forget(before)
+    forget()
 
 
-def forget(before: dict[str, dict] | None = None) -> None:
+def forget() -> None:
     """As in a new process: the user's modules are not imported, their kinds not registered."""
     for kind, table in TABLES.items():
         kept = {n: v for n, v in table.entries.items() if getattr(v, "__module__", "").startswith("warp_mca.")}
-        entries = before[kind] if before else kept if kind != "element" else dict(ELEMENTS)
-        table.entries.clear()
-        table.entries.update(entries)
+        if kind != "element":
+            table.entries.clear()
+            table.entries.update(kept)
     for name in ("own_kinds", "warp_mca_scene_file_block"):
         sys.modules.pop(name, None)
 

@@ -27,7 +27,7 @@ def test_scene_then_gravity_then_a_plane_say_what_is_up(bars: FlyingBars):
     expected = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
     for scene, up in zip((plain, on_floor, falling, told), expected, strict=True):
         np.testing.assert_allclose(up_of(scene), up, atol=1e-15)
-    with pytest.raises(RequestError, match=r"Scene.up = \(0.0, 0.0, 0.0\): give a vector that is not zero"):
+    with pytest.raises(RequestError, match=r"Scene.up = \(0.0, 0.0, 0.0\): give a direction other than zero"):
         dataclasses.replace(plain, up=(0, 0, 0))
 
 

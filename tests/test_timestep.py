@@ -10,7 +10,7 @@ from warp_mca.model import stable_step as timestep
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.build import build_model
 from warp_mca.model.model import Model
-from warp_mca.model.stable_step import stable_step
+from warp_mca.model.stable_step import Elements, stable_step
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
@@ -181,7 +181,7 @@ def test_worst_of_many_elements_is_found_wherever_it_lies():
         G = K * rng.uniform(0.01, 0.6, n)  # the bound is close for small G only
         mass, contact = lumped_masses(x, rho), rng.uniform(0.0, 1e12, n)
         exact = largest_eigenvalues(x, K, G, mass) + contact
-        found = stable_step(ELEMENTS["hex8"], x.reshape(-1, 3), conn, K, G, mass, contact, np.arange(n))
+        found = stable_step(Elements(ELEMENTS["hex8"], x.reshape(-1, 3), conn, K, G, mass, contact, np.arange(n)))
         assert found.element == exact.argmax()
         assert found.dt == pytest.approx(2.0 / np.sqrt(exact.max()), rel=1e-12)
         assert found.contact_share == pytest.approx(contact[found.element] / exact.max(), rel=1e-12)
@@ -203,7 +203,8 @@ def test_odd_element_is_found_among_many_alike(key: np.ndarray, monkeypatch: pyt
         x[odd] *= larger  # its mass is that of the others
         K[odd] *= stiffer
         exact = largest_eigenvalues(x[odd : odd + 1], K[odd : odd + 1], 0.5 * K[odd : odd + 1], mass[:1])
-        found = stable_step(ELEMENTS["hex8"], x.reshape(-1, 3), conn, K, 0.5 * K, mass, contact, np.arange(n))
+        elements = Elements(ELEMENTS["hex8"], x.reshape(-1, 3), conn, K, 0.5 * K, mass, contact, np.arange(n))
+        found = stable_step(elements)
         assert found.element == odd
         assert found.dt == pytest.approx(2.0 / np.sqrt(exact[0]), rel=1e-12)
 
@@ -258,13 +259,8 @@ def test_steps_of_single_elements_are_lower_bounds(coarse: bool):
     added = np.zeros(len(parts.X))
     added[parts.faces(made.contacts[0].slave).nodes] = 1e12
     (cells,), (mass,) = parts.cells, parts.element_mass
-    contact = added[cells.conn].max(axis=1)
     alone = [
-        stable_step(
-            ELEMENTS["hex8"],
-            parts.X,
-            *(v[k : k + 1] for v in (cells.conn, parts.K, parts.G, mass, contact, cells.index)),
-        ).dt
+        stable_step(parts.elements(cells.element, cells.conn[[k]], mass[[k]], added, cells.index[[k]])).dt
         for k in range(parts.element_count)
     ]
     ratio = parts.element_steps(added, coarse=coarse) / alone

@@ -16,8 +16,6 @@ from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.records.extremes import add_normal_force
 
-wp.set_module_options({"enable_backward": False})
-
 BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
 LANES = 4  # GPU threads per master node, which share the faces around it
 

@@ -2,8 +2,6 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 MOST = 32  # faces through which an edge is followed at most
 AHEAD = 1.0e-5  # distance behind a face at which the next ray starts, as a share of the edge's length
 

@@ -7,8 +7,6 @@ import warp as wp
 
 from warp_mca.kernels.contact.laws import law_functions
 
-wp.set_module_options({"enable_backward": False})
-
 
 @cache
 def dashpot_function(law: str) -> Any:

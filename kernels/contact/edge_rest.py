@@ -18,9 +18,6 @@ from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, slides_at, usual_depth
 
-wp.set_module_options({"enable_backward": False})
-
-
 _FLAT = 0.9  # least cosine between the reversed normal of a face that rests and that of the side
 _SLOW = 5e-5  # largest motion into the side in a step with which a crossing begins to rest, as a share of an edge
 _SLIDES = 0.01  # the same for its whole motion

@@ -11,8 +11,6 @@ from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def slid_off(e: int, spring: Spring) -> bool:

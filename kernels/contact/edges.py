@@ -4,8 +4,6 @@ import warp as wp
 
 from warp_mca.kernels.contact.nearest import Master
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class SlaveFaces:

@@ -5,8 +5,6 @@ import warp as wp
 from warp_mca.kernels.contact.projection import interpolate, project_on_face
 from warp_mca.kernels.contact.spring import FAR
 
-wp.set_module_options({"enable_backward": False})
-
 # Lengths, as fractions of the edges of a face
 _FOLD = 0.01  # extra depth allowed at once when a node slides through a fold into the rising neighbour
 SLACK = 1e-4  # growth of the depth in a step allowed beyond the motion of the node

@@ -2,8 +2,6 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def force(depth: wp.float64, k: wp.float64, parameters: wp.array2d(dtype=wp.float64), s: int) -> wp.float64:

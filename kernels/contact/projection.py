@@ -2,8 +2,6 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 # Faces reach this far beyond their edges: a node that leaves a face of a dented surface may project beside both.
 EDGE_REACH = 1.02
 

@@ -8,8 +8,6 @@ import warp as wp
 from warp_mca.kernels.contact.projection import interpolate, project_on_face, weights_at
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
-wp.set_module_options({"enable_backward": False})
-
 # Entries of the flag array that the host reads with every batch of records.
 FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
 

@@ -11,8 +11,6 @@ from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, open_function, rest_function, spring_function
 from warp_mca.kernels.records.extremes import add_normal_force
 
-wp.set_module_options({"enable_backward": False})
-
 _SHARP = 0.7  # a node has turned a sharp edge if successive normals have a smaller cosine
 
 

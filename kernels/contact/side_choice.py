@@ -11,8 +11,6 @@ from warp_mca.kernels.contact.settle import Touch
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function
 
-wp.set_module_options({"enable_backward": False})
-
 _ROUNDING = 1e-6  # a node penetrates a side beyond this depth, as a fraction of an edge
 
 

@@ -11,8 +11,6 @@ from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.contact.way_back import OPPOSES, slides_at, usual_depth
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def belongs_to_other_side(

@@ -27,8 +27,6 @@ from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
-wp.set_module_options({"enable_backward": False})
-
 
 @cache
 def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> Any:

@@ -9,8 +9,6 @@ from warp_mca.kernels.contact.dashpot import dashpot_function
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.laws import LINEAR, law_functions
 
-wp.set_module_options({"enable_backward": False})
-
 FAR = 1e30  # larger than any distance [m]
 ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
 

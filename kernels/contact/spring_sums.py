@@ -21,8 +21,6 @@ from warp_mca.kernels.records.columns import (
 )
 from warp_mca.kernels.records.ledger import run_of
 
-wp.set_module_options({"enable_backward": False})
-
 Columns = wp.types.vector(length=PASS_COLUMNS, dtype=wp.float64)
 
 

@@ -9,8 +9,6 @@ from warp_mca.kernels.contact.edges import Surfaces, is_on_rim, lies_below, oppo
 from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, nearest_face
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
-wp.set_module_options({"enable_backward": False})
-
 OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
 _USUAL = 4.0  # largest depth of a node that comes over an edge, over the depth at which a spring bears the recent force
 _FADES = 0.99  # share of a recent force that is kept from step to step

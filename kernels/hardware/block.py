@@ -4,8 +4,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def block_sum(x: Any):

@@ -10,8 +10,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 MIN_ARCH = 90  # compute capability times ten of the first devices that support it
 
 EARLY: set[str] = set()  # keys of kernels that wait

@@ -15,8 +15,6 @@ ROW = PATCH + 1  # one force component of all elements at one corner, and a zero
 FORCES = 24 * ROW
 HEADS = 4  # patches whose heads are in shared memory: the present one, the next two, and one that is being copied
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func_native("__syncthreads();")
 def barrier():

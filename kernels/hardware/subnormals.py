@@ -6,8 +6,6 @@ flush them to zero as well.
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 # Of x86-64's MXCSR, which each thread has to itself: results that are subnormal become zero, and so do operands.
 _FLUSH = "0x8040u"
 

@@ -14,8 +14,6 @@ from warp_mca.kernels.nodes.constraint import table_value
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.records.half_steps import add_half_steps
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Bases:

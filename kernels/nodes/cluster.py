@@ -22,8 +22,6 @@ from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.nodes.coupling import Response, inertia_about
 from warp_mca.kernels.records.extremes import keep_speed
 
-wp.set_module_options({"enable_backward": False})
-
 SUM_COUNT = 20  # sums over a cluster: q (1), q r (3), q r r (6), s q (1), s q r (3), s q r r (6); the momenta follow
 TOTALS = SUM_COUNT + 6
 Sums = wp.types.vector(length=TOTALS, dtype=wp.float64)

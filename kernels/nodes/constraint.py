@@ -18,8 +18,6 @@ from warp_mca.kernels.nodes.gather import (
 )
 from warp_mca.kernels.records.half_steps import add_half_steps
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Bonds:

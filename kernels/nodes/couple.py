@@ -21,8 +21,6 @@ from warp_mca.kernels.nodes.hinge import (
     side_of,
 )
 
-wp.set_module_options({"enable_backward": False})
-
 Momenta = wp.types.vector(length=12, dtype=wp.float64)  # p and L of the first cluster, then of the second
 
 

@@ -13,8 +13,6 @@ weld.
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Response:

@@ -13,8 +13,6 @@ import warp as wp
 
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Frames:

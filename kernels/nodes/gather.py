@@ -18,8 +18,6 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames, turn_function
 from warp_mca.kernels.records.extremes import keep_speed
 
-wp.set_module_options({"enable_backward": False})
-
 # In the role of a node, whose lowest three bits are its axes at rest:
 BOUND = 8  # another kernel than `node.integrate_kernel` advances it
 TOUCHABLE = 16  # it may have a nodal force

@@ -9,8 +9,6 @@ import warp as wp
 from warp_mca.kernels.nodes.cluster import Clusters, Mean, Sums, mean_response
 from warp_mca.kernels.nodes.coupling import Inverse, inverse_of, joint_impulses, sum_of, turned
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Side:

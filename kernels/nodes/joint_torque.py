@@ -15,10 +15,9 @@ import warp as wp
 
 from warp_mca.kernels.hardware.block import block_sum, wait_for_block
 from warp_mca.kernels.nodes.constraint import table_value
+from warp_mca.kernels.nodes.slide import place_before
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.records.half_steps import add_half_steps
-
-wp.set_module_options({"enable_backward": False})
 
 SOLVES = 64  # steps of Newton's method at most
 PRECISION = 1e-14  # change of the rate, relative, at which the steps end
@@ -56,14 +55,6 @@ def inverse(S: wp.float64) -> wp.float64:
 
 
 @wp.func
-def arm(
-    i: int, X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), v: wp.array(dtype=wp.vec3d), drift: wp.float64
-) -> wp.vec3d:
-    """Position of a node before it moved by drift v [m]."""
-    return X[i] + u[i] - drift * v[i]
-
-
-@wp.func
 def side_motion(
     begin: int,
     end: int,
@@ -84,7 +75,7 @@ def side_motion(
     m_y = wp.float64(0.0)
     for k in range(begin + lane, end, wp.block_dim()):
         i = node[k]
-        x = arm(i, X, u, v, drift)
+        x = place_before(X, u, v, i, drift)
         m += mass[i]
         m_x += mass[i] * x[0]
         m_y += mass[i] * x[1]
@@ -95,7 +86,7 @@ def side_motion(
     S = wp.float64(0.0)
     for k in range(begin + lane, end, wp.block_dim()):
         i = node[k]
-        x = arm(i, X, u, v, drift)
+        x = place_before(X, u, v, i, drift)
         r_x = x[0] - c_x
         r_y = x[1] - c_y
         spin += mass[i] * (r_x * v[i][1] - r_y * v[i][0])
@@ -147,7 +138,7 @@ def twist(
     turn = kick * couple * inverse(motion[3])
     for k in range(begin + lane, end, wp.block_dim()):
         i = node[k]
-        x = arm(i, X, u_out, v_out, drift)
+        x = place_before(X, u_out, v_out, i, drift)
         change = wp.vec3d(turn * (motion[1] - x[1]), turn * (x[0] - motion[0]), wp.float64(0.0))
         u_out[i] = u_out[i] + drift * change
         v_out[i] = v_out[i] + change

@@ -27,8 +27,6 @@ from warp_mca.kernels.nodes.gather import (
 )
 from warp_mca.kernels.records.extremes import keep_normal_force
 
-wp.set_module_options({"enable_backward": False})
-
 KEEPERS = 32  # threads that keep the greatest normal force of each scene
 
 

@@ -19,8 +19,6 @@ from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
 from warp_mca.kernels.nodes.symmetric import factorise
 
-wp.set_module_options({"enable_backward": False})
-
 Wrench = wp.types.vector(length=6, dtype=wp.float64)  # force and moment
 
 

@@ -20,8 +20,6 @@ import warp as wp
 
 from warp_mca.kernels.nodes.cluster import Mean
 
-wp.set_module_options({"enable_backward": False})
-
 SOLVES = 50  # steps of Newton's method at most
 ROUNDING = 1e-15  # change of the rotation of a step, relative, at which the steps end
 

@@ -11,8 +11,6 @@ from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidStep
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def find_cluster(

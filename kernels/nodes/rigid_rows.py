@@ -13,8 +13,6 @@ from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, f
 from warp_mca.kernels.nodes.rigid_pins import move_pin, pin_lightness
 from warp_mca.kernels.nodes.symmetric import solve
 
-wp.set_module_options({"enable_backward": False})
-
 SOLVES = 50  # steps of Newton's method at most
 
 

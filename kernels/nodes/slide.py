@@ -10,8 +10,6 @@ import warp as wp
 
 from warp_mca.kernels.records.extremes import keep_speed
 
-wp.set_module_options({"enable_backward": False})
-
 SWEEPS = 200  # greatest number of sweeps over the sliders of a rail, which disturb each other where they share nodes
 TOLERANCE = 1e-12  # distance from the rail at which sweeps end, as a share of the segment
 

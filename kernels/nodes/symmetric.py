@@ -2,8 +2,6 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 DEPENDENT = 1e-10  # a row is dependent if its pivot is below this share of its diagonal entry
 
 

@@ -18,8 +18,6 @@ from warp_mca.kernels.nodes.gather import (
     nodal_force_function,
 )
 
-wp.set_module_options({"enable_backward": False})
-
 LANES = 8  # GPU threads per master node; it has about 25 slaves where its cells are three times as wide
 
 

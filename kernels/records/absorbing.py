@@ -6,8 +6,6 @@ from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.records.columns import ABSORBED, BEYOND_WORK
 from warp_mca.kernels.records.ledger import run_of
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.kernel(enable_backward=False)
 def sum_absorbed(

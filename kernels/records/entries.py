@@ -4,8 +4,6 @@ import warp as wp
 
 from warp_mca.kernels.records.ledger import run_of
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.kernel(enable_backward=False)
 def sum_entries(

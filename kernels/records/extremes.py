@@ -5,8 +5,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 # Rows of the extremes of elements:
 STRAIN_SQUARE, VOLUME_LOSS = 0, 1
 

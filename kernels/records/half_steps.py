@@ -4,8 +4,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.func
 def add_half_steps(k: int, before: Any, after: Any, sum_out: wp.array(dtype=Any), after_out: wp.array(dtype=Any)):

@@ -22,8 +22,6 @@ from warp_mca.kernels.records.columns import (
     STRAIN,
 )
 
-wp.set_module_options({"enable_backward": False})
-
 SUM_WIDTH = 256  # runs of a scene at most
 RUN = 256  # least number of entries of a run, one for each thread of a block
 

@@ -4,8 +4,6 @@ import warp as wp
 
 from warp_mca.kernels.contact.spring import Spring
 
-wp.set_module_options({"enable_backward": False})
-
 vec6 = wp.types.vector(6, wp.float32)  # xx, yy, zz, xy, yz, xz
 OPEN, SLIP, STICK = 0, 1, 2  # states of a contact point
 _STICKING = 0.999999  # share of mu F_n below which a point sticks

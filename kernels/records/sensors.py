@@ -9,8 +9,6 @@ from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames, turn_function
 
-wp.set_module_options({"enable_backward": False})
-
 LANES = 256  # threads of a block on a GPU; one on a CPU
 
 

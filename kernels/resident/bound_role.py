@@ -13,8 +13,6 @@ from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes, gather_function, hold_node, next_velocity
 from warp_mca.kernels.resident.patch_role import THREADS
 
-wp.set_module_options({"enable_backward": False})
-
 KEEPERS = 32  # the last threads, which keep the greatest normal force
 MOST_BOUND = THREADS - KEEPERS
 

@@ -18,8 +18,6 @@ from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 
-wp.set_module_options({"enable_backward": False})
-
 _, exchange = shared_functions("float64")
 
 

@@ -16,8 +16,6 @@ from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes, gather_function, hold_node, next_velocity
 
-wp.set_module_options({"enable_backward": False})
-
 _, exchange = shared_functions("float64")
 
 

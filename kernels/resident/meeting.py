@@ -7,8 +7,6 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
-
 # Entries of the counts, each in a line of the cache of its own: blocks whose forces are stored, blocks whose nodes have
 # moved, blocks that have ended.
 FORCES, NODES, ENDED = 0, 32, 64

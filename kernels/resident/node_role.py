@@ -14,8 +14,6 @@ from warp_mca.kernels.nodes.gather import TOUCHABLE, NodeData, NodeState, hold
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Nodes:

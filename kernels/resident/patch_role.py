@@ -35,8 +35,6 @@ from warp_mca.kernels.nodes.floating import seen
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
 from warp_mca.kernels.resident.node_role import Nodes
 
-wp.set_module_options({"enable_backward": False})
-
 THREADS = 2 * PATCH  # of a block
 RESIDENT = 2  # blocks of threads that a multiprocessor holds, by the registers they need
 ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread

@@ -24,8 +24,6 @@ from warp_mca.kernels.nodes.hinge import (
 from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.kernels.resident.patch_role import THREADS
 
-wp.set_module_options({"enable_backward": False})
-
 WARPS = THREADS // 32
 COLUMNS = 16  # of a row of values that are summed together
 

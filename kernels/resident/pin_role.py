@@ -44,8 +44,6 @@ from warp_mca.kernels.resident.pin_joint import (
     put_pinned,
 )
 
-wp.set_module_options({"enable_backward": False})
-
 MOST_PINNED = THREADS  # nodes of a cluster
 
 Half = wp.types.vector(length=COLUMNS // 2, dtype=wp.float64)

@@ -26,8 +26,6 @@ from warp_mca.kernels.resident.node_role import Nodes, free_role
 from warp_mca.kernels.resident.patch_role import RESIDENT, THREADS, patch_role
 from warp_mca.kernels.resident.pin_role import pin_role
 
-wp.set_module_options({"enable_backward": False})
-
 
 @wp.struct
 class Roles:

@@ -12,14 +12,12 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.knobs import EXCLUDED, Trial
 from warp_mca.accuracy.measure import Bench, Measured
 from warp_mca.accuracy.variant import Variant
-
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
 
 BETTER = 0.98  # error over that of a cheaper combination below which more is worth its cost [-]
 WORST = 0.2  # foreseen error of combinations that are not worth running [-]

@@ -17,12 +17,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.accuracy.figures import BOUND
 from warp_mca.accuracy.store import Family, Process
-
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
 
 NOISE = 2e-3  # least noise of the limits [-]
 INTERVAL = 5e-3  # the same of durations, which are known to the output interval [-]

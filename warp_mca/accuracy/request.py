@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from warp_mca.accuracy.typed import check_names, check_values
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.phases.rate_groups import check_multi_rate
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Scene
+from warp_mca.scene.phases import is_mass_scaling
 
 LEAST, MOST = 1e-3, 0.5  # shares that can be asked for [-]
 REMEDY = f"give a share from {LEAST:.1%} to {MOST:.0%}, as 2% or 0.02"
@@ -33,7 +35,13 @@ class Accuracy:
         if not (validate.is_number(self.share) and LEAST <= self.share <= MOST):
             raise bad_value("accuracy", self.share, REMEDY)
         validate.kinds("Accuracy", Mapping, "give a mapping of values by name", typed=self.typed)
-        check_values(self.typed)
+        for name, value in self.typed.items():
+            if name == "multi_rate":
+                check_multi_rate(value)
+            elif name in _VALUES:
+                allowed, remedy = _VALUES[name]
+                if not allowed(value):
+                    raise bad_value(f"Accuracy.typed[{name!r}]", value, remedy)
 
     @property
     def percent(self) -> str:
@@ -69,5 +77,41 @@ def check_accuracy(scene: Scene, asked: float | str | Accuracy | None) -> None:
     Raises:
         RequestError: it is not an accuracy, or a name is unknown.
     """
-    if asked is not None:
-        check_names(scene, accuracy_of(asked).typed)
+    if asked is None:
+        return
+    known = dict.fromkeys([*_VALUES, "multi_rate", *scene.parameters])
+    for name, value in accuracy_of(asked).typed.items():
+        if name not in known:
+            remedy = f"scene {scene.name} has no such name; choose among {', '.join(known)}"
+            raise bad_value(f"Accuracy.typed[{name!r}]", value, remedy)
+
+
+def _is_positive(value: object) -> bool:
+    return validate.is_number(value) and value > 0.0  # pyright: ignore[reportOperatorIssue]
+
+
+def _is_scale(value: object) -> bool:
+    return _is_positive(value) and value <= 1.0  # pyright: ignore[reportOperatorIssue]
+
+
+def _is_penalty(value: object) -> bool:
+    return value is None or _is_positive(value) or _is_one_of("auto")(value)
+
+
+def _is_mass_scaling(value: object) -> bool:
+    return value is None or is_mass_scaling(value)
+
+
+def _is_one_of(*names: str) -> Callable[[object], bool]:
+    return lambda value: isinstance(value, str) and value in names
+
+
+# Whether a value is allowed, and the remedy; None stands for no added mass and the default springs.
+_VALUES: Mapping[str, tuple[Callable[[object], bool], str]] = {
+    "refine": (_is_positive, "give a finite number above 0"),
+    "penalty": (_is_penalty, "give a finite number above 0, auto or None"),
+    "mass_scaling": (_is_mass_scaling, "give a factor of 1 or above for the stable step, or a step as 2e-8s"),
+    "precision": (_is_one_of("mixed", "float64"), "choose mixed or float64"),
+    "time_step_scale": (_is_scale, "give a number above 0, at most 1"),
+    "element": (lambda value: _is_one_of(*ELEMENTS)(value), f"choose among {', '.join(ELEMENTS)}"),
+}

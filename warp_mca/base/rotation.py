@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
 
 
 def rotation_matrix(rotation_vector: Sequence[float] | Array) -> Array:

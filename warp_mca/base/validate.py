@@ -13,6 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from itertools import pairwise
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -118,11 +119,13 @@ def flags(owner: str, /, **values: bool) -> None:
     kinds(owner, bool, "give True or False", **values)
 
 
-def entries(owner: str, count: int, /, **values: tuple) -> None:
-    """Each value must be a tuple of `count` entries."""
+def entries(owner: str, count: int, check: Callable[..., None], /, **values: tuple) -> None:
+    """Each value must be a tuple of `count` entries that pass a check of this module."""
     for name, value in values.items():
         if not (isinstance(value, (tuple, list)) and len(value) == count):
             raise bad_value(f"{owner}.{name}", value, f"give {count} numbers")
+        for entry in value:
+            check(owner, **{name: entry})
 
 
 def vectors(owner: str, /, **values: Sequence[float]) -> None:
@@ -130,6 +133,39 @@ def vectors(owner: str, /, **values: Sequence[float]) -> None:
     for name, value in values.items():
         if not (is_list(value) and len(value) == 3):
             raise bad_value(f"{owner}.{name}", value, "give three finite numbers")
+
+
+def directions(owner: str, /, **values: Sequence[float]) -> None:
+    """Each value must be three finite numbers that are not all zero."""
+    vectors(owner, **values)
+    for name, value in values.items():
+        if not any(value):
+            raise bad_value(f"{owner}.{name}", value, "give a direction other than zero")
+
+
+def table(owner: str, times: Sequence[float], /, **values: Sequence[float]) -> None:
+    """Times must increase, and each value must hold one finite number for each of them."""
+    for name, column in (("times", times), *values.items()):
+        if not is_list(column):
+            raise bad_value(f"{owner}.{name}", column, "give finite numbers")
+        if len(column) != len(times) or not len(times):
+            raise bad_value(f"{owner}.{name}", column, "give one value for each time")
+    if any(b <= a for a, b in pairwise(times)):
+        raise bad_value(f"{owner}.times", times, "list them in increasing order")
+
+
+def choice(owner: str, options: Sequence[str], /, **values: str) -> None:
+    """Each value must be one of the options."""
+    for name, value in values.items():
+        if value not in options:
+            words = f"{', '.join(options[:-1])} or {options[-1]}"
+            raise bad_value(f"{owner}.{name}", value, f"choose {words}")
+
+
+def unique(field: str, names: Sequence[str], what: str) -> None:
+    """The names in that field must differ."""
+    if len(set(names)) < len(names):
+        raise bad_value(field, names, f"give each {what} a name of its own")
 
 
 def kinds(owner: str, kind: type | tuple[type, ...], remedy: str, /, **values: object) -> None:

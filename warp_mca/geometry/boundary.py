@@ -7,10 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Index
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.geometry.cell_types import CELL_TYPES, is_triangle
-
-Index = NDArray[np.int32]
 
 BITS = 20  # of the numbers that nodes get: sums over 600 cells around a node are exact in float64
 

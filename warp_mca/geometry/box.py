@@ -29,14 +29,10 @@ class Box:
 
     def __post_init__(self) -> None:
         validate.plain(self)
-        validate.entries("Box", 3, size=self.size, divisions=self.divisions, origin=self.origin)
-        for value in self.size:
-            validate.positive("Box", size=value)
-        for value in self.divisions:
-            validate.counts("Box", divisions=value)
+        validate.entries("Box", 3, validate.positive, size=self.size)
+        validate.entries("Box", 3, validate.counts, divisions=self.divisions)
         check_size("Box", [self.divisions], divisions=self.divisions)
-        for value in self.origin:
-            validate.finite("Box", origin=value)
+        validate.entries("Box", 3, validate.finite, origin=self.origin)
 
     def refined(self, factor: float) -> Box:
         """The brick with `factor` times as many cells along each edge; even numbers stay even, for a middle plane."""

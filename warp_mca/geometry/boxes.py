@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import CHUNK, chunks
 
-Array = NDArray[np.float64]
 Boxes = tuple[Array, Array]  # least and greatest coordinates of each cell, as from `cell_boxes`
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
 
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 

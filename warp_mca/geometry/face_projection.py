@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.cell_types import is_triangle
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 CANDIDATES = 32  # faces tried for each point, those with the nearest middles
 ITERATIONS = 8  # of Newton's method, which is exact in one on a parallelogram

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.geometry.cell_types import HEXAHEDRON
-
-Array = NDArray[np.float64]
 
 CORNERS = np.array(HEXAHEDRON.natural, dtype=float)
 

@@ -15,11 +15,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.geometry.edit import compact, mirror
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.rings import CORE_BULGE, CORE_RADIUS
-
-Array = NDArray[np.float64]
 
 # All in radii of the rod, counted from the hinge axis.
 ROOT = 1.45  # where the section of the rod begins: 18.8 mm for 13 mm, the middle hinge of the paper's Fig. 11

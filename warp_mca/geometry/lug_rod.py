@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.geometry.lug import HOLE, ROOT, WELD, lug, lug_volume
@@ -38,10 +39,7 @@ class LugRod(Rod):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("start", "end"):
-            value = getattr(self, name)
-            if value not in ("flat", "fork", "eye"):
-                raise bad_value(f"LugRod.{name}", value, "choose flat, fork or eye")
+        validate.choice("LugRod", ("flat", "fork", "eye"), start=self.start, end=self.end)
         if self.tip != "flat" and self.end != "flat":
             raise bad_value("LugRod.end", self.end, "the rod ends in a hemisphere; leave end out, or take tip = flat")
         if self._between_lugs <= 0.0:

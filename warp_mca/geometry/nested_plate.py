@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.blocks import growth
 from warp_mca.geometry.box import Box
@@ -19,7 +20,6 @@ from warp_mca.geometry.recipe import check_size
 from warp_mca.geometry.refinement import refined_count
 from warp_mca.geometry.shape_volume import with_volumes
 
-Array = NDArray[np.float64]
 Axes = tuple[Array, Array, Array]
 
 
@@ -57,9 +57,7 @@ class NestedPlate:
         validate.plain(self)
         name = "NestedPlate"
         validate.positive(name, length=self.length, width=self.width, height=self.height, core_size=self.core_size)
-        validate.entries(name, 2, core=self.core)
-        for value in self.core:
-            validate.counts(name, core=value)
+        validate.entries(name, 2, validate.counts, core=self.core)
         validate.counts(name, core_depth=self.core_depth, ratio=self.ratio, shell=self.shell, extension=self.extension)
         if self.ratio < 2:
             raise bad_value(f"{name}.ratio", self.ratio, "give 2 or more")

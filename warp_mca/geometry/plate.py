@@ -58,16 +58,13 @@ class Plate:
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.positive("Plate", length=self.length, width=self.width, height=self.height, core_size=self.core_size)
-        validate.entries("Plate", 2, core=self.core)
-        for value in self.core:
-            validate.even_counts("Plate", core=value)
+        validate.entries("Plate", 2, validate.even_counts, core=self.core)
         validate.counts("Plate", core_depth=self.core_depth, layers=self.layers)
         validate.counts("Plate", extension=self.extension, extension_z=self.extension_z)
         for name in ("box", "contact"):
             if getattr(self, name) is not None:
                 validate.positive("Plate", **{name: getattr(self, name)})
-        if self.part not in ("whole", "quarter"):
-            raise bad_value("Plate.part", self.part, "choose whole or quarter")
+        validate.choice("Plate", ("whole", "quarter"), part=self.part)
         half = self._half_box
         if 2.0 * half > min(self.length, self.width) * (1.0 + 1e-12):
             raise bad_value("Plate.box", self.box, "it must fit the plate: at most half its length and width")

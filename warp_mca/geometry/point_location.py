@@ -7,13 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry import tetrahedron
 from warp_mca.geometry.boxes import Boxes
 from warp_mca.geometry.cell_types import HEXAHEDRON, MAX_CORNERS, TETRAHEDRON
 from warp_mca.geometry.hexahedron import shape_functions
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 CANDIDATES = 64  # candidate cells for each point: the centres of long thin cells are far away
 OUTSIDE = 0.05  # share of a cell's diagonal by which a point may lie outside: faces on curved surfaces are flat

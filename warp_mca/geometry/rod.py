@@ -67,8 +67,7 @@ class Rod:
         validate.even_counts("Rod", section=self.section)
         validate.counts("Rod", ring=self.ring, axial=self.axial, focus_layers=self.focus_layers)
         validate.finite("Rod", focus_angle=self.focus_angle)
-        if self.tip not in ("flat", "hemisphere"):
-            raise bad_value("Rod.tip", self.tip, "choose flat or hemisphere")
+        validate.choice("Rod", ("flat", "hemisphere"), tip=self.tip)
         if self.tip_layers is not None:
             validate.counts("Rod", tip_layers=self.tip_layers)
         if self.tip == "hemisphere":

@@ -50,8 +50,8 @@ class Select:
         validate.vectors("Select", **given)
         if set(given) not in (({"low", "high"}, {"point", "normal"}) if not self.faces else (set(),)):
             raise bad_value("Select", self.name, "give faces, or low and high of a box, or point and normal of a plane")
-        if self.normal is not None and not any(self.normal):
-            raise bad_value("Select.normal", self.normal, "give a direction other than zero")
+        if self.normal is not None:
+            validate.directions("Select", normal=self.normal)
 
     def nodes(self, mesh: Mesh) -> NDArray[np.int32]:
         """Node indices, sorted, shape (count,), int32.
@@ -79,9 +79,7 @@ class Select:
 def check_selections(owner: str, select: Sequence[Select]) -> None:
     """Raise RequestError unless these are selections with names of their own."""
     validate.members(owner, Select, select=select)
-    names = [item.name for item in select]
-    if len(set(names)) < len(names):
-        raise bad_value(f"{owner}.select", names, "give each selection a name of its own")
+    validate.unique(f"{owner}.select", [item.name for item in select], "selection")
 
 
 def with_selections(mesh: Mesh, select: Sequence[Select]) -> Mesh:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import volumes
@@ -17,7 +18,6 @@ from warp_mca.geometry.quality import volumes
 if TYPE_CHECKING:
     from warp_mca.geometry.recipe import Recipe
 
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # of a ratio: cells that fill their shape that well fill it exactly
 STRANGE = 4.0  # ratio of volumes that no mesh of the shape has: a triangular prism in a cylinder has 2.4

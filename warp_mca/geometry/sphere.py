@@ -55,8 +55,7 @@ class Sphere:
         validate.positive("Sphere", radius=self.radius)
         validate.even_counts("Sphere", section=self.section)
         validate.counts("Sphere", ring=self.ring, pole_layers=self.pole_layers)
-        if self.part not in ("whole", "half", "quarter"):
-            raise bad_value("Sphere.part", self.part, "choose whole, half or quarter")
+        validate.choice("Sphere", ("whole", "half", "quarter"), part=self.part)
         if self.pole_size is not None:
             validate.positive("Sphere", pole_size=self.pole_size)
             if self.pole_size > self._largest_size:

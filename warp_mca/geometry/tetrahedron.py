@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
 
 
 def determinants(x: Array) -> Array:

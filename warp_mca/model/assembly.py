@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
-from warp_mca.model.stable_step import StableStep, at_elements, element_steps, stable_step
+from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
 from warp_mca.physics.contact.surfaces import Faces, make_faces
+from warp_mca.physics.elements import Element
 from warp_mca.physics.elements.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
 from warp_mca.physics.elements.patches import compact_order
 from warp_mca.scene import Point, Scene, Surface
@@ -168,37 +169,29 @@ class Assembly:
 
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
-        added = self.relieved(added)
-        steps = []
-        for part, mass in self.computed():
-            moduli = self.K[part.index], self.G[part.index]
-            contact = at_elements(part.conn, added)
-            steps.append(stable_step(part.element, self.X, part.conn, *moduli, mass, contact, part.index))
-        return min(steps, key=lambda step: step.dt)
+        return min(map(stable_step, self.computed(added)), key=lambda step: step.dt)
 
     def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
         """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
-        added = self.relieved(added)
         steps = np.full(self.element_count, np.inf)  # of elements of rigid bodies
-        for part, mass in self.computed():
-            moduli = self.K[part.index], self.G[part.index]
-            contact = at_elements(part.conn, added)
-            steps[part.index] = element_steps(part.element, self.X, part.conn, *moduli, mass, contact, coarse=coarse)
+        for elements in self.computed(added):
+            steps[elements.index] = element_steps(elements, coarse=coarse)
         return steps
 
-    def relieved(self, added: Array) -> Array:
-        """Eigenvalues that springs add at nodes, with masses less by `relief`."""
-        return added if self.relief is None else added * self.relief
-
-    def computed(self) -> Iterator[tuple[Cells, Array]]:
-        """Cells that are computed, with their lumped masses as `element_mass` has them, less by `relief`."""
+    def computed(self, added: Array) -> Iterator[Elements]:
+        """Elements that are computed, by formulation, with masses less by `relief`."""
+        added = added if self.relief is None else added * self.relief
         for part, own in zip(self.cells, self.element_mass, strict=True):
-            mass = own if self.relief is None else own / self.relief[part.conn]
             kept = ~self.rigid[part.index]
-            if kept.all():
-                yield part, mass
-            elif kept.any():
-                yield Cells(part.element, part.finite, part.conn[kept], part.index[kept]), mass[kept]
+            if kept.any():
+                some = slice(None) if kept.all() else kept  # without a copy
+                conn, index, mass = part.conn[some], part.index[some], own[some]
+                mass = mass if self.relief is None else mass / self.relief[conn]
+                yield self.elements(part.element, conn, mass, added, index)
+
+    def elements(self, element: Element, conn: Index, mass: Array, added: Array, index: Index) -> Elements:
+        """Elements with their moduli, and with what springs add at their nodes."""
+        return Elements(element, self.X, conn, self.K[index], self.G[index], mass, at_elements(conn, added), index)
 
     def where(self, node: int) -> str:
         """Body and place of a node, for errors."""

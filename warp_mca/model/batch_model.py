@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Index
 from warp_mca.base.joining import join, offsets
 from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
 from warp_mca.physics.loads.nodal import check_batch
-
-Index = NDArray[np.int32]
 
 # what the numbers in a model's arrays count, and how many of them a model has
 _COUNTS: dict[str, Callable[[Model], int]] = {
@@ -83,12 +82,9 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
-        _, law, element, finite = kind
         blocks.append(
-            Block(
-                element=element,
-                law=law,
-                finite=finite,
+            replace(
+                next(block for model in models for block in model.blocks if block.kind == kind),
                 conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),
                 first=first,

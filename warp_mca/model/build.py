@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.mass_scaling import check_masses, scale_masses
@@ -31,7 +31,6 @@ from warp_mca.scene import RigidPlane, Scene
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
 
-Array = NDArray[np.float64]
 Grouping = Callable[[Model, OwnSteps], Model]
 
 

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Index
 from warp_mca.base.joining import offsets
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
-
-Index = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.stable_step import StableStep, at_elements, exact_or_bound, switching
 from warp_mca.scene import Scene, Surface
-
-Array = NDArray[np.float64]
 
 # Relative error of the first force peak over the mass added where bodies strike, as a share of the lightest of them;
 # measured, see docs/decisions.md.
@@ -105,9 +103,8 @@ class _Slow:
 
     def __init__(self, parts: Assembly, k: int, contact: Array, limit: float) -> None:
         cells, self.mass, self.limit = parts.cells[k], parts.element_mass[k], limit
-        moduli = parts.K[cells.index], parts.G[cells.index]
-        touched = at_elements(cells.conn, contact)
-        self.mine, self.own = exact_or_bound(cells.element, parts.X, cells.conn, *moduli, self.mass, touched, limit)
+        elements = parts.elements(cells.element, cells.conn, self.mass, contact, cells.index)
+        self.mine, self.own = exact_or_bound(elements, limit)
         self.conn, self.index = cells.conn[self.mine], cells.index[self.mine]
         self.factor = np.ones(len(self.mine))
         self.contact = self.excess = np.zeros(len(self.mine))

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
 from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
@@ -25,9 +23,6 @@ from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.rigid.bodies import RigidBody
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow
 from warp_mca.physics.ties.nodes import TiedNodes
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 
 @joinable

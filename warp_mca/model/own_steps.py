@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import chunks
-from warp_mca.model.stable_step import BATCH, KEY, at_elements, step_of
+from warp_mca.model.stable_step import BATCH, KEY, Elements, step_of
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
-    from warp_mca.physics.elements import Element
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 ALIKE = 1e-6  # of its extent, within which elements are of one shape
 MARGIN = 1e-3  # share by which elements of one shape may differ in their step, up to an aspect ratio of 1 / 1000
 LOOSENESS = 1.25  # of a bound's step: an exact one is hardly ever greater
-
-
-@dataclass(frozen=True)
-class _Part:
-    """Elements of one formulation, as `stable_step` takes them."""
-
-    element: Element
-    conn: Index
-    K: Array
-    G: Array
-    mass: Array
-    contact: Array
-    index: Index
 
 
 class OwnSteps:
@@ -46,22 +30,9 @@ class OwnSteps:
 
     def __init__(self, parts: Assembly, added: Array) -> None:
         """Bounds of all elements; `added` is what contact springs add to the eigenvalue at each node [1/s^2]."""
-        self.X = parts.X
         self.step = parts.element_steps(added)
-        added = parts.relieved(added)
         self._exact = np.zeros(len(self.step), dtype=bool)
-        self._parts = [
-            _Part(
-                part.element,
-                part.conn,
-                parts.K[part.index],
-                parts.G[part.index],
-                mass,
-                at_elements(part.conn, added),
-                part.index,
-            )
-            for part, mass in parts.computed()
-        ]
+        self._parts = list(parts.computed(added))
 
     def levels(self, base: float, highest: int) -> NDArray[np.int64]:
         """Level of each element: the greatest k <= highest with 2^k base <= its step, shape (element_count,).
@@ -81,22 +52,21 @@ class OwnSteps:
         """Replace bounds of the `wanted` elements by exact steps; those of one shape have one of them."""
         for part in self._parts:
             mine = np.flatnonzero(wanted[part.index])
-            first, lot = _shapes(self.X, part, mine)
+            first, lot = _shapes(part, mine)
             step = np.empty(len(first))
             for some in chunks(len(first), BATCH):
                 k = mine[first[some]]
-                own = part.element.largest_eigenvalues(self.X[part.conn[k]], part.K[k], part.G[k], part.mass[k])
-                step[some] = step_of(own, part.contact[k])
+                step[some] = step_of(part.exact(k), part.contact[k])
             chosen = part.index[mine]
             self.step[chosen] = np.maximum(self.step[chosen], (1.0 - MARGIN) * step[lot])
         self._exact |= wanted
 
 
-def _shapes(X: Array, part: _Part, chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _shapes(part: Elements, chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """First of the chosen elements of each shape, and the number of each one's shape: same size, moduli, springs."""
     if not len(chosen):
         return chosen, chosen
-    corners = X[part.conn[chosen]]
+    corners = part.X[part.conn[chosen]]
     edges = (corners[:, 1:] - corners[:, :1]).reshape(len(chosen), -1)
     size = np.abs(edges).max(axis=1)
     values = (size, part.K[chosen], part.G[chosen], 1.0 + part.contact[chosen], part.mass[chosen].sum(axis=1))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
 from warp_mca.geometry.boxes import Boxes, cell_boxes
@@ -20,7 +21,6 @@ from warp_mca.scene import Line, Path, Scene
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
-Array = NDArray[np.float64]
 
 MAX_PROBES = 100_000  # of a line
 

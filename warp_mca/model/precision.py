@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boxes import cell_boxes
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
-Array = NDArray[np.float64]
 
 # Elements take the fourth power of lengths and the square of stresses, which float32 holds from 1e-38 to 3e38.
 EDGES = 5e-10, 2e9  # mean edge of an element [m]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Index
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.patches import compact_order
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from warp_mca.model.assembly import Block
     from warp_mca.model.model import Model
 
-Index = NDArray[np.int32]
 Levels = NDArray[np.int64]
 
 

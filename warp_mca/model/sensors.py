@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
 from warp_mca.geometry.boxes import cell_boxes
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.scene import Probe, Scene, Section
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 CHANNELS = 6  # of a probe, position [m] and velocity [m/s]; of a section, force [N] and moment [N m]
 

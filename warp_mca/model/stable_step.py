@@ -9,12 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.physics.elements import Element
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
 MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem takes 50 us
@@ -44,10 +42,47 @@ class StableStep:
     shortened: float
 
 
+@dataclass(frozen=True)
+class Elements:
+    """Elements of one formulation, and what their stable steps depend on.
+
+    Attributes:
+        element: their formulation.
+        X: positions of the nodes [m], shape (node_count, 3), float64.
+        conn: nodes of each element, shape (element_count, corners), int32.
+        K, G: moduli [Pa], shape (element_count,), float64.
+        mass: lumped masses [kg], shape (element_count, corners), float64.
+        contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,), float64.
+        index: number that each element goes by, shape (element_count,), int32.
+    """
+
+    element: Element
+    X: Array
+    conn: Index
+    K: Array
+    G: Array
+    mass: Array
+    contact: Array
+    index: Index
+
+    def exact(self, some: Part) -> Array:
+        """Largest eigenvalues of some elements by themselves [1/s^2]."""
+        return self.element.largest_eigenvalues(*self._of(some))
+
+    def bounds(self, coarse: bool, some: Part | None = None) -> Array:
+        """Upper bounds of them, of all elements or of some [1/s^2]."""
+        some = np.arange(len(self.conn)) if some is None else some
+        own = np.empty(len(some))
+        for part in chunks(len(some), CHUNK):
+            own[part] = self.element.eigenvalue_bounds(*self._of(some[part]), coarse)
+        return own
+
+    def _of(self, some: Part) -> tuple[Array, Array, Array, Array]:
+        return self.X[self.conn[some]], self.K[some], self.G[some], self.mass[some]
+
+
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # bounds that are not numbers are refused
-def stable_step(
-    formulation: Element, X: Array, conn: Index, K: Array, G: Array, mass: Array, contact: Array, index: Index
-) -> StableStep:
+def stable_step(elements: Elements) -> StableStep:
     """Stable step from max over elements of (element eigenvalue + contact eigenvalue), both upper bounds of their part.
 
     Springs that dominate count for more, since they open and close.
@@ -56,39 +91,27 @@ def stable_step(
     coarse bound ranks the elements, a closer one those that could still be the worst after the first exact
     eigenvalues, and exact ones decide.
 
-    Args:
-        formulation: of the elements.
-        X: positions of the nodes [m], shape (node_count, 3), float64.
-        conn: nodes of each element, shape (element_count, corners), int32. K, G: moduli [Pa], shape (element_count,).
-        mass: lumped masses [kg], shape (element_count, corners).
-        contact: eigenvalue that contact springs add at each element [1/s^2], shape (element_count,).
-        index: number that each element goes by, shape (element_count,).
-
     Raises:
         RequestError: a bound is not finite.
     """
+    contact, index = elements.contact, elements.index
 
     def exact(part: Part) -> Array:
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # values that are not numbers are refused
-                return formulation.largest_eigenvalues(X[conn[part]], K[part], G[part], mass[part]) + contact[part]
+                return elements.exact(part) + contact[part]
         except np.linalg.LinAlgError as error:
             raise _out_of_range(int(index[part[0]]), float(bound.max())) from error
 
-    def bounds(part: Part | slice, coarse: bool) -> Array:
-        return formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse) + contact[part]
-
-    bound = np.empty(len(conn))
-    for part in chunks(len(conn), CHUNK):
-        bound[part] = bounds(part, True)
+    bound = elements.bounds(True) + contact
     if not np.isfinite(bound).all():
         raise _out_of_range(int(index[np.argmin(np.isfinite(bound))]), float(bound.max()))
     usual = float(np.median(bound))
-    worst, element = _worst(bound, exact, bounds, lambda part: part[_different(X, conn[part], bound[part])])
+    worst, element = _worst(elements, bound, exact)
     own = worst - float(contact[element])
     stiff = np.flatnonzero(switching(contact, 1.0) > worst)
     if len(stiff):
-        bound = formulation.eigenvalue_bounds(X[conn[stiff]], K[stiff], G[stiff], mass[stiff], False)
+        bound = elements.bounds(False, stiff)
         value = switching(contact[stiff], contact[stiff] / (bound + contact[stiff]))
         most = int(value.argmax())
         if value[most] > worst:
@@ -121,26 +144,13 @@ def at_elements(conn: Index, value: Array) -> Array:
     return found
 
 
-def element_steps(
-    formulation: Element,
-    X: Array,
-    conn: Index,
-    K: Array,
-    G: Array,
-    mass: Array,
-    contact: Array,
-    *,
-    coarse: bool = False,
-) -> Array:
+def element_steps(elements: Elements, *, coarse: bool = False) -> Array:
     """Stable step that each element would ask for by itself, contact springs included [s], shape (element_count,).
 
     A lower bound from upper bounds of the eigenvalues: that of a hexahedron's own stiffness is 12 to 18 % below its
-    step, `coarse` ones are 7 % lower and three times as quick. Arguments as in `stable_step`.
+    step, `coarse` ones are 7 % lower and three times as quick.
     """
-    own = np.empty(len(conn))
-    for part in chunks(len(conn), CHUNK):
-        own[part] = formulation.eigenvalue_bounds(X[conn[part]], K[part], G[part], mass[part], coarse)
-    return step_of(own, contact)
+    return step_of(elements.bounds(coarse), elements.contact)
 
 
 def step_of(own: Array, contact: Array) -> Array:
@@ -151,47 +161,35 @@ def step_of(own: Array, contact: Array) -> Array:
     return 2.0 / np.sqrt(np.maximum(own + contact, switching(contact, contact / (own + contact))))
 
 
-def exact_or_bound(
-    formulation: Element, X: Array, conn: Index, K: Array, G: Array, mass: Array, contact: Array, limit: float
-) -> tuple[Part, Array]:
+def exact_or_bound(elements: Elements, limit: float) -> tuple[Part, Array]:
     """Elements whose eigenvalue, with what contact adds, may exceed a limit [1/s^2], and their own eigenvalues.
 
-    Eigenvalues [1/s^2] are exact for the MAX_EXACT greatest bounds, bounds for others. Arguments as in `stable_step`.
+    Eigenvalues [1/s^2] are exact for the MAX_EXACT greatest bounds, bounds for others.
     """
+    contact = elements.contact
 
     def whole(own: Array, touched: Array) -> Array:
         return np.maximum(own + touched, switching(touched, touched / (own + touched)))
 
-    mine = np.arange(len(conn))
+    mine = np.arange(len(contact))
     own = np.zeros(0)
     for coarse in (True, False):
-        own = np.empty(len(mine))
-        for part in chunks(len(mine), CHUNK):
-            some = mine[part]
-            own[part] = formulation.eigenvalue_bounds(X[conn[some]], K[some], G[some], mass[some], coarse)
+        own = elements.bounds(coarse, mine)
         over = whole(own, contact[mine]) > limit
         mine, own = mine[over], own[over]
     greatest = _greatest(own, MAX_EXACT)
     for part in chunks(len(greatest), BATCH):
-        some = mine[greatest[part]]
-        own[greatest[part]] = formulation.largest_eigenvalues(X[conn[some]], K[some], G[some], mass[some])
+        own[greatest[part]] = elements.exact(mine[greatest[part]])
     over = whole(own, contact[mine]) > limit
     return mine[over], own[over]
 
 
-def _worst(
-    bound: Array,
-    exact: Callable[[Part], Array],
-    bounds: Callable[[Part, bool], Array],
-    different: Callable[[Part], Part],
-) -> tuple[float, int]:
-    """Largest eigenvalue of any element [1/s^2], and that element.
+def _worst(elements: Elements, bound: Array, exact: Callable[[Part], Array]) -> tuple[float, int]:
+    """Largest eigenvalue of any element with its contact springs [1/s^2], and that element.
 
     Args:
         bound: coarse upper bound of each [1/s^2], shape (element_count,), float64; closer ones replace them.
         exact: exact eigenvalues of some elements.
-        bounds: coarse or closer bounds of some elements.
-        different: those of some elements that are not alike.
     """
     first = _greatest(bound, BATCH)
     value = exact(first)
@@ -199,9 +197,8 @@ def _worst(
     bound[first] = 0.0
     left = np.flatnonzero(bound > worst)
     if len(left) > MAX_EXACT:
-        left = different(left)
-    for part in chunks(len(left), CHUNK):
-        bound[left[part]] = bounds(left[part], False)
+        left = left[_different(elements.X, elements.conn[left], bound[left])]
+    bound[left] = elements.bounds(False, left) + elements.contact[left]
     left = left[bound[left] > worst]
     left = left[np.argsort(-bound[left], kind="stable")]
     for start in range(0, len(left), BATCH):

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 
-from warp_mca.paper.claims import Found, Words
-from warp_mca.paper.evidence import Evidence, MissingRunError
-from warp_mca.paper.studies import STUDIES
+from warp_mca.paper.evidence import MissingRunError
 from warp_mca.results.force_figure import compression_phases
 from warp_mca.results.force_history import Interval
 from warp_mca.results.paths import PathHistory
@@ -120,15 +117,6 @@ def after_contact(result: Result, column: str) -> np.ndarray:
     return later
 
 
-def trend(evidence: Evidence, study: str, reading: Callable[[Result], float], unit: str, rises: bool) -> Words:
-    """Whether a reading rises, or falls, from value to value of a study, and from what to what."""
-    values = evidence.values(study)
-    found = [reading(evidence.run(study, value)) for value in values]
-    steady = all((b > a) == rises and a != b for a, b in pairwise(found))
-    listed, given = ", ".join(f"{x:#.3g}" for x in found), ", ".join(f"{v:g}" for v in values)
-    return Words(f"{listed} {unit} for {STUDIES[study].quantity} of {given}", steady)
-
-
 def path(result: Result, number: int) -> PathHistory:
     """Path 1, 2 or 3 of Fig. 10.
 
@@ -180,10 +168,3 @@ def transmitted(result: Result) -> float:
     if not arrived.any():
         raise MissingRunError("no stress passes hinge A")
     return 1e6 * float(result.time[np.argmax(arrived)])
-
-
-def reversal(evidence: Evidence) -> Found:
-    """At which velocities of the plate F_t turns from negative to positive."""
-    turned = {value: bool(evidence.run("v_plate", value).summary["F_t_reverses"]) for value in (0.4, 0.8)}
-    said = ", ".join(f"{'turns' if turns else 'does not turn'} at {value} m/s" for value, turns in turned.items())
-    return Words(f"F_t {said}", turned == {0.4: False, 0.8: True})

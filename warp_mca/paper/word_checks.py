@@ -3,57 +3,71 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from warp_mca.paper import readings as read
 from warp_mca.paper.claims import Found, Words
 from warp_mca.paper.evidence import Evidence, MissingRunError
-from warp_mca.paper.studies import MAIN
+from warp_mca.paper.studies import MAIN, STUDIES
 from warp_mca.results.result import Result
 
 TIP_SPEED = 3.27  # along the plate at contact, in the paper [m/s]
+Reading = Callable[[Result], float]
+Check = Callable[[Evidence], Found]
 
 
-def of(study: str, value: float, reading: Callable[[Result], float]) -> Callable[[Evidence], Found]:
+def later(check: Callable[..., Found]) -> Callable[..., Check]:
+    """Let a check be called with all but its evidence, its last positional argument, which it then waits for."""
+    return lambda *given, **options: lambda evidence: check(*given, evidence, **options)
+
+
+@later
+def of(study: str, value: float, reading: Reading, evidence: Evidence) -> Found:
     """A number of the run of a study with a value."""
-    return lambda evidence: float(reading(evidence.run(study, value)))
+    return float(reading(evidence.run(study, value)))
 
 
-def base(reading: Callable[[Result], float]) -> Callable[[Evidence], Found]:
+def base(reading: Reading) -> Check:
     """A number of the run with the values of Table 1."""
     return of("base", 0.0, reading)
 
 
-def chosen(variant: str, found: Callable[[Evidence], Found]) -> Callable[[Evidence], Found]:
+@later
+def chosen(variant: str, found: Check, evidence: Evidence) -> Found:
     """What is found in the runs of another variant than the main one, and of this one only."""
-
-    def of_variant(evidence: Evidence) -> Found:
-        if evidence.variant != MAIN:
-            raise MissingRunError("choices are run on one mesh")
-        return found(Evidence(evidence.runs, variant))
-
-    return of_variant
+    if evidence.variant != MAIN:
+        raise MissingRunError("choices are run on one mesh")
+    return found(Evidence(evidence.runs, variant))
 
 
-def trend(study: str, reading: Callable[[Result], float], unit: str, *, rises: bool) -> Callable[[Evidence], Found]:
-    """Whether a reading rises, or falls, over all values of a study."""
-    return partial(read.trend, study=study, reading=reading, unit=unit, rises=rises)
+@later
+def trend(study: str, reading: Reading, unit: str, evidence: Evidence, *, rises: bool) -> Found:
+    """Whether a reading rises, or falls, from value to value of a study, and from what to what."""
+    values = evidence.values(study)
+    found = [reading(evidence.run(study, value)) for value in values]
+    steady = all((b > a) == rises and a != b for a, b in pairwise(found))
+    listed, given = ", ".join(f"{x:#.3g}" for x in found), ", ".join(f"{v:g}" for v in values)
+    return Words(f"{listed} {unit} for {STUDIES[study].quantity} of {given}", steady)
 
 
-def finest_meshes(study: str, reading: Callable[[Result], float], least: float) -> Callable[[Evidence], Found]:
+@later
+def finest_meshes(study: str, reading: Reading, least: float, evidence: Evidence) -> Found:
     """Whether a reading changes by less than `least` between the two finest meshes."""
+    if evidence.variant != MAIN:
+        raise MissingRunError("meshes are compared once")
+    coarser, finer = (evidence.run(study, value) for value in evidence.values(study)[-2:])
+    change = reading(finer) / reading(coarser) - 1.0
+    counts = " to ".join(f"{result.summary['n_elements']:,}" for result in (coarser, finer))
+    return Words(f"{100 * change:+.2f} % from {counts} elements", abs(change) < least)
 
-    def found(evidence: Evidence) -> Found:
-        if evidence.variant != MAIN:
-            raise MissingRunError("meshes are compared once")
-        coarser, finer = (evidence.run(study, value) for value in evidence.values(study)[-2:])
-        change = reading(finer) / reading(coarser) - 1.0
-        counts = " to ".join(f"{result.summary['n_elements']:,}" for result in (coarser, finer))
-        return Words(f"{100 * change:+.2f} % from {counts} elements", abs(change) < least)
 
-    return found
+def reversal(evidence: Evidence) -> Found:
+    """At which velocities of the plate F_t turns from negative to positive."""
+    turned = {value: bool(evidence.run("v_plate", value).summary["F_t_reverses"]) for value in (0.4, 0.8)}
+    said = ", ".join(f"{'turns' if turns else 'does not turn'} at {value} m/s" for value, turns in turned.items())
+    return Words(f"F_t {said}", turned == {0.4: False, 0.8: True})
 
 
 def two_compressions(evidence: Evidence) -> Found:
@@ -103,18 +117,15 @@ def gross_slip(evidence: Evidence) -> Found:
     return Words(f"sticks {said}", shares[0.1] < 0.1 < shares[1.5])
 
 
-def succession(study: str) -> Callable[[Evidence], Found]:
+@later
+def succession(study: str, evidence: Evidence) -> Found:
     """Whether bodies of 7 GPa or less touch the plate more than once."""
-
-    def found(evidence: Evidence) -> Found:
-        values = [value for value in evidence.values(study) if value <= 7.0]
-        if not values:
-            raise MissingRunError(f"no run of {study} with 7 GPa or less")
-        counts = {value: len(evidence.run(study, value).summary["contacts"]) for value in values}
-        said = ", ".join(f"{count} at {value:g} GPa" for value, count in counts.items())
-        return Words(f"contacts: {said}", any(count > 1 for count in counts.values()))
-
-    return found
+    values = [value for value in evidence.values(study) if value <= 7.0]
+    if not values:
+        raise MissingRunError(f"no run of {study} with 7 GPa or less")
+    counts = {value: len(evidence.run(study, value).summary["contacts"]) for value in values}
+    said = ", ".join(f"{count} at {value:g} GPa" for value, count in counts.items())
+    return Words(f"contacts: {said}", any(count > 1 for count in counts.values()))
 
 
 def many_compressions(evidence: Evidence) -> Found:
@@ -130,26 +141,20 @@ def stick_share(result: Result) -> float:
     return read.stick_time(result) / (1e3 * result.summary["contact_duration"])
 
 
-def sticking(study: str, *, rises: bool) -> Callable[[Evidence], Found]:
+@later
+def sticking(study: str, evidence: Evidence, *, rises: bool) -> Found:
     """Whether the share of sticking rises, or falls, from the softest to the stiffest."""
-
-    def found(evidence: Evidence) -> Found:
-        values = evidence.values(study)
-        first, last = (stick_share(evidence.run(study, value)) for value in (values[0], values[-1]))
-        said = f"{100 * first:.0f} % of the contact at {values[0]:g} GPa, {100 * last:.0f} % at {values[-1]:g}"
-        return Words(f"sticks {said}", (last > first) == rises)
-
-    return found
+    values = evidence.values(study)
+    first, last = (stick_share(evidence.run(study, value)) for value in (values[0], values[-1]))
+    said = f"{100 * first:.0f} % of the contact at {values[0]:g} GPa, {100 * last:.0f} % at {values[-1]:g}"
+    return Words(f"sticks {said}", (last > first) == rises)
 
 
-def stress_ratio(first: int, second: int, least: float, most: float) -> Callable[[Evidence], Found]:
+@later
+def stress_ratio(first: int, second: int, least: float, most: float, evidence: Evidence) -> Found:
     """Whether the stress on one path over that on another, until 100 us, lies between two limits."""
-
-    def found(evidence: Evidence) -> Found:
-        ratio = read.stress_ratio(evidence.run("base", 0.0), first, second)
-        return Words(f"{ratio:.2f} of it, means over rod AB", least < ratio < most)
-
-    return found
+    ratio = read.stress_ratio(evidence.run("base", 0.0), first, second)
+    return Words(f"{ratio:.2f} of it, means over rod AB", least < ratio < most)
 
 
 def passes(evidence: Evidence) -> Found:
@@ -158,18 +163,15 @@ def passes(evidence: Evidence) -> Found:
     return Words(f"stress on OA from {time:.0f} µs on", 20.0 < time < 1e6 * read.EARLY)
 
 
-def below_tip(study_reading: Callable[[Result], float]) -> Callable[[Evidence], Found]:
+@later
+def below_tip(reading: Reading, evidence: Evidence) -> Found:
     """Whether a reading falls as the plate gets faster, up to the speed of the tip."""
-
-    def found(evidence: Evidence) -> Found:
-        values = [value for value in evidence.values("v_plate") if value < TIP_SPEED]
-        if len(values) < 2:
-            raise MissingRunError("fewer than two velocities below that of the tip")
-        numbers = [study_reading(evidence.run("v_plate", value)) for value in values]
-        listed, speeds = ", ".join(f"{x:.3f}" for x in numbers), ", ".join(f"{v:g}" for v in values)
-        return Words(f"{listed} ms at {speeds} m/s", numbers[-1] < numbers[0])
-
-    return found
+    values = [value for value in evidence.values("v_plate") if value < TIP_SPEED]
+    if len(values) < 2:
+        raise MissingRunError("fewer than two velocities below that of the tip")
+    numbers = [reading(evidence.run("v_plate", value)) for value in values]
+    listed, speeds = ", ".join(f"{x:.3f}" for x in numbers), ", ".join(f"{v:g}" for v in values)
+    return Words(f"{listed} ms at {speeds} m/s", numbers[-1] < numbers[0])
 
 
 def tip_follows_plate(evidence: Evidence) -> Found:

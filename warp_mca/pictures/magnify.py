@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
+from warp_mca.base.rotation import mean_pose
 
 
 def magnified(X: Array, u: Array, factor: float) -> Array:
@@ -21,12 +21,6 @@ def magnified(X: Array, u: Array, factor: float) -> Array:
 
 
 def rigid_motion(X: Array, u: Array) -> Array:
-    """Displacement of the rigid motion nearest to `u` in the least squares [m], shape (node_count, 3), float64.
-
-    The rotation is that of W. Kabsch, Acta Cryst. A 32 (1976) 922, from the singular value decomposition of the
-    covariance of places before and after.
-    """
-    centre, moved = X.mean(axis=0), (X + u).mean(axis=0)
-    left, _, right = np.linalg.svd((X - centre).T @ (X + u - moved))
-    sign = np.sign(np.linalg.det(left @ right))
-    return (X - centre) @ (left * [1.0, 1.0, sign]) @ right + moved - X
+    """Displacement of the rigid motion nearest to `u` in the least squares [m], shape (node_count, 3), float64."""
+    centre, moved, rotation = mean_pose(X, X + u, np.ones(len(X)))
+    return (X - centre) @ rotation.T + moved - X

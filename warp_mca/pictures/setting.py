@@ -107,7 +107,7 @@ def plane_mesh(plane: RigidPlane, points: NDArray[np.floating], up: Array) -> Pl
     flat = (points - np.array(plane.point)) @ axes.T
     low, high = flat.min(axis=0), flat.max(axis=0)
     reach = BEYOND * float(np.ptp(points, axis=0).max())
-    square = _rounded((float((high - low).max()) + 2.0 * reach) / CHECKS)
+    square = rounded((float((high - low).max()) + 2.0 * reach) / CHECKS)
     first = np.floor((low - reach) / square).astype(int)
     last = np.ceil((high + reach) / square).astype(int)
     s, t = (np.arange(a, b + 1) for a, b in zip(first, last, strict=True))
@@ -124,7 +124,7 @@ def plane_mesh(plane: RigidPlane, points: NDArray[np.floating], up: Array) -> Pl
     )
 
 
-def _rounded(length: float) -> float:
+def rounded(length: float) -> float:
     """The next length below that is 1, 2 or 5 times a power of ten."""
     decade = 10.0 ** np.floor(np.log10(length))
     return decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= length)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.geometry.creases import Creases
 from warp_mca.pictures.raster import rasterise
-from warp_mca.pictures.setting import EYE, PlaneMesh, view_axes
+from warp_mca.pictures.setting import EYE, PlaneMesh, rounded, view_axes
 from warp_mca.results.figure_style import engineering, new_figure, save_png
 
 if TYPE_CHECKING:
@@ -207,7 +207,6 @@ def _draw_scale(axes: Axes, width: float) -> None:
     """A bar of round length, about a fifth of `width` [mm], in the lower left corner."""
     from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
-    decade = 10.0 ** np.floor(np.log10(0.2 * width))
-    length = decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= 0.2 * width)
+    length = rounded(0.2 * width)
     bar = AnchoredSizeBar(axes.transData, length, f"{length:g} mm", "lower left", pad=0.4, frameon=True)
     axes.add_artist(bar)

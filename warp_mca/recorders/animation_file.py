@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.recorders.pictures import Subject, for_film
-from warp_mca.recorders.recorder import Cadence, check_file
+from warp_mca.recorders.recorder import Cadence, FramesOnly, check_file
 
 if TYPE_CHECKING:
     from warp_mca.pictures.snapshot import Look, Skin
@@ -27,7 +27,7 @@ DOTS_PER_INCH = 100
 LAST = 1000  # how long a .gif shows the last picture before it begins again [ms]
 
 
-class AnimationFile:
+class AnimationFile(FramesOnly):
     """Keeps the skins of each frame, and draws them all on one scale of colours when the run has ended."""
 
     def __init__(
@@ -58,9 +58,6 @@ class AnimationFile:
     def frame(self, frame: Frame) -> None:
         """Keep it."""
         self._frames.append((frame.time, self.subject.skins(self.info, frame)))
-
-    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Nothing is drawn of it."""
 
     def finish(self, ok: bool) -> None:
         """Draw the frames that there are.

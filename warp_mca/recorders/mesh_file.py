@@ -18,15 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 from warp_mca.base.errors import McaError, RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, CellType
 from warp_mca.geometry.degenerate import cell_names
-from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_file, file_path
+from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, FramesOnly, check_file, file_path
 from warp_mca.scene.elements import ELEMENTS
 
 if TYPE_CHECKING:
     import meshio
 
     from warp_mca.model.model import Model
-    from warp_mca.scene.elements import ELEMENTS
-from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.recorders.recorder import Frame, RunInfo
 
 USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"
 # Formats whose readers take six components as xx, yy, zz, xy, yz, xz; XDMF's take yy as the fourth, gmsh takes none.
@@ -35,7 +34,7 @@ SCALES = (1e3, 1e-6, 1e-17)  # of coordinates along x, y and z in the trial; the
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
-class FinalState:
+class FinalState(FramesOnly):
     """Writes the last frame: displaced points, hexahedra, the fields at nodes, body and material of each element.
 
     The file appears, complete, when the run has ended without an error; an older file stays until then.
@@ -77,9 +76,6 @@ class FinalState:
         """Keep it in place of the one before."""
         assert frame.volume is not None
         self._fields = {name: np.array(field) for name, field in vars(frame.volume).items()}
-
-    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Is not written to this file."""
 
     def finish(self, ok: bool) -> None:
         """Write the file; after a run that failed there is no final state, and none is written.

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from warp_mca.scene import Scene
 
 Float = NDArray[np.float32]
-Index = NDArray[np.int32]
 
 DISK_RESERVE = 64 << 20  # disk space that recorders leave free for the results [byte]
 FULL = f"less than {DISK_RESERVE >> 20} MiB are free on its disk"
@@ -199,6 +198,19 @@ class Recorder(Protocol):
     def finish(self, ok: bool) -> None:
         """Close what is open; `ok` tells that the run ended as it should. Called once, also if `start` failed."""
         ...
+
+
+class FramesOnly:
+    """Base of recorders that leave out the rows of the history, and need not start or finish."""
+
+    def start(self, info: RunInfo) -> None:
+        """Nothing is to be opened."""
+
+    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
+        """Nothing is kept of it."""
+
+    def finish(self, ok: bool) -> None:
+        """Nothing is open."""
 
 
 def apart(names: Iterable[str]) -> list[str]:

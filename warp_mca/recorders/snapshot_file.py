@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-
-import numpy as np
-from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import brief, is_number
 from warp_mca.recorders.pictures import Subject
-from warp_mca.recorders.recorder import Cadence, Frame, RunInfo, check_file, make_way
+from warp_mca.recorders.recorder import Cadence, Frame, FramesOnly, RunInfo, check_file, make_way
 
 
-class SnapshotFile:
+class SnapshotFile(FramesOnly):
     """Draws the skins, coloured by a field, at the output interval's end nearest to a time."""
 
     def __init__(
@@ -50,9 +46,3 @@ class SnapshotFile:
         skins = self.subject.skins(self.info, frame)
         make_way(self.path)
         save_snapshot(self.path, skins, frame.time, self.subject.look(self.info, skins))
-
-    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Nothing is drawn of it."""
-
-    def finish(self, ok: bool) -> None:
-        """The picture is written already."""

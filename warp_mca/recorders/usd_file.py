@@ -28,6 +28,7 @@ from warp_mca.recorders.recorder import (
     FULL,
     SURFACE,
     Cadence,
+    FramesOnly,
     apart,
     check_disk,
     check_file,
@@ -49,7 +50,7 @@ PLAYBACK = 24.0  # frames shown in a second
 POINT_SIZE = 0.004  # of contact points, as a share of the scene
 
 
-class UsdFile:
+class UsdFile(FramesOnly):
     """Writes /World/BODY meshes with one time code for each frame, so that microseconds do not collapse.
 
     Colours are indices into a static palette, in linear colour space as USD has it. `vonMises` [Pa] and
@@ -179,9 +180,6 @@ class UsdFile:
                     self.setting.write(code, frame.time)
                     self.times.append(frame.time)
                     self.limits.append(limit)
-
-    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Is not written to this file."""
 
     def finish(self, ok: bool) -> None:
         """Save what is left; a file without a frame is removed.

@@ -24,7 +24,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.files import nearest
 from warp_mca.pictures.setting import rigid_planes, up_of
 from warp_mca.recorders.mesh_file import cells
-from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, check_disk, check_file
+from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, FramesOnly, check_disk, check_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -44,7 +44,7 @@ FIELDS = {"displacement": (3,), "velocity": (3,), "stress": (6,), "von_mises": (
 NODE_BYTES, ELEMENT_BYTES, FRAME_BYTES, HEADER_BYTES = 24, 88, 256, 256 << 10
 
 
-class VtkHdfFile:
+class VtkHdfFile(FramesOnly):
     """Writes displacement, velocity, stress, von Mises stress and plastic strain at all nodes, as float32.
 
     Points stay where they were at t = 0, in float64: float32 positions would lose displacements below 3e-8 m, and
@@ -144,9 +144,6 @@ class VtkHdfFile:
         except (OSError, RuntimeError) as error:
             self._abandon()
             raise OSError(f"{_reason(error)}; the file holds the {self.frame_count} frames before") from error
-
-    def history(self, rows: Mapping[str, NDArray[np.float64]]) -> None:
-        """Is not written to this file; ParaView opens history.csv."""
 
     def finish(self, ok: bool) -> None:
         """Close the file.

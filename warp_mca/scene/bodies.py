@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.scene.drops import fall_velocity, resting_place
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.scene.elements import ELEMENTS
 from warp_mca.scene.materials import MATERIALS, Material, check_law
 
@@ -72,8 +75,7 @@ class Body:
             check_law(material)
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
-        if self.kinematics not in ("corotational", "finite"):
-            raise bad_value(f"Body {self.name}.kinematics", self.kinematics, "choose corotational or finite")
+        validate.choice(f"Body {self.name}", ("corotational", "finite"), kinematics=self.kinematics)
         validate.flags(f"Body {self.name}", rigid=self.rigid, exact_mass=self.exact_mass)
         validate.vectors(
             f"Body {self.name}",
@@ -89,7 +91,17 @@ class Body:
         Raises:
             RequestError: the gap is below 0, or the body cannot be meshed.
         """
-        return replace(self, position=resting_place(self, plane, gap))
+        from warp_mca.geometry.mesh import Mesh
+
+        _check_height("place_on: gap", gap, "give 0 or a distance above it, in metres")
+        if not (hasattr(plane, "normal") and hasattr(plane, "point")):
+            raise bad_value("place_on: plane", validate.brief(plane), "give a RigidPlane")
+        mesh = self.geometry if isinstance(self.geometry, Mesh) else self.geometry.build()
+        normal = np.array(plane.normal) / math.hypot(*plane.normal)
+        placed = np.array(self.position) + mesh.points @ rotation_matrix(np.array(self.rotation)).T
+        height = float(((placed - np.array(plane.point)) @ normal).min())
+        x, y, z = (np.array(self.position) + (gap - height) * normal).tolist()
+        return replace(self, position=(x, y, z))
 
     def drop(self, height: float, gravity: Vec3 = (0.0, -9.81, 0.0)) -> Body:
         """The body with the velocity sqrt(2 g h) along `gravity` [m/s^2] added, as after a fall from rest.
@@ -101,6 +113,15 @@ class Body:
         Raises:
             RequestError: the height is below 0, or there is no gravity.
         """
-        fall = fall_velocity(height, gravity)
-        x, y, z = (v + w for v, w in zip(self.velocity, fall, strict=True))
+        _check_height("drop: height", height, "give 0 or a height above it, in metres")
+        validate.vectors("drop", gravity=gravity)
+        g = math.hypot(*gravity)
+        if g == 0.0:
+            raise bad_value("drop: gravity", gravity, "give a vector that is not zero, in m/s^2")
+        x, y, z = (v + math.sqrt(2.0 * g * height) * w / g for v, w in zip(self.velocity, gravity, strict=True))
         return replace(self, velocity=(x, y, z))
+
+
+def _check_height(field: str, value: float, remedy: str) -> None:
+    if not (validate.is_number(value) and value >= 0.0):
+        raise bad_value(field, value, remedy)

@@ -43,9 +43,8 @@ class RigidPlane:
 
     def __post_init__(self) -> None:
         validate.plain(self)
-        validate.vectors("RigidPlane", point=self.point, normal=self.normal, velocity=self.velocity)
-        if math.hypot(*self.normal) == 0.0:
-            raise bad_value("RigidPlane.normal", self.normal, "give a vector that is not zero")
+        validate.vectors("RigidPlane", point=self.point, velocity=self.velocity)
+        validate.directions("RigidPlane", normal=self.normal)
         if abs(sum(v * n for v, n in zip(self.velocity, self.normal, strict=True))) > 1e-12 * math.hypot(
             *self.velocity
         ):
@@ -111,9 +110,5 @@ class Contact:
             raise bad_value("Contact.master.body", self.master.body, "name a body other than the slave's")
         if self.name is not None:
             validate.texts("Contact", name=self.name)
-        for axis in ("normal", "tangent"):
-            value = getattr(self, axis)
-            if value is not None:
-                validate.vectors("Contact", **{axis: value})
-                if not any(value):
-                    raise bad_value(f"Contact.{axis}", value, "give a direction other than zero")
+        axes = {"normal": self.normal, "tangent": self.tangent}
+        validate.directions("Contact", **{name: axis for name, axis in axes.items() if axis is not None})

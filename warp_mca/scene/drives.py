@@ -53,10 +53,4 @@ class Prescribed:
         owner = f"Prescribed of {self.body}"
         if self.axis not in ("x", "y", "z"):
             raise bad_value(f"{owner}.axis", self.axis, "use one of x, y and z")
-        for name, values in (("times", self.times), ("velocities", self.velocities)):
-            if not validate.is_list(values):
-                raise bad_value(f"{owner}.{name}", values, "give finite numbers")
-        if len(self.times) != len(self.velocities) or not len(self.times):
-            raise bad_value(f"{owner}.velocities", self.velocities, "give one velocity for each time")
-        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise bad_value(f"{owner}.times", self.times, "list them in increasing order")
+        validate.table(owner, self.times, velocities=self.velocities)

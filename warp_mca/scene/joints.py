@@ -79,10 +79,9 @@ class Revolute(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validate.vectors(self.title, at=self.at, other_at=self.other_at, axis=self.axis)
-        _check_direction(f"{self.title}.axis", self.axis)
-        if self.nodes not in ("axis", "ends", "pin", "hole"):
-            raise bad_value(f"{self.title}.nodes", self.nodes, "choose axis, ends, pin or hole")
+        validate.vectors(self.title, at=self.at, other_at=self.other_at)
+        validate.directions(self.title, axis=self.axis)
+        validate.choice(self.title, ("axis", "ends", "pin", "hole"), nodes=self.nodes)
         pinned = self.nodes in ("pin", "hole")
         if (self.pin_radius is not None) != pinned:
             remedy = f"give the radius of the {self.nodes} [m]" if pinned else 'it needs nodes="pin"; leave it out'
@@ -193,8 +192,7 @@ class Prismatic(Joint):
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.texts(self.title, nodes=self.nodes)
-        validate.vectors(self.title, axis=self.axis)
-        _check_direction(f"{self.title}.axis", self.axis)
+        validate.directions(self.title, axis=self.axis)
         _check_sets(self, self.other_nodes)
 
     def ties(self, first: Side, second: Side | None) -> Ties | Rails:
@@ -210,11 +208,6 @@ class Prismatic(Joint):
             what = f"{len(sliders)} of these nodes {where}, and a slide needs three that are not on one line"
             raise bad_value(f"{self.title}.nodes", self.nodes, what)
         return rails
-
-
-def _check_direction(field: str, value: Vec3) -> None:
-    if not any(value):
-        raise bad_value(field, value, "give a direction other than zero")
 
 
 def _check_sets(joint: Joint, other_nodes: str | None) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
 from types import NoneType
 from typing import Literal
 
@@ -50,7 +49,7 @@ class BaseMotion:
 
     def __post_init__(self) -> None:
         validate.plain(self)
-        _check_table("BaseMotion", self.times, vx=self.vx, vy=self.vy)
+        validate.table("BaseMotion", self.times, vx=self.vx, vy=self.vy)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,18 +96,7 @@ class JointTorque:
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.texts("JointTorque", joint=self.joint)
-        _check_table("JointTorque", self.times, torques=self.torques)
-
-
-def _check_table(owner: str, times: tuple[float, ...], **values: tuple[float, ...]) -> None:
-    """Check that times increase and that every column has one value for each time."""
-    for name, column in (("times", times), *values.items()):
-        if not validate.is_list(column):
-            raise bad_value(f"{owner}.{name}", column, "give finite numbers")
-        if len(column) != len(times) or not len(times):
-            raise bad_value(f"{owner}.{name}", column, "give one value for each time")
-    if any(b <= a for a, b in pairwise(times)):
-        raise bad_value(f"{owner}.times", times, "list them in increasing order")
+        validate.table("JointTorque", self.times, torques=self.torques)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,8 +149,7 @@ class RigidPhase:
             raise bad_value("RigidPhase.theta_dot", self.theta_dot, "give one angle and one rate for each link")
         validate.kinds("RigidPhase", Tip, "give a Tip", tip=self.tip)
         validate.kinds("RigidPhase", (Surface, RigidPlane), "give a Surface or a RigidPlane", target=self.target)
-        if self.inertia not in ("mesh", "slender"):
-            raise bad_value("RigidPhase.inertia", self.inertia, "choose mesh or slender")
+        validate.choice("RigidPhase", ("mesh", "slender"), inertia=self.inertia)
         validate.flags("RigidPhase", centre_target=self.centre_target)
         validate.positive("RigidPhase", t_max=self.t_max, friction_rate=self.friction_rate)
         validate.kinds("RigidPhase", (BaseMotion, NoneType), "give a BaseMotion or None", base_motion=self.base_motion)

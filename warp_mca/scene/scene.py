@@ -104,30 +104,23 @@ class Scene:
         names = [body.name for body in self.bodies]
         if not names:
             raise bad_value("Scene.bodies", (), "give at least one body")
-        if len(set(names)) != len(names):
-            raise bad_value("Scene.bodies", names, "give each body a name of its own")
-        paths = [path.name for path in self.paths]
-        if len(set(paths)) != len(paths):
-            raise bad_value("Scene.paths", paths, "give each path a name of its own")
+        validate.unique("Scene.bodies", names, "body")
+        validate.unique("Scene.paths", [path.name for path in self.paths], "path")
         sensors = [item.name for item in (*self.probes, *self.sections)]
-        if len(set(sensors)) != len(sensors):
-            raise bad_value("Scene.probes", sensors, "give each probe and each section a name of its own")
+        validate.unique("Scene.probes", sensors, "probe and each section")
         contacts = [contact.name for contact in self.contacts if contact.name is not None]
-        if len(set(contacts)) != len(contacts):
-            raise bad_value("Scene.contacts", contacts, "give each contact a name of its own")
+        validate.unique("Scene.contacts", contacts, "contact")
         if shared := sorted(set(sensors) & set(contacts)):
             raise bad_value("Scene.probes", shared, "contacts have these names too, and columns of tables; rename them")
-        joints = [joint.name for joint in self.joints]
-        if len(set(joints)) != len(joints):
-            raise bad_value("Scene.joints", joints, "give each joint a name of its own")
+        validate.unique("Scene.joints", [joint.name for joint in self.joints], "joint")
         pairs = [(item.slave, item.master) for item in self.contacts]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:
                 what = f"{slave.nodes} of {slave.body}"
                 raise bad_value("Scene.contacts", what, "it meets the same master twice; list each pair once")
-        validate.vectors("Scene", gravity=self.gravity, **({} if self.up is None else {"up": self.up}))
-        if self.up is not None and not any(self.up):
-            raise bad_value("Scene.up", self.up, "give a vector that is not zero")
+        validate.vectors("Scene", gravity=self.gravity)
+        if self.up is not None:
+            validate.directions("Scene", up=self.up)
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
@@ -164,15 +157,13 @@ class Scene:
         if self.impact.mass_scaling is not None:
             remedy = "links that get rigid again have their own masses; leave mass_scaling out, or t_end"
             raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
-        if self.absorbing:
-            remedy = "a cut body with absorbing sides does not move between impacts as the large one; leave t_end out"
-            raise bad_value("Scene.t_end", self.t_end, remedy)
-        if self.loads:
-            remedy = "loads act in an impact alone, not in the swings between; leave t_end out"
-            raise bad_value("Scene.t_end", self.t_end, remedy)
-        if self.prescribed:
-            remedy = "nodes with a Prescribed velocity cannot follow it between impacts; leave t_end out"
-            raise bad_value("Scene.t_end", self.t_end, remedy)
+        for present, why in (
+            (self.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
+            (self.loads, "loads act in an impact alone, not in the swings between"),
+            (self.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
+        ):
+            if present:
+                raise bad_value("Scene.t_end", self.t_end, f"{why}; leave t_end out")
 
     def _check_phases(self) -> None:
         """Refuse phases that are not known, or that cannot come before this impact.
@@ -189,42 +180,43 @@ class Scene:
             if getattr(self, name):
                 raise bad_value(f"Scene.{name}", "given", "its times count from the impact; leave it or phases out")
 
+    @property
+    def _held(self) -> tuple[Fixed | Prescribed | Absorbing, ...]:
+        return (*self.fixed, *self.prescribed, *self.absorbing)
+
+    def _surfaces(self) -> list[tuple[str, Surface]]:
+        """Surfaces that the scene names, each with the field."""
+        named: list[tuple[str, object]] = [("Contact.slave", item.slave) for item in self.contacts]
+        named += [("Contact.master", item.master) for item in self.contacts]
+        named += [(f"{tie.title}.{name}", getattr(tie, name)) for tie in self.ties for name in ("slave", "master")]
+        named += [("RigidPhase.target", self.rigid.target)] if self.rigid else []
+        return [(field, surface) for field, surface in named if isinstance(surface, Surface)]
+
     def _named_bodies(self) -> list[tuple[str, str]]:
-        named = [("Fixed.body", item.body) for item in self.fixed]
-        named += [("Prescribed.body", item.body) for item in self.prescribed]
-        named += [("Absorbing.body", item.body) for item in self.absorbing]
+        named = [(f"{type(item).__name__}.body", item.body) for item in self._held]
         named += [(f"{type(load).__name__}.{key}", body) for load in self.loads for key, body in load.bodies().items()]
         named += [(f"{item.title}.body", item.body) for item in self.joints]
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
-        named += [("Contact.slave.body", item.slave.body) for item in self.contacts]
-        named += [("Contact.master.body", m.body) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
-        named += [(f"{t.title}.{name}.body", getattr(t, name).body) for t in self.ties for name in ("slave", "master")]
+        named += [(f"{field}.body", surface.body) for field, surface in self._surfaces()]
         named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]
         named += [(f"{item.title}.body", item.body) for item in (*self.probes, *self.sections)]
         named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
         if self.rigid:
             named.append(("RigidPhase.tip.body", self.rigid.tip.body))
-            if isinstance(self.rigid.target, Surface):
-                named.append(("RigidPhase.target.body", self.rigid.target.body))
         return named
 
     def named_sets(self) -> list[tuple[str, str, str, bool]]:
         """Node sets that the scene names: the field, the body, the set, and whether it must cover faces."""
-        named = [("Fixed.nodes", item.body, item.nodes, False) for item in self.fixed]
-        named += [("Prescribed.nodes", item.body, item.nodes, False) for item in self.prescribed]
-        named += [("Absorbing.nodes", item.body, item.nodes, True) for item in self.absorbing]
+        named = [
+            (f"{type(item).__name__}.nodes", item.body, item.nodes, isinstance(item, Absorbing)) for item in self._held
+        ]
         named += [(f"{type(load).__name__}.{key}", *own) for load in self.loads for key, own in load.sets().items()]
         for joint in self.joints:
             if isinstance(joint, Weld | Prismatic):
                 named.append((f"{joint.title}.nodes", joint.body, joint.nodes, False))
                 if joint.other is not None and joint.other_nodes is not None:
                     named.append((f"{joint.title}.other_nodes", joint.other, joint.other_nodes, False))
-        surfaces = [("Contact.slave.nodes", contact.slave) for contact in self.contacts]
-        surfaces += [("Contact.master.nodes", m) for m in (c.master for c in self.contacts) if isinstance(m, Surface)]
-        surfaces += [(f"{t.title}.{name}.nodes", getattr(t, name)) for t in self.ties for name in ("slave", "master")]
-        if self.rigid and isinstance(self.rigid.target, Surface):
-            surfaces.append(("RigidPhase.target.nodes", self.rigid.target))
-        named += [(field, surface.body, surface.nodes, True) for field, surface in surfaces]
+        named += [(f"{field}.nodes", surface.body, surface.nodes, True) for field, surface in self._surfaces()]
         return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in self.probes if p.nodes is not None]
 
     @property

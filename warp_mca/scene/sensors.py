@@ -86,9 +86,8 @@ class Section:
         validate.plain(self)
         validate.texts("Section", name=self.name)
         validate.texts(self.title, body=self.body)
-        validate.vectors(self.title, at=self.at, normal=self.normal)
-        if not any(self.normal):
-            raise bad_value(f"{self.title}.normal", self.normal, "give a vector that is not zero")
+        validate.vectors(self.title, at=self.at)
+        validate.directions(self.title, normal=self.normal)
 
     @property
     def title(self) -> str:

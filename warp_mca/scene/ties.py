@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.scene.bodies import Vec3
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 ON_HOLE = 1e-3  # distance from the surface of a hole, as a share of its radius
 COINCIDENT = 1e-6  # distance of coincident nodes, as a share of the extent of the joint's first body

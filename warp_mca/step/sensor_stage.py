@@ -8,7 +8,7 @@ copies of their histories: the slots of the step itself may hold sums over eleme
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Index
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.records import sensors as kernels
 from warp_mca.model.assembly import Block
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
     from warp_mca.step.stage import Step
     from warp_mca.step.state import State
-
-Index = NDArray[np.int32]
 
 
 class SensorStage:
@@ -184,14 +183,8 @@ class _Sections:
                 continue
             block, own = solver.model.blocks[k], mine[chosen]
             element, counted = _with_neighbours(block, own)
-            part = Block(
-                element=block.element,
-                law=block.law,
-                finite=block.finite,
-                conn=np.ascontiguousarray(block.conn[:, element]),
-                material=block.material[element],
-                first=0,
-            )
+            conn = np.ascontiguousarray(block.conn[:, element])
+            part = replace(block, conn=conn, material=block.material[element], first=0, ends=(), part_ends=())
             stage = ELEMENTS[block.element].stage(part, solver.model.X, solver.precision)
             stage.slot = self._slots
             self.layers.append(_Layer(k, _ints(element), stage, stage.new_state()))

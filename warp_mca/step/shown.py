@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Index
 from warp_mca.geometry.cell_types import is_triangle, triangulated
-
-Index = NDArray[np.int32]
 
 # What a frame can hold. Only what a recorder of the run asks for is computed and copied.
 SURFACE, CONTACT, PATHS, VOLUME = NEEDS = "surface", "contact", "paths", "volume"

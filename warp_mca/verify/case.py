@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -58,7 +58,7 @@ class Setup:
         return mca.run(self.with_element(scene), meshes=meshes, **settings)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Row:
     """One quantity beside its known value.
 
@@ -78,7 +78,7 @@ class Row:
 
     quantity: str
     exact: float
-    measured: tuple[float, ...]
+    measured: Sequence[float]
     unit: str
     tolerance: float
     why: str
@@ -86,6 +86,9 @@ class Row:
     scale: float | None = None
     least_order: float | None = None
     open: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "measured", tuple(self.measured))
 
     @property
     def errors(self) -> tuple[float, ...]:
@@ -112,6 +115,9 @@ class Row:
         return good and (self.least_order is None or (self.order is not None and self.order >= self.least_order))
 
 
+Measure = Callable[[Setup], list[Row]]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Case:
     """A verification case.
@@ -130,7 +136,7 @@ class Case:
     group: str
     title: str
     reference: str
-    measure: Callable[[Setup], list[Row]]
+    measure: Measure
     needs: str | None = None
     uses_elements: bool = True
 
@@ -146,28 +152,13 @@ def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: floa
     return time[k] + share * (time[k + 1] - time[k])
 
 
-def case(
-    *,
-    group: str,
-    title: str,
-    reference: str,
-    needs: str | None = None,
-    uses_elements: bool = True,
-) -> Callable[[Callable[[Setup], list[Row]]], Callable[[Setup], list[Row]]]:
-    """Register the function below as the case of its name."""
+def case(**facts: Any) -> Callable[[Measure], Measure]:
+    """Register the function below as the case of its name; `facts` are the other fields of `Case`."""
 
-    def register(measure: Callable[[Setup], list[Row]]) -> Callable[[Setup], list[Row]]:
+    def register(measure: Measure) -> Measure:
         name: str = measure.__name__  # type: ignore[attr-defined]
         assert name not in CASES, name
-        CASES[name] = Case(
-            name=name,
-            group=group,
-            title=title,
-            reference=reference,
-            measure=measure,
-            needs=needs,
-            uses_elements=uses_elements,
-        )
+        CASES[name] = Case(name=name, measure=measure, **facts)
         return measure
 
     return register

@@ -67,31 +67,11 @@ def sliding_block(setup: Setup) -> list[Row]:
         time.append(slid(result.time, speed))
         heat.append(float(result["E_friction"][-1]))
     springs = "the tangential springs stretch by 0.015 % of the way, and the block swings on them in the end"
+    line = "of the line through the middle 80 % of the speed; the block bounces a little as it slides"
     return [
-        Row(
-            quantity="distance",
-            exact=SPEED**2 / (2.0 * MU * GRAVITY),
-            measured=tuple(distance),
-            unit="m",
-            tolerance=0.0005,
-            why=springs,
-        ),
-        Row(
-            quantity="time",
-            exact=SPEED / (MU * GRAVITY),
-            measured=tuple(time),
-            unit="s",
-            tolerance=0.001,
-            why="of the line through the middle 80 % of the speed; the block bounces a little as it slides",
-        ),
-        Row(
-            quantity="heat",
-            exact=0.5 * MASS * SPEED**2,
-            measured=tuple(heat),
-            unit="J",
-            tolerance=0.0002,
-            why=springs,
-        ),
+        Row("distance", SPEED**2 / (2.0 * MU * GRAVITY), distance, "m", 0.0005, springs),
+        Row("time", SPEED / (MU * GRAVITY), time, "s", 0.001, line),
+        Row("heat", 0.5 * MASS * SPEED**2, heat, "J", 0.0002, springs),
     ]
 
 
@@ -117,41 +97,14 @@ def block_on_belt(setup: Setup) -> list[Row]:
         heat.append(float(result["E_friction"][-1]))
         work.append(float(result.summary["energy"]["external_work"]))
     swing = "the block swings on its contact springs"
+    line = "of the line through the middle 80 % of the slip; the block bounces a little as it slides"
+    modes = setup.by_element(swing, tet4=swing + ", in more than one mode: the mean is not over whole ones")
     return [
-        Row(
-            quantity="time",
-            exact=exact,
-            measured=tuple(time),
-            unit="s",
-            tolerance=0.001,
-            why="of the line through the middle 80 % of the slip; the block bounces a little as it slides",
-        ),
-        Row(
-            quantity="speed then",
-            exact=SPEED,
-            measured=tuple(speed),
-            unit="m/s",
-            tolerance=setup.by_element(0.0005, tet4=0.0015),
-            why=setup.by_element(swing, tet4=swing + ", in more than one mode: the mean is not over whole ones"),
-        ),
-        Row(
-            quantity="friction F_t then",
-            exact=0.0,
-            measured=tuple(rest),
-            unit="N",
-            tolerance=0.02,
-            why=swing,
-            scale=MU * MASS * GRAVITY,
-        ),
-        Row(quantity="heat", exact=0.5 * MASS * SPEED**2, measured=tuple(heat), unit="J", tolerance=0.0002, why=swing),
-        Row(
-            quantity="work of the belt",
-            exact=MASS * SPEED**2,
-            measured=tuple(work),
-            unit="J",
-            tolerance=0.005,
-            why=swing + ": mu g / omega is 0.5 % of its speed",
-        ),
+        Row("time", exact, time, "s", 0.001, line),
+        Row("speed then", SPEED, speed, "m/s", setup.by_element(0.0005, tet4=0.0015), modes),
+        Row("friction F_t then", 0.0, rest, "N", 0.02, swing, scale=MU * MASS * GRAVITY),
+        Row("heat", 0.5 * MASS * SPEED**2, heat, "J", 0.0002, swing),
+        Row("work of the belt", MASS * SPEED**2, work, "J", 0.005, swing + ": mu g / omega is 0.5 % of its speed"),
     ]
 
 
@@ -170,23 +123,12 @@ def friction_work(setup: Setup) -> list[Row]:
     work = SPEED * (impulse(result)[-1] - impulse(result)[half])
     heat = result["E_friction"][-1] - result["E_friction"][half]
     stored = MU**2 / (1.0 + MU**2) * (result["E_contact"][-1] - result["E_contact"][half])
+    sums = "the force is summed by rectangles, the heat by trapezoids"
+    stretch = "the springs are stretched first, over 0.015 % of the way"
+    share = (float(result["E_friction"][-1] / (MU * MASS * GRAVITY * SPEED * result.time[-1])),)
     return [
-        Row(
-            quantity="heat and springs' energy over force times slip",
-            exact=1.0,
-            measured=(float((heat + stored) / work),),
-            unit="-",
-            tolerance=2e-5,
-            why="the force is summed by rectangles, the heat by trapezoids",
-        ),
-        Row(
-            quantity="heat over mu m g v t",
-            exact=1.0,
-            measured=(float(result["E_friction"][-1] / (MU * MASS * GRAVITY * SPEED * result.time[-1])),),
-            unit="-",
-            tolerance=0.0005,
-            why="the springs are stretched first, over 0.015 % of the way",
-        ),
+        Row("heat and springs' energy over force times slip", 1.0, (float((heat + stored) / work),), "-", 2e-5, sums),
+        Row("heat over mu m g v t", 1.0, share, "-", 0.0005, stretch),
     ]
 
 
@@ -215,33 +157,12 @@ def sticking_energy(setup: Setup) -> list[Row]:
         moving = float(result["E_kinetic"][0])
         kept.append(float(np.abs(energy - energy[0]).max()) / moving)
         heat.append(float(result["E_friction"][-1]) / moving)
+    yields = "the block itself yields by 0.1 % of what its springs do"
+    single = "elements in single precision"
     return [
-        Row(
-            quantity="frequency over sqrt(k / m)",
-            exact=1.0,
-            measured=tuple(omega),
-            unit="-",
-            tolerance=0.001,
-            why="the block itself yields by 0.1 % of what its springs do",
-        ),
-        Row(
-            quantity="energy lost or won over that of the motion",
-            exact=0.0,
-            measured=tuple(kept),
-            unit="-",
-            tolerance=1e-5,
-            why="elements in single precision",
-            scale=1.0,
-        ),
-        Row(
-            quantity="heat over the energy of the motion",
-            exact=0.0,
-            measured=tuple(heat),
-            unit="-",
-            tolerance=1e-12,
-            why="nothing slips: rounding alone",
-            scale=1.0,
-        ),
+        Row("frequency over sqrt(k / m)", 1.0, omega, "-", 0.001, yields),
+        Row("energy lost or won over that of the motion", 0.0, kept, "-", 1e-5, single, scale=1.0),
+        Row("heat over the energy of the motion", 0.0, heat, "-", 1e-12, "nothing slips: rounding alone", scale=1.0),
     ]
 
 
@@ -274,13 +195,11 @@ def stick_slip(setup: Setup) -> list[Row]:
         amplitude.append(0.5 * float(reached[0] - reached[1]))
         warmed = np.interp([first, first + 2.0 * math.pi / omega], result.time, result["E_friction"])
         heat.append(float(warmed[1] - warmed[0]))
-    rows = (
-        ("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
-        ("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0001, "speed is straight between rows"),
-        ("amplitude", v / omega, amplitude, "m", 0.0005, "contact stretches by 0.01 %, few waves stay in the spring"),
-        ("heat in the first swing", force * v * 2.0 * math.pi / omega, heat, "J", 0.0002, "its start is read to a row"),
-    )
+    why = "contact stretches by 0.01 %, few waves stay in the spring"
+    heated = force * v * 2.0 * math.pi / omega
     return [
-        Row(quantity=quantity, exact=exact, measured=tuple(measured), unit=unit, tolerance=tolerance, why=why)
-        for quantity, exact, measured, unit, tolerance, why in rows
+        Row("time for which it sticks", force / (stiffness * v), stuck, "s", 0.005, "read to half of 0.5 %"),
+        Row("period of the swing", 2.0 * math.pi / omega, period, "s", 0.0001, "speed is straight between rows"),
+        Row("amplitude", v / omega, amplitude, "m", 0.0005, why),
+        Row("heat in the first swing", heated, heat, "J", 0.0002, "its start is read to a row"),
     ]

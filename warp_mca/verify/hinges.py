@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.recorders import Cadence
+from warp_mca.base.arrays import Array
+from warp_mca.recorders.recorder import Cadence, FramesOnly
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.vibration import fitted_frequencies
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.recorders.recorder import Frame, RunInfo
 
-Array = NDArray[np.float64]
 
 E, RHO, LENGTH, SIDE = 70e9, 2700.0, 1.0, 0.01  # of the spinning rod [Pa], [kg/m^3], [m], [m]
 PACE = math.sqrt(E / RHO) / LENGTH  # of waves along it [1/s]
@@ -77,42 +77,18 @@ def spinning_rod(setup: Setup) -> list[Row]:
     counts = setup.choose((20, 40), (20, 40, 80))
     centre, greatest = zip(*(_free_spin(setup, count) for count in counts), strict=True)
     quarter, reaction = zip(*(_hinged_spin(setup, count) for count in counts), strict=True)
+    window = setup.by_element(
+        "what the window leaves of the oscillation",
+        tet4="stress of a tetrahedron is constant, and those around a node are not symmetric about it: order 1",
+    )
+    ripples = "ripples where waves meet, shorter than a few elements"
+    hinge = "what the window leaves of the oscillation, and the hinge's disturbance of the stress at 25 widths"
+    higher = "higher modes, of which four periods of the lowest are not whole ones"
     return [
-        Row(
-            quantity="free: mean stress at the centre",
-            exact=load / 8.0,
-            measured=centre,
-            unit="Pa",
-            tolerance=setup.by_element(1e-4, tet4=5e-4),
-            why=setup.by_element(
-                "what the window leaves of the oscillation",
-                tet4="stress of a tetrahedron is constant, and those around a node are not symmetric about it: order 1",
-            ),
-        ),
-        Row(
-            quantity="free: greatest stress at the centre",
-            exact=load / 4.0,
-            measured=greatest,
-            unit="Pa",
-            tolerance=0.003,
-            why="ripples where waves meet, shorter than a few elements",
-        ),
-        Row(
-            quantity="hinged: mean stress at L / 4",
-            exact=load * 15.0 / 32.0,
-            measured=quarter,
-            unit="Pa",
-            tolerance=0.0005,
-            why="what the window leaves of the oscillation, and the hinge's disturbance of the stress at 25 widths",
-        ),
-        Row(
-            quantity="hinged: mean reaction",
-            exact=0.5 * load * SIDE**2,
-            measured=reaction,
-            unit="N",
-            tolerance=0.0002,
-            why="higher modes, of which four periods of the lowest are not whole ones",
-        ),
+        Row("free: mean stress at the centre", load / 8.0, centre, "Pa", setup.by_element(1e-4, tet4=5e-4), window),
+        Row("free: greatest stress at the centre", load / 4.0, greatest, "Pa", 0.003, ripples),
+        Row("hinged: mean stress at L / 4", load * 15.0 / 32.0, quarter, "Pa", 0.0005, hinge),
+        Row("hinged: mean reaction", 0.5 * load * SIDE**2, reaction, "N", 0.0002, higher),
     ]
 
 
@@ -137,7 +113,7 @@ def rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[A
     return travel(1), travel(0), chain.kinetic_energy(end.theta, end.theta_dot)
 
 
-class _Ends:
+class _Ends(FramesOnly):
     """A recorder that keeps how far the end of each link has travelled.
 
     The sum of the history's velocities would not do: links vibrate faster than rows are written, in mixed precision at
@@ -169,12 +145,6 @@ class _Ends:
         for link, nodes in self._nodes.items():
             here = frame.points[link][nodes].astype(np.float64).mean(axis=0)
             self.travel[link] = here - self._first.setdefault(link, here)
-
-    def history(self, rows: object) -> None:
-        """Not used."""
-
-    def finish(self, succeeded: bool) -> None:
-        """Nothing to close."""
 
 
 @case(
@@ -219,35 +189,10 @@ def _swinging_links(setup: Setup, **parameters: object) -> list[Row]:
     why = "the links bend and stretch in proportion to 1 / E, and so by order 2 in the inverse of the speed of waves"
     # float32 feeds up to 4e-6 of the energy into vibration of links that turn, beside an error of 4e-5 to 5e-5
     order = 1.7 if setup.precision == "float64" else 1.6
+    distance = "distance of the tip from that of the rigid chain"
+    energy = "kinetic energy at the end"
     return [
-        Row(
-            quantity="distance of the tip from that of the rigid chain",
-            exact=0.0,
-            measured=tuple(tip),
-            unit="m",
-            scale=LENGTH,
-            tolerance=3e-4 * share,
-            why=why,
-            sizes=sizes,
-            least_order=1.7,
-        ),
-        Row(
-            quantity="displacement of hinge A along x",
-            exact=float(hinge_exact[0]),
-            measured=tuple(hinge),
-            unit="m",
-            tolerance=3e-4 * share,
-            why=why,
-            sizes=sizes,
-        ),
-        Row(
-            quantity="kinetic energy at the end",
-            exact=kinetic_exact,
-            measured=tuple(kinetic),
-            unit="J",
-            tolerance=3e-4 * share,
-            why=why,
-            sizes=sizes,
-            least_order=order,
-        ),
+        Row(distance, 0.0, tip, "m", 3e-4 * share, why, scale=LENGTH, sizes=sizes, least_order=1.7),
+        Row("displacement of hinge A along x", float(hinge_exact[0]), hinge, "m", 3e-4 * share, why, sizes=sizes),
+        Row(energy, kinetic_exact, kinetic, "J", 3e-4 * share, why, sizes=sizes, least_order=order),
     ]

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import warp_mca as mca
 from warp_mca.verify.case import Row, Setup, case, crossings
-
-if TYPE_CHECKING:
-    pass
 
 
 @case(
@@ -30,25 +26,11 @@ def rod_on_wall(setup: Setup) -> list[Row]:
         half = crossings(result.time, result.F_n, 0.5 * exact)
         duration.append(float(half[-1] - half[0]))
     sizes = tuple(2.0 / count for count in counts)
+    mean = "its mean over the middle half of contact leaves out the oscillations behind the front"
+    front = "the front is smeared over an element or two, of 40 along the rod"
     return [
-        Row(
-            quantity="force F",
-            exact=exact,
-            measured=tuple(force),
-            unit="N",
-            tolerance=0.002,
-            why="its mean over the middle half of contact leaves out the oscillations behind the front",
-            sizes=sizes,
-        ),
-        Row(
-            quantity="duration at F / 2",
-            exact=2.0 * 2.0 / c,
-            measured=tuple(duration),
-            unit="s",
-            tolerance=0.02,
-            why="the front is smeared over an element or two, of 40 along the rod",
-            sizes=sizes,
-        ),
+        Row("force F", exact, force, "N", 0.002, mean, sizes=sizes),
+        Row("duration at F / 2", 2.0 * 2.0 / c, duration, "s", 0.02, front, sizes=sizes),
     ]
 
 
@@ -83,47 +65,13 @@ def coaxial_rods(setup: Setup) -> list[Row]:
     force, duration, short, restitution = zip(*map(figures, counts), strict=True)
     sizes = tuple(length / count for count in counts)
     front = "dispersion smears the front over (L h^2)^(1/3), so errors fall as h^(2/3)"
+    mean = "its mean over the middle half of contact leaves out the oscillations behind the front"
+    afterwards = "speed v1 of the short rod afterwards"
     return [
-        Row(
-            quantity="force F",
-            exact=exact,
-            measured=force,
-            unit="N",
-            tolerance=0.002,
-            why="its mean over the middle half of contact leaves out the oscillations behind the front",
-            sizes=sizes,
-        ),
-        Row(
-            quantity="duration at F / 2",
-            exact=transit,
-            measured=duration,
-            unit="s",
-            tolerance=0.03,
-            why=front,
-            sizes=sizes,
-            least_order=0.5,
-        ),
-        Row(
-            quantity="speed v1 of the short rod afterwards",
-            exact=0.0,
-            measured=short,
-            unit="m/s",
-            tolerance=0.01,
-            why=front,
-            sizes=sizes,
-            scale=v,
-            least_order=0.5,
-        ),
-        Row(
-            quantity="restitution e",
-            exact=0.5,
-            measured=restitution,
-            unit="-",
-            tolerance=0.03,
-            why=front,
-            sizes=sizes,
-            least_order=0.5,
-        ),
+        Row("force F", exact, force, "N", 0.002, mean, sizes=sizes),
+        Row("duration at F / 2", transit, duration, "s", 0.03, front, sizes=sizes, least_order=0.5),
+        Row(afterwards, 0.0, short, "m/s", 0.01, front, sizes=sizes, scale=v, least_order=0.5),
+        Row("restitution e", 0.5, restitution, "-", 0.03, front, sizes=sizes, least_order=0.5),
     ]
 
 
@@ -167,30 +115,9 @@ def hertz_sphere(setup: Setup) -> list[Row]:
     exponent = math.log(found[0][0] / peak_and_duration(setup.run(slow))[0]) / math.log(4.0)
     force, duration = hertz(1.0, STEEL)
     return [
-        Row(
-            quantity="peak force F_max",
-            exact=force,
-            measured=tuple(item[0] for item in found),
-            unit="N",
-            tolerance=0.02,
-            why=FINITE,
-        ),
-        Row(
-            quantity="duration",
-            exact=duration,
-            measured=tuple(item[1] for item in found),
-            unit="s",
-            tolerance=0.025,
-            why=FINITE + "; read to 0.0025",
-        ),
-        Row(
-            quantity="exponent of v in F_max",
-            exact=1.2,
-            measured=(exponent,),
-            unit="-",
-            tolerance=0.01,
-            why="a / R is 0.04 at one speed and 0.02 at the other",
-        ),
+        Row("peak force F_max", force, [item[0] for item in found], "N", 0.02, FINITE),
+        Row("duration", duration, [item[1] for item in found], "s", 0.025, FINITE + "; read to 0.0025"),
+        Row("exponent of v in F_max", 1.2, (exponent,), "-", 0.01, "a / R is 0.04 at one speed and 0.02 at the other"),
     ]
 
 
@@ -214,16 +141,6 @@ def hertz_block(setup: Setup) -> list[Row]:
         more = "linear tetrahedra under the contact add 1.5 %, of order 1.4: 6.3, 3.5, 2.3 % with 4, 6, 8 layers"
         limit, reason = 0.04, f"{FINITE}; {more}"
     return [
-        Row(
-            quantity=quantity,
-            exact=exact,
-            measured=measured,
-            unit=unit,
-            tolerance=tolerance,
-            why=why,
-        )
-        for quantity, exact, measured, unit, tolerance, why in (
-            ("peak force F_max", force, tuple(item[0] for item in found), "N", 0.025, FINITE),
-            ("duration", duration, tuple(item[1] for item in found), "s", limit, reason),
-        )
+        Row("peak force F_max", force, [item[0] for item in found], "N", 0.025, FINITE),
+        Row("duration", duration, [item[1] for item in found], "s", limit, reason),
     ]

@@ -6,13 +6,11 @@ import dataclasses
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
 from warp_mca.verify.material import NU, SIGMA_Y, SIZE, E, imposed_course, integrated_stress
-
-Array = NDArray[np.float64]
 
 STRAIN = 0.08  # greatest axial strain [-]
 
@@ -86,27 +84,11 @@ def large_tension_torsion(setup: Setup) -> list[Row]:
         order = 0.9
         left = (steps[-2] / steps[-1]) ** order - 1.0
         why = f"what order {order:g} in the step leaves of the change from the run before: the direction of flow turns"
+        limits = (worst[-2] - worst[-1]) / left / SIGMA_Y, abs(work[-1] - work[-2]) / left / known
+        more = {"sizes": tuple(steps), "least_order": order}
+        greatest, share = f"greatest error of any component of stress, {course}", why + "; a share of the yield stress"
         rows += [
-            Row(
-                quantity=f"greatest error of any component of stress, {course}",
-                exact=0.0,
-                measured=tuple(worst),
-                unit="Pa",
-                tolerance=(worst[-2] - worst[-1]) / left / SIGMA_Y,
-                why=why + "; a share of the yield stress",
-                scale=SIGMA_Y,
-                sizes=tuple(steps),
-                least_order=order,
-            ),
-            Row(
-                quantity=f"work of the driven nodes, {course}",
-                exact=known,
-                measured=tuple(work),
-                unit="J",
-                tolerance=abs(work[-1] - work[-2]) / left / known,
-                why=why,
-                sizes=tuple(steps),
-                least_order=order,
-            ),
+            Row(greatest, 0.0, worst, "Pa", limits[0], share, scale=SIGMA_Y, **more),
+            Row(f"work of the driven nodes, {course}", known, work, "J", limits[1], why, **more),
         ]
     return rows

@@ -6,12 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
-
-Array = NDArray[np.float64]
 
 E, NU, SIGMA_Y, E_T = 200e9, 0.3, 400e6, 20e9  # the defaults of the scenes
 H = E * E_T / (E - E_T)
@@ -86,27 +84,13 @@ def cyclic(setup: Setup) -> list[Row]:
             worst.append(float(np.abs(stress - _bilinear(strain, beta)[0]).max()))
             turned.append(_reversed_yield(stress, strain))
         rates = tuple(1.0 / stroke for stroke in strokes)
+        vibrate = "of the yield stress; the free sides vibrate a little, the less the slower the strokes"
+        what, after = f"greatest error of stress, beta = {beta:g}", f"yield stress after tension, beta = {beta:g}"
+        lines = "of the yield stress; lines laid through stresses that vibrate a little"
+        lower = greatest - 2.0 * (SIGMA_Y + beta * (greatest - SIGMA_Y))
         rows += [
-            Row(
-                quantity=f"greatest error of stress, beta = {beta:g}",
-                exact=0.0,
-                measured=tuple(worst),
-                unit="Pa",
-                tolerance=6e-4,
-                why="of the yield stress; the free sides vibrate a little, the less the slower the strokes",
-                scale=SIGMA_Y,
-                sizes=rates,
-            ),
-            Row(
-                quantity=f"yield stress after tension, beta = {beta:g}",
-                exact=greatest - 2.0 * (SIGMA_Y + beta * (greatest - SIGMA_Y)),
-                measured=tuple(turned),
-                unit="Pa",
-                tolerance=5e-5,
-                why="of the yield stress; lines laid through stresses that vibrate a little",
-                scale=SIGMA_Y,
-                sizes=rates,
-            ),
+            Row(what, 0.0, worst, "Pa", 6e-4, vibrate, scale=SIGMA_Y, sizes=rates),
+            Row(after, lower, turned, "Pa", 5e-5, lines, scale=SIGMA_Y, sizes=rates),
         ]
     return rows
 
@@ -126,16 +110,8 @@ def plastic_dissipation(setup: Setup) -> list[Row]:
             result, strain = _cycle(setup, stroke, beta)
             measured.append(float(result["E_plastic"][-1]))
             exact = float(_bilinear(strain, beta)[1][-1]) * SIZE**3
-        rows.append(
-            Row(
-                quantity=f"plastic work, beta = {beta:g}",
-                exact=exact,
-                measured=tuple(measured),
-                unit="J",
-                tolerance=1e-5,
-                why="what the vibration of the free sides adds",
-            )
-        )
+        why = "what the vibration of the free sides adds"
+        rows.append(Row(f"plastic work, beta = {beta:g}", exact, measured, "J", 1e-5, why))
     return rows
 
 
@@ -222,19 +198,9 @@ def tension_torsion(setup: Setup) -> list[Row]:
             exact = _exact_course(F, fine, 0.5)[::10]
             worst.append(float(np.abs(result.paths[0].stress[:, 1] - exact).max()))
             steps.append(result.summary["dt"] / duration)
-        rows.append(
-            Row(
-                quantity=f"greatest error of any component, {course}",
-                exact=0.0,
-                measured=tuple(worst),
-                unit="Pa",
-                tolerance=tolerance,
-                why="of the yield stress; the return is of first order in the step where the direction of flow turns",
-                scale=SIGMA_Y,
-                sizes=tuple(steps),
-                least_order=order,
-            )
-        )
+        why = "of the yield stress; the return is of first order in the step where the direction of flow turns"
+        what = f"greatest error of any component, {course}"
+        rows.append(Row(what, 0.0, worst, "Pa", tolerance, why, scale=SIGMA_Y, sizes=tuple(steps), least_order=order))
     return rows
 
 
@@ -276,15 +242,7 @@ def yield_surface(setup: Setup) -> list[Row]:
         xi = S - (2.0 / 3.0 * (1.0 - beta) * H)[:, None, None] * plastic
         off = np.abs(np.sqrt(1.5 * (xi**2).sum(axis=(1, 2))) - SIGMA_Y - beta * H * p)
         trial = np.sqrt(6.0 * G * G * ((strain - before) ** 2).sum(axis=(1, 2)))
-        rows.append(
-            Row(
-                quantity=f"distance from the surface over the trial stress, {precision}",
-                exact=0.0,
-                measured=(float((off / trial).max()),),
-                unit="-",
-                tolerance=6.0 * rounding,
-                why="six roundings of the trial stress, by which the return goes back",
-                scale=1.0,
-            )
-        )
+        why = "six roundings of the trial stress, by which the return goes back"
+        what = f"distance from the surface over the trial stress, {precision}"
+        rows.append(Row(what, 0.0, (float((off / trial).max()),), "-", 6.0 * rounding, why, scale=1.0))
     return rows

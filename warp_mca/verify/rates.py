@@ -29,30 +29,12 @@ def graded_bars(setup: Setup) -> list[Row]:
         mean.append(float(force.mean()) / v)
         ripple.append(float(force.std() / usual.std()))
         end.append(grouped.summary["contacts"][-1][1])
+    coarsest = "a vibration of the coarsest cells, whose period does not divide the time"
+    beyond = "measured beyond 1: groups may not add to it"
+    front = "the front is as wide as a few cells; rows are 0.1 s apart"
+    rippled = "ripple of the force, standard deviation over that with one step for all"
     return [
-        Row(
-            quantity="mean force over the speed, rho c A, over 1 < t < 19",
-            exact=1.0,
-            measured=tuple(mean),
-            unit="N s/m",
-            tolerance=0.01,
-            why="a vibration of the coarsest cells, whose period does not divide the time",
-        ),
-        Row(
-            quantity="ripple of the force, standard deviation over that with one step for all",
-            exact=0.0,
-            measured=tuple(max(share - 1.0, 0.0) for share in ripple),
-            unit="-",
-            scale=1.0,
-            tolerance=0.0,
-            why="measured beyond 1: groups may not add to it",
-        ),
-        Row(
-            quantity="end of contact 2 l / c",
-            exact=20.0,
-            measured=tuple(end),
-            unit="s",
-            tolerance=0.03,
-            why="the front is as wide as a few cells; rows are 0.1 s apart",
-        ),
+        Row("mean force over the speed, rho c A, over 1 < t < 19", 1.0, mean, "N s/m", 0.01, coarsest),
+        Row(rippled, 0.0, [max(share - 1.0, 0.0) for share in ripple], "-", 0.0, beyond, scale=1.0),
+        Row("end of contact 2 l / c", 20.0, end, "s", 0.03, front),
     ]

@@ -6,15 +6,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
     from warp_mca.rigid.swing import Swing
 
-Array = NDArray[np.float64]
 
 SPAN = 1.0  # of the free swings [s]
 ROUND_OFF = 1e-12
@@ -103,19 +102,11 @@ def chain_mujoco(setup: Setup) -> list[Row]:
     for count, (chain, theta, theta_dot) in chains.items():
         mine = free_swing(chain, theta, theta_dot)
         other = [mujoco_swing(chain, theta, theta_dot, len(mine.t), n) for n in substeps]
-        rows.append(
-            Row(
-                quantity=f"largest difference of an angle, {count} links",
-                exact=0.0,
-                measured=tuple(float(np.abs(angles - mine.theta_t).max()) for angles in other),
-                unit="rad",
-                scale=1.0,
-                tolerance=2e-9,
-                why="the other code's error, which falls with the fourth power of its time step",
-                sizes=tuple(1.0 / n for n in substeps),
-                least_order=3.7,
-            )
-        )
+        why = "the other code's error, which falls with the fourth power of its time step"
+        sizes = tuple(1.0 / n for n in substeps)
+        what = f"largest difference of an angle, {count} links"
+        off = [float(np.abs(angles - mine.theta_t).max()) for angles in other]
+        rows.append(Row(what, 0.0, off, "rad", 2e-9, why, scale=1.0, sizes=sizes, least_order=3.7))
     return rows
 
 
@@ -134,33 +125,13 @@ def chain_energy(setup: Setup) -> list[Row]:
     momentum = [chain.angular_momentum(a, b) for a, b in zip(free.theta_t, free.theta_dot_t, strict=True)]
     worst = int(np.abs(np.array(momentum) - momentum[0]).argmax())
     why = "the integrator's relative tolerance of 1e-12 a step, over some hundred steps"
+    change = "largest change of energy, over the largest kinetic energy"
+    spin = "angular momentum about O without gravity, where it is farthest from its first value"
+    dense = "the same, through the integrator's dense output"
     return [
-        Row(
-            quantity="largest change of energy, over the largest kinetic energy",
-            exact=0.0,
-            measured=(falling.energy_drift,),
-            unit="-",
-            scale=1.0,
-            tolerance=1e-12,
-            why=why,
-        ),
-        Row(
-            quantity="energy without gravity, likewise",
-            exact=0.0,
-            measured=(free.energy_drift,),
-            unit="-",
-            scale=1.0,
-            tolerance=1e-12,
-            why=why,
-        ),
-        Row(
-            quantity="angular momentum about O without gravity, where it is farthest from its first value",
-            exact=momentum[0],
-            measured=(momentum[worst],),
-            unit="kg m^2/s",
-            tolerance=1e-12,
-            why="the same, through the integrator's dense output",
-        ),
+        Row(change, 0.0, (falling.energy_drift,), "-", 1e-12, why, scale=1.0),
+        Row("energy without gravity, likewise", 0.0, (free.energy_drift,), "-", 1e-12, why, scale=1.0),
+        Row(spin, momentum[0], (momentum[worst],), "kg m^2/s", 1e-12, dense),
     ]
 
 
@@ -219,15 +190,7 @@ def handoff_conservation(setup: Setup) -> list[Row]:
 def _kept(quantity: str, measured: float, exact: float, unit: str, scale: float | None = None) -> Row:
     """A figure that is kept to round-off."""
     why = "round-off of sums over the nodes"
-    return Row(
-        quantity=quantity,
-        exact=float(exact),
-        measured=(float(measured),),
-        unit=unit,
-        scale=scale,
-        tolerance=ROUND_OFF,
-        why=why,
-    )
+    return Row(quantity, float(exact), (float(measured),), unit, ROUND_OFF, why, scale=scale)
 
 
 def vibration(points: Array) -> Array:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.scenes.spinning_top import inertia
 from warp_mca.verify.case import Row, Setup, case, crossings
 from warp_mca.verify.hinges import LENGTH, SPAN, THETA, THETA_DOT, rigid_pendulum
 from warp_mca.verify.impact import FINITE, HERTZ, STEEL, hertz, peak_and_duration
-
-Array = NDArray[np.float64]
 
 RATE = 20.0  # of the tops' precession [rad/s]
 ROUND_OFF = 1e-12
@@ -48,35 +45,12 @@ def free_top(setup: Setup) -> list[Row]:
     spin = [np.array(result.summary["rigid_bodies"]["top"]["spin"]) for result in results]
     off = [float(np.linalg.norm(L - [0.0, 0.0, across * RATE])) for L in spin]
     kinetic = [result["E_kinetic"] for result in results]
+    change = [float(np.abs(K - K[0]).max()) for K in kinetic]
+    steady = "round-off: the scheme precesses steadily too"
     return [
-        Row(
-            quantity="rate of precession",
-            exact=RATE,
-            measured=rate,
-            unit="rad/s",
-            tolerance=5e-6,
-            why=SECOND,
-            sizes=sizes,
-            least_order=1.9,
-        ),
-        Row(
-            quantity="change of the angular momentum",
-            exact=0.0,
-            measured=tuple(off),
-            unit="kg m^2/s",
-            scale=across * RATE,
-            tolerance=ROUND_OFF,
-            why="round-off",
-        ),
-        Row(
-            quantity="greatest change of the kinetic energy",
-            exact=0.0,
-            measured=tuple(float(np.abs(K - K[0]).max()) for K in kinetic),
-            unit="J",
-            scale=float(kinetic[-1][0]),
-            tolerance=ROUND_OFF,
-            why="round-off: the scheme precesses steadily too",
-        ),
+        Row("rate of precession", RATE, rate, "rad/s", 5e-6, SECOND, sizes=sizes, least_order=1.9),
+        Row("change of the angular momentum", 0.0, off, "kg m^2/s", ROUND_OFF, "round-off", scale=across * RATE),
+        Row("greatest change of the kinetic energy", 0.0, change, "J", ROUND_OFF, steady, scale=float(kinetic[-1][0])),
     ]
 
 
@@ -90,28 +64,10 @@ def heavy_top(setup: Setup) -> list[Row]:
     """The box of `free_top` stands on the middle of its lower face; g = 9.8 m/s^2."""
     results, sizes = _tops(setup, heavy=True)
     rate, nodding = zip(*map(_precession, results), strict=True)
+    vertical = "vertical speed of the top's end over its speed"
     return [
-        Row(
-            quantity="rate of precession",
-            exact=RATE,
-            measured=rate,
-            unit="rad/s",
-            tolerance=5e-6,
-            why=SECOND,
-            sizes=sizes,
-            least_order=1.9,
-        ),
-        Row(
-            quantity="vertical speed of the top's end over its speed",
-            exact=0.0,
-            measured=nodding,
-            unit="-",
-            scale=1.0,
-            tolerance=5e-6,
-            why=SECOND,
-            sizes=sizes,
-            least_order=1.9,
-        ),
+        Row("rate of precession", RATE, rate, "rad/s", 5e-6, SECOND, sizes=sizes, least_order=1.9),
+        Row(vertical, 0.0, nodding, "-", 5e-6, SECOND, scale=1.0, sizes=sizes, least_order=1.9),
     ]
 
 
@@ -137,28 +93,11 @@ def rigid_pendulum_period(setup: Setup) -> list[Row]:
     # nodes of n cells along a have a^2 / 12 (1 + 2 / n^2) about the middle
     about = mass * ((1.0 + 2.0 / 4**2) / 12.0 + 0.1**2 / 12.0 * 1.5 + 0.25)
     exact = 4.0 * float(ellipk(math.sin(1.0) ** 2)) * math.sqrt(about / (mass * 9.8 * 0.5))
+    sizes = tuple(1.0 / count for count in samples)
+    fall = mass * 9.8 * 0.5
     return [
-        Row(
-            quantity="period",
-            exact=exact,
-            measured=tuple(period),
-            unit="s",
-            tolerance=2e-5,
-            why=SECOND,
-            sizes=tuple(1.0 / count for count in samples),
-            least_order=1.9,
-        ),
-        Row(
-            quantity="greatest error of the energy",
-            exact=0.0,
-            measured=tuple(drift),
-            unit="J",
-            scale=mass * 9.8 * 0.5,
-            tolerance=1e-4,
-            why=SECOND,
-            sizes=tuple(1.0 / count for count in samples),
-            least_order=1.9,
-        ),
+        Row("period", exact, period, "s", 2e-5, SECOND, sizes=sizes, least_order=1.9),
+        Row("greatest error of the energy", 0.0, drift, "J", 1e-4, SECOND, scale=fall, sizes=sizes, least_order=1.9),
     ]
 
 
@@ -182,26 +121,14 @@ def rigid_double_pendulum(setup: Setup) -> list[Row]:
     meshes = mesh(scenes[0])
     _, _, kinetic = rigid_pendulum(meshes, nodal_masses(scenes[0], meshes))
     results = [setup.run(scene, meshes) for scene in scenes]
+    sizes = tuple(1.0 / count for count in samples)
+    ends = [float(result["E_kinetic"][-1]) for result in results]
+    sideways = [float(result.summary["joint_impulse"]["O"][2]) for result in results]
+    whole = float(np.linalg.norm(results[-1].summary["joint_impulse"]["O"]))
+    plane = "round-off: the links stay in their plane"
     return [
-        Row(
-            quantity="kinetic energy at the end",
-            exact=kinetic,
-            measured=tuple(float(result["E_kinetic"][-1]) for result in results),
-            unit="J",
-            tolerance=5e-6,
-            why=SECOND,
-            sizes=tuple(1.0 / count for count in samples),
-            least_order=1.9,
-        ),
-        Row(
-            quantity="impulse of hinge O along z",
-            exact=0.0,
-            measured=tuple(float(result.summary["joint_impulse"]["O"][2]) for result in results),
-            unit="N s",
-            scale=float(np.linalg.norm(results[-1].summary["joint_impulse"]["O"])),
-            tolerance=ROUND_OFF,
-            why="round-off: the links stay in their plane",
-        ),
+        Row("kinetic energy at the end", kinetic, ends, "J", 5e-6, SECOND, sizes=sizes, least_order=1.9),
+        Row("impulse of hinge O along z", 0.0, sideways, "N s", ROUND_OFF, plane, scale=whole),
     ]
 
 
@@ -224,40 +151,12 @@ def rigid_ball(setup: Setup) -> list[Row]:
     exact = hertz(1.0, STEEL)
     sizes = tuple(1.0 / ratio for ratio in ratios)
     near = "the elastic sphere shares the deformation in proportion to 1 / E"
+    limit = setup.by_element(0.025, tet4=0.05)
+    peaks = "peak force of stiff elastic spheres beside the rigid one's"
+    durations = "duration of stiff elastic spheres' contact beside the rigid one's"
     return [
-        Row(
-            quantity="peak force F_max of the rigid sphere",
-            exact=exact[0],
-            measured=(force,),
-            unit="N",
-            tolerance=setup.by_element(0.025, tet4=0.05),
-            why=FINITE,
-        ),
-        Row(
-            quantity="duration of the rigid sphere's contact",
-            exact=exact[1],
-            measured=(duration,),
-            unit="s",
-            tolerance=setup.by_element(0.025, tet4=0.05),
-            why=FINITE,
-        ),
-        Row(
-            quantity="peak force of stiff elastic spheres beside the rigid one's",
-            exact=force,
-            measured=tuple(item[0] for item in stiff),
-            unit="N",
-            tolerance=0.02,
-            why=near,
-            sizes=sizes,
-            least_order=0.7,
-        ),
-        Row(
-            quantity="duration of stiff elastic spheres' contact beside the rigid one's",
-            exact=duration,
-            measured=tuple(item[1] for item in stiff),
-            unit="s",
-            tolerance=0.02,
-            why=near,
-            sizes=sizes,
-        ),
+        Row("peak force F_max of the rigid sphere", exact[0], (force,), "N", limit, FINITE),
+        Row("duration of the rigid sphere's contact", exact[1], (duration,), "s", limit, FINITE),
+        Row(peaks, force, [item[0] for item in stiff], "N", 0.02, near, sizes=sizes, least_order=0.7),
+        Row(durations, duration, [item[1] for item in stiff], "s", 0.02, near, sizes=sizes),
     ]

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.recorders import Cadence
+from warp_mca.recorders.recorder import Cadence, FramesOnly
 from warp_mca.verify.case import Row, Setup, case
 
 if TYPE_CHECKING:
-    from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.recorders.recorder import Frame
 
 
-class _Foot:
+class _Foot(FramesOnly):
     """A recorder that keeps the final shape of `taylor_bar`.
 
     Attributes:
@@ -32,9 +32,6 @@ class _Foot:
         self._nodes: NDArray[np.intp] | None = None
         self.length = self.radius = math.nan
 
-    def start(self, info: RunInfo) -> None:
-        """Nothing to prepare."""
-
     def frame(self, frame: Frame) -> None:
         """Choose the rim in the first frame, measure in each."""
         x, y, z = np.asarray(frame.points["bar"], dtype=np.float64).T
@@ -42,12 +39,6 @@ class _Foot:
         if self._nodes is None:
             self._nodes = np.flatnonzero((x > 0.9999 * self._end) & (distance > 0.999 * self._rim))
         self.length, self.radius = float(np.ptp(x)), float(distance[self._nodes].mean())
-
-    def history(self, rows: object) -> None:
-        """Not used."""
-
-    def finish(self, succeeded: bool) -> None:
-        """Nothing to close."""
 
 
 @case(
@@ -67,25 +58,18 @@ def taylor_bar(setup: Setup) -> list[Row]:
     that the step is a small share of the first stable one.
     """
     counts = setup.choose((24,), (24, 36))
-    rows = []
+    rows, sizes = [], tuple(1.0 / count for count in counts)
     for foot, final_length, final_radius in setup.choose(_FEET[:1], _FEET):
         length, radius = zip(*(mushroom(setup, count, foot) for count in counts), strict=True)
         coarse = 24.0 / counts[-1]
         left = coarse * setup.by_element(0.10, hex8r=0.32), coarse * setup.by_element(0.22, hex8r=0.34, tet4=0.30)
         found = (("length", final_length, length), ("radius", final_radius, radius))
-        rows += [
-            Row(
-                quantity=f"final {what}, foot {foot}",
-                exact=exact,
-                measured=measured,
-                unit="mm",
-                tolerance=(0.03 + mesh) / exact,
-                why=f"the references agree within 0.03 mm; order 1 leaves {mesh:.2f} mm on the finest mesh, as the "
-                "change from 24 to 36 cells shows",
-                sizes=tuple(1.0 / count for count in counts),
+        for (what, exact, measured), mesh in zip(found, left, strict=True):
+            why = f"the references agree within 0.03 mm; order 1 leaves {mesh:.2f} mm on the finest mesh, as the "
+            why += "change from 24 to 36 cells shows"
+            rows.append(
+                Row(f"final {what}, foot {foot}", exact, measured, "mm", (0.03 + mesh) / exact, why, sizes=sizes)
             )
-            for (what, exact, measured), mesh in zip(found, left, strict=True)
-        ]
     return rows
 
 

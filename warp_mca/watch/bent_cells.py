@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warp_mca.base.arrays import Array
+
 TURNS = 8  # of the iteration at most: rotations are exact to rounding for stretches from 0.1 to 10
 
 # What a look finds of the cells of a body, in this order; sums over cells.

@@ -11,13 +11,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
 from warp_mca.scene import RigidPlane, Scene
 from warp_mca.watch.skins import NOWHERE, Found, Skin, crossed
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 SLACK = 0.05  # of the width of a face, and of the thickness of a body, by which skins may cross: they have flat faces

@@ -8,9 +8,7 @@ from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warp_mca.base.arrays import Array
 from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 
-Array = NDArray[np.float64]
 Values = Mapping[str, object]  # that fill the places of a sentence
 Condition = Callable[[Any, float], Iterable[Values]]
 

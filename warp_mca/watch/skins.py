@@ -8,14 +8,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.rotation import best_rotation
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.contact import crossing
 from warp_mca.kernels.contact.inside import depths_inside
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 Found = tuple[float, Array]  # depth [m] and place [m], shape (3,)
 
 INWARD = 0.02  # of its shortest edge, by which a node is moved into its body: skins that only touch do not cross

@@ -8,14 +8,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.scene.absorbing import Absorbing
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 TRANSLATION = 1e-9  # spread of a body's velocities, as a share of the greatest, up to which it translates
 # Stiffness of the springs over G / R, across the boundary and along it (Liu, Du, Du, Wang and Wu, Earthquake Eng. Eng.

@@ -16,13 +16,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.model.assembly import Assembly
 from warp_mca.physics.contact.surfaces import FLAT, Faces
 from warp_mca.scene import Contact, RigidPlane, Surface
-
-Array = NDArray[np.float64]
 
 SHARE = 0.067  # of the energy that springs may hold, by estimate: some 2 % of the force peak
 SATURATION = 1.3

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.face_projection import project
 from warp_mca.scene import RigidPlane
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from warp_mca.physics.contact.surfaces import Faces
     from warp_mca.scene import Contact
 
-Array = NDArray[np.float64]
 
 FLAT = 1e-6  # of the width of a surface, as thin as which it is flat
 INNER = np.arange(1, 8) / 8.0  # places along an edge that are looked at

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
+from warp_mca.base.arrays import Array, Index
 
 SHARP = math.cos(math.radians(50.0))  # between the normals of faces that meet at a sharp edge, at most
 BENT = math.cos(math.radians(0.1))  # between the normals of neighbouring faces of a flat surface, at least

@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.scene import Body, Scene
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 GAIN = 3.0  # measured with `hex8`
 ALLOWED = 1e-4  # growth of the kinetic energy that needs no frames [-]

@@ -8,17 +8,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import mean_pose
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Clusters, Side
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 APART = 1e-3  # of a cluster's extent: distance of the points of both clusters, at most
 FLAT = 1e-3  # of a cluster's radius of inertia: distance from a line below which nodes are on it

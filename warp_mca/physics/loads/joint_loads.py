@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, SCENE, joinable, of
 from warp_mca.model.assembly import Assembly
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain, Vec2
     from warp_mca.rigid.loads import Table
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 ON_AXIS = 1e-6  # of a body's extent: distance from a hinge's axis up to which nodes lie on it
 MARGIN = 1.0 + 1e-9  # so that rounding leaves no node out

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warp_mca.base.arrays import Array
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
-
-Array = NDArray[np.float64]
 
 
 def nodal_gravity(model: Model) -> Array | None:

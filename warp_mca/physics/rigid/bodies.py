@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, SCENE, joinable, of
 from warp_mca.model.assembly import GROUND, Assembly
@@ -22,9 +23,6 @@ from warp_mca.scene import Scene
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.rigid.chain import Chain
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 
 @joinable

@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.scene.joints import Joint
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 HELD = 1e-4  # least share of a rigid motion that shows at fixed axes
 APART = 1e-6  # of the extent of a joint's nodes: distance at which two of them differ

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE, StableStep
 from warp_mca.physics.rigid.bodies import RigidBody
 from warp_mca.scene import Contact, RigidPlane, Scene
-
-Array = NDArray[np.float64]
 
 WHOLE = 100.0
 TURN = 0.01  # of a body in a step at most [rad]: its scheme is then off by some 1e-5 of the angle

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import mean_pose
 from warp_mca.kernels.nodes import rigid_body
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
 
-Array = NDArray[np.float64]
 
 BLOCK = 256  # threads of a GPU for a group of bodies
 

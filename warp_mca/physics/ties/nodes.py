@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.joining import AS_IS, join, joinable, of
 from warp_mca.base.rotation import mean_spin
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.scene import Scene, Tie
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int32]
 
 MOST_BEYOND = 0.25  # of a face's width: a fine mesh's nodes on a curved rim lie so far beyond the coarse one's chords
 MOVING = 1e-6  # of a body's greatest speed: difference of velocities that is rounding
