@@ -11,7 +11,6 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.phases.cycle import Cycle, begin_cycle
-from warp_mca.phases.cycle_result import cycle_result
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.impact_driver import bending_period
 from warp_mca.phases.parts import ImpactPart, Part, SwingPart
@@ -48,8 +47,9 @@ def cycle(name: str, inertia: str = "mesh", duration: float = 1.5e-3) -> tuple[S
     """A run of two impacts, in float64."""
     settings = Settings("cpu", "float64", 1)
     setup = begin_cycle(scene(name, rigid_inertia=inertia), None, duration, settings, lambda stage, done: None)
-    parts = Cycle(setup).run()
-    return setup, parts, cycle_result(setup, parts)
+    run = Cycle(setup)
+    result = run.run()
+    return setup, run.story.parts, result
 
 
 def impacts(name: str, inertia: str = "mesh") -> list[ImpactPart]:

@@ -204,12 +204,8 @@ def _phases(request: _Request, store: Checkpoint | None = None) -> Result:
         return pure_result(run)
     if scene.t_end is not None:
         from warp_mca.phases.cycle import Cycle, begin_cycle
-        from warp_mca.phases.cycle_result import cycle_result
 
-        cycle = Cycle(begin_cycle(scene, meshes, span, settings, tell), store, recorders)
-        parts, film = cycle.run(), cycle.film
-        result = cycle_result(cycle.setup, parts, film.said if film else ())
-        return replace(result, failed=film.failed if film else ())
+        return Cycle(begin_cycle(scene, meshes, span, settings, tell), store, recorders).run()
     (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders, store)
     if found.stopped is not None:
         raise GuardError(found.stopped)

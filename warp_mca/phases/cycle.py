@@ -6,11 +6,14 @@ Each kind of phase has a driver, which takes a `Motion` and returns the next one
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.checkpoint import Checkpoint
+from warp_mca.phases.cycle_result import cycle_result
+from warp_mca.phases.cycle_rows import Story
 from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.film import Film
 from warp_mca.phases.impact_driver import ImpactDriver
@@ -20,6 +23,7 @@ from warp_mca.phases.prepare import Clock, place
 from warp_mca.phases.settings import Settings
 from warp_mca.phases.swing_driver import SwingDriver
 from warp_mca.recorders.recorder import Recorder
+from warp_mca.results.result import Result
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import Scene
 
@@ -44,21 +48,20 @@ class Cycle:
 
     Attributes:
         setup: what the phases share.
-        parts: what each phase so far adds to the run.
+        story: what the phases so far add to the run.
         film: what recorders see of it, from the first touch on; None without recorders.
     """
 
     def __init__(self, setup: Setup, store: Checkpoint | None = None, recorders: Sequence[Recorder] = ()) -> None:
         """Of a run that goes on from what `store` has, and stores its state there."""
-        self.setup, self.recorders = setup, recorders
+        self.setup, self.recorders, self.story = setup, recorders, Story(setup)
         self.swings, self.impacts = SwingDriver(setup), ImpactDriver(setup, store)
-        self.parts: list[Part] = []
 
     @property
     def film(self) -> Film | None:
         return self.impacts.film
 
-    def run(self) -> list[Part]:
+    def run(self) -> Result:
         """Until the time is up: each phase takes the motion that the one before left, its event says which one follows.
 
         Raises:
@@ -67,18 +70,18 @@ class Cycle:
         """
         phase: Phase | None = self.swings.first
         motion: Motion | None = None
+        done = False
         try:
             while phase is not None:
                 motion, part = phase(motion)
                 phase = self._after(motion, part)
                 self._take(motion, part, phase is not None)
-        except BaseException:
+            done = True
+        finally:
             if self.film:
-                self.film.finish(False)
-            raise
-        if self.film:
-            self.film.finish(True)
-        return self.parts
+                self.film.finish(done)
+        result = cycle_result(self.setup, self.story, self.film.said if self.film else ())
+        return replace(result, failed=self.film.failed if self.film else ())
 
     def _after(self, motion: Motion | None, part: Part) -> Phase | None:
         """The phase that follows the event that ended another one."""
@@ -88,10 +91,11 @@ class Cycle:
 
     def _take(self, motion: Motion | None, part: Part, following: bool) -> None:
         """Keep what a phase adds, and show it."""
-        self.parts.append(part)
+        kept = self.story.add(part, following)
         if self.recorders and self.impacts.film is None:
             assert motion is not None
-            self.impacts.film = Film(self.setup, self.recorders, self.impacts.prepare(motion)[0])
+            ready = self.impacts.prepare(motion)[0]
+            self.impacts.film = Film(self.setup, self.recorders, ready, self.story.origin)
         if self.film:
-            self.film.take(part, following)
+            self.film.take(part, kept, self.story.rows[-1])
             self.setup.clock.lap("output")

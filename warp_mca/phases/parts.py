@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.motion import Motion
+from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import HandBack
+from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.rigid.swing import Swing
 
 Array = NDArray[np.float64]
@@ -36,6 +38,16 @@ class SwingPart:
     def ended_by(self) -> str:
         """What ended it: "touch" or "t_end"."""
         return self.swing.ended_by
+
+    def chain(self, row: int) -> Chain:
+        """The chain with its base where it is at a sample of the swing."""
+        return self.motion.chain.moved_to(self.swing.t[row])
+
+    def placements(self, row: int) -> dict[str, Placement]:
+        """Pose and motion of each body by name at a sample of the swing."""
+        run, placed = self.swing, self.motion.placements
+        links = link_placements(self.chain(row), run.theta_t[row], run.theta_dot_t[row])
+        return {name: p.after(run.t[row] - run.t[0]) for name, p in placed.items() if name not in links} | links
 
 
 @dataclass(frozen=True, kw_only=True)

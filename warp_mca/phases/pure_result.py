@@ -9,8 +9,9 @@ import numpy as np
 
 from warp_mca.phases.cycle_rows import SPENT, STORED
 from warp_mca.phases.every import METHOD
+from warp_mca.phases.history_rows import phase_facts
 from warp_mca.phases.pure_fem import PureRun
-from warp_mca.phases.stretch import Stretch, joined, phase_facts
+from warp_mca.phases.stretch import Stretch, rows_before
 from warp_mca.results.result import Result
 from warp_mca.rigid.target import target_plane
 
@@ -20,10 +21,9 @@ def pure_result(run: PureRun) -> Result:
     scene_run, touch = run.impact.scene_runs[0], run.place.touch
     assert touch is not None
     origin = (touch - 1) * run.fine.interval
-    found = scene_run.result(run.clock.wall, origin=origin)
     swing = Stretch(kind="swing", ended_by="touch", steps=run.coarse, count=run.place.swung, records=run.swing)
-    whole = joined(found, scene_run, [swing], origin)
-    return replace(whole, summary={**whole.summary, **_figures(run, found, origin, touch)})
+    found = scene_run.result(run.clock.wall, before=rows_before(scene_run, [swing], origin), origin=origin)
+    return replace(found, summary={**found.summary, **_figures(run, found, origin, touch)})
 
 
 def _figures(run: PureRun, found: Result, origin: float, touch: int) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def _figures(run: PureRun, found: Result, origin: float, touch: int) -> dict[str
     return {
         "method": METHOD,
         "t_contact": t_contact,
-        **_approach(run, found, touch - 1),
+        **_approach(run, found, len(run.swing.sums) + touch - 1),
         "theta": [],
         "theta_dot": [],
         "n_steps": steps,

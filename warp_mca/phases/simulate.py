@@ -19,7 +19,7 @@ from warp_mca.phases.prepare import Clock, Prepared, prepare
 from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.settings import Settings
 from warp_mca.phases.settle import settle
-from warp_mca.phases.stretch import Stretch, joined, restored, stored
+from warp_mca.phases.stretch import Stretch, restored, rows_before, stored
 from warp_mca.recorders.recorder import Recorder, RunInfo
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene, Settle
@@ -86,7 +86,7 @@ def simulate(
     tell("impact", 1.0)
     results = []
     for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True):
-        found = joined(item.result(clock.wall, said, stopped), item, stretches)
+        found = item.result(clock.wall, said, stopped, before=rows_before(item, stretches))
         results.append(replace(found, failed=failed))
     return results
 

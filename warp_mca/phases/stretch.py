@@ -1,19 +1,14 @@
-"""Owns phases of finite elements that one solver computes before an impact, and what they add to its result."""
+"""Owns phases of finite elements that one solver computes before an impact, and what they add to its history."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.phases.history_rows import contact_histories, history_columns
-from warp_mca.results.contact_history import ContactHistory
-from warp_mca.results.paths import path_histories
-from warp_mca.results.result import Result
-from warp_mca.results.sensor_history import sensor_figures, sensor_histories
+from warp_mca.phases.history_rows import Rows, phase_facts, rows_of
 from warp_mca.step.records import SceneRecords
 from warp_mca.step.steps import Steps
 from warp_mca.watch.ledger import Ledger
@@ -81,51 +76,13 @@ def restored(place: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> list[St
     return found
 
 
-def joined(found: Result, scene_run: SceneRun, stretches: Sequence[Stretch], origin: float = 0.0) -> Result:
-    """The result of an impact, with the rows of the stretches before it; times count from `origin` [s] after its start.
-
-    The summary's figures are those of the impact, but for the probes and sections.
-    """
-    if not stretches:
-        return found
-    ready, names = scene_run.ready, [contact.name for contact in found.contacts]
-    ledgers = [item.ledger(scene_run) for item in stretches]
-    tables = [history_columns(ledger) for ledger in ledgers]
-    for k, table in enumerate(tables):
-        table["time_s"] = table["time_s"] - sum(item.time for item in stretches[k:]) - origin
-    tables.append(dict(found.history))
-    history = {name: np.concatenate([table[name] for table in tables]) for name in found.history}
-    contacts = [*(contact_histories(ledger, names) for ledger in ledgers), found.contacts]
-    paths = [*(path_histories(ready.probes, item.records.path_stress) for item in stretches if item.records.count)]
-    records = [row for item in (*(s.records for s in stretches), scene_run.ledger.kept) for row in item.sensors]
-    phases, start = [], 0.0
-    for item, ledger in zip(stretches, ledgers, strict=True):
-        phases.append(phase_facts(item.kind, start, start + item.time, item.ended_by, ledger.energy()))
-        start += item.time
-    end = start + found.summary["simulated_time"]
-    phases.append(phase_facts("impact", start, end, "duration", scene_run.ledger.energy()))
-    probes, sections = sensor_histories(ready.scene, history["time_s"], records)
-    return replace(
-        found,
-        summary={**found.summary, **sensor_figures(probes, sections, history), "phases": phases},
-        history=history,
-        contacts=tuple(_one_contact(parts) for parts in zip(*contacts, strict=True)),
-        paths=tuple(
-            replace(parts[-1], stress=np.concatenate([part.stress for part in parts]))
-            for parts in zip(*paths, found.paths, strict=True)
-        ),
-        probes=probes,
-        sections=sections,
-    )
-
-
-def _one_contact(parts: Sequence[ContactHistory]) -> ContactHistory:
-    """A contact over all phases."""
-    names = ("force", "pressure", "normal_force", "closing_speed")
-    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return ContactHistory(name=parts[-1].name, **columns)
-
-
-def phase_facts(kind: str, start: float, end: float, ended_by: str, energy: Mapping[str, float]) -> dict[str, Any]:
-    """What `summary.json` says of a phase: its ledger at the end."""
-    return {"kind": kind, "start": start, "end": end, "ended_by": ended_by, "energy": dict(energy), "lost": 0.0}
+def rows_before(scene_run: SceneRun, stretches: Sequence[Stretch], origin: float = 0.0) -> list[Rows]:
+    """Rows of the stretches before an impact; times count from `origin` [s] after its start."""
+    found, start = [], 0.0
+    for k, item in enumerate(stretches):
+        ledger, end = item.ledger(scene_run), start + item.time
+        facts = phase_facts(item.kind, start, end, item.ended_by, ledger.energy())
+        before = sum(later.time for later in stretches[k:])
+        found.append(rows_of(scene_run.ready, ledger, facts, before=before, origin=origin))
+        start = end
+    return found
