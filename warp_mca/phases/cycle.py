@@ -5,42 +5,24 @@ Each kind of phase has a driver, which takes a `Motion` and returns the next one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.cycle_result import cycle_result
 from warp_mca.phases.cycle_rows import Story
-from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.film import Film
 from warp_mca.phases.impact_driver import ImpactDriver
 from warp_mca.phases.motion import Motion
 from warp_mca.phases.parts import Part, SwingPart
-from warp_mca.phases.prepare import Clock, place
-from warp_mca.phases.settings import Settings
+from warp_mca.phases.prepare import Request, place
 from warp_mca.phases.swing_driver import SwingDriver
-from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.result import Result
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import Scene
 
 Phase = Callable[[Motion | None], tuple[Motion | None, Part]]
-
-
-def begin_cycle(
-    scene: Scene, meshes: Mapping[str, Mesh] | None, span: float, settings: Settings, tell: Progress
-) -> Setup:
-    """Mesh a scene with `t_end`, and swing it to its first touch; each impact will last at most `span` [s].
-
-    Raises:
-        RequestError: the scene cannot be built as written.
-    """
-    clock = Clock()
-    placed = place(scene, meshes, clock, tell, by=partial(hand_off, t_end=scene.t_end))
-    return Setup(**vars(placed), span=span, settings=settings, clock=clock, tell=tell)
 
 
 class Cycle:
@@ -52,10 +34,14 @@ class Cycle:
         film: what recorders see of it, from the first touch on; None without recorders.
     """
 
-    def __init__(self, setup: Setup, store: Checkpoint | None = None, recorders: Sequence[Recorder] = ()) -> None:
-        """Of a run that goes on from what `store` has, and stores its state there."""
-        self.setup, self.recorders, self.story = setup, recorders, Story(setup)
-        self.swings, self.impacts = SwingDriver(setup), ImpactDriver(setup, store)
+    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh] | None, request: Request) -> None:
+        """Mesh a scene with `t_end`, and swing it to its first touch.
+
+        Raises:
+            RequestError: the scene cannot be built as written.
+        """
+        self.setup = place(scene, meshes, request, by=partial(hand_off, t_end=scene.t_end))
+        self.story, self.swings, self.impacts = Story(self.setup), SwingDriver(self.setup), ImpactDriver(self.setup)
 
     @property
     def film(self) -> Film | None:
@@ -92,10 +78,11 @@ class Cycle:
     def _take(self, motion: Motion | None, part: Part, following: bool) -> None:
         """Keep what a phase adds, and show it."""
         kept = self.story.add(part, following)
-        if self.recorders and self.impacts.film is None:
+        recorders, clock = self.setup.request.recorders, self.setup.request.clock
+        if recorders and self.impacts.film is None:
             assert motion is not None
             ready = self.impacts.prepare(motion)[0]
-            self.impacts.film = Film(self.setup, self.recorders, ready, self.story.origin)
+            self.impacts.film = Film(self.setup, recorders, ready, self.story.origin)
         if self.film:
             self.film.take(part, kept, self.story.rows[-1])
-            self.setup.clock.lap("output")
+            clock.lap("output")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from warp_mca.phases.cycle_rows import STORED, Story
-from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.history_rows import joined
+from warp_mca.phases.prepare import Setup
 from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
@@ -21,7 +21,7 @@ NOTHING = "no phase of the run touched anything: give a later t_end, or check po
 def cycle_result(setup: Setup, story: Story, said: Sequence[str] = ()) -> Result:
     """What came of a cycle that is over, with what recorders `said`."""
     impacts = [part.impact for part in story.impacts]
-    results = [impact.scene_runs[0].result(setup.clock.wall) for impact in impacts]
+    results = [impact.scene_runs[0].result(setup.request.clock.wall) for impact in impacts]
     found = joined(setup.scene, impacts[0].ready[0].probes if impacts else None, story.rows)
     common = set.intersection(*(set(result.warnings) for result in results)) if results else set()
     warnings = [w for w in results[0].warnings if w in common] if results else [NOTHING]
@@ -43,9 +43,9 @@ def _without_impact(setup: Setup) -> dict[str, Any]:
         "n_nodes": sum(len(item.points) for item in meshes.values()),
         "dt": 0.0,
         "n_steps": 0,
-        "wall": setup.clock.wall,
-        "device": setup.settings.device,
-        "precision": setup.settings.precision,
+        "wall": setup.request.clock.wall,
+        "device": setup.request.settings.device,
+        "precision": setup.request.settings.precision,
         "element": " ".join(sorted({body.element for body in scene.bodies})),
         "parameters": dict(scene.parameters),
         "theta": start.theta.tolist(),
@@ -71,7 +71,7 @@ def _of_all(
     phases = [rows.facts for rows in story.rows]
     last = phases[-1]["energy"]
     steps = sum(summary["n_steps"] for summary in summaries)
-    fe, elements = setup.clock.wall["fe"], summaries[0]["n_elements"] if summaries else 0
+    fe, elements = setup.request.clock.wall["fe"], summaries[0]["n_elements"] if summaries else 0
     pairs = [
         _pair(pair, [summary["contacts_by_pair"][k] for summary in summaries], offsets)
         for k, pair in enumerate(contacts)
@@ -93,7 +93,7 @@ def _of_all(
         "F_t_reverses": any(summary["F_t_reverses"] for summary in summaries),
         "joint_impulse": {name: np.sum([j[name] for j in joints], axis=0).tolist() for name in (joints or [{}])[0]},
         "element_steps_per_s": elements * steps / fe if fe > 0.0 and steps else None,
-        "wall": dict(setup.clock.wall),
+        "wall": dict(setup.request.clock.wall),
     }
     if summaries:
         found["extremes"] = _extremes([summary["extremes"] for summary in summaries])

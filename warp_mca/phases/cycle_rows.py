@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.model.sensors import CHANNELS, Spot
-from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.history_rows import Rows, phase_facts
 from warp_mca.phases.parts import ImpactPart, Part, SwingPart
+from warp_mca.phases.prepare import Setup
 from warp_mca.results.result import HISTORY_COLUMNS
 from warp_mca.rigid.placement import Placement
 from warp_mca.scene import Point

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.division import divide
 from warp_mca.phases.history_rows import Rows
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.motion import Stress
 from warp_mca.phases.parts import Part, SwingPart
-from warp_mca.phases.prepare import Prepared
+from warp_mca.phases.prepare import Prepared, Setup
 from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Recorder, RunInfo
 
@@ -41,7 +40,7 @@ class Film:
         self.said: list[str] = []
         self.needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
         self.surfaces = skins(ready.model, ready.meshes)
-        steps, paths = divide(ready.scene, ready.model, setup.span), ready.probes.position
+        steps, paths = divide(ready.scene, ready.model, setup.request.span), ready.probes.position
         length, told = setup.t_end - self.origin, self.said.append
         info = RunInfo(
             ready.scene, ready.model, self.surfaces, paths, steps.dt, steps.interval, length, told, phases=True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ class Stretch:
         steps: how its history is divided.
         count: steps that it took [-].
         records: what it has recorded.
+        more: what else a result needs of it, as JSON can hold it.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Stretch:
     steps: Steps
     count: int
     records: SceneRecords
+    more: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -48,7 +50,19 @@ class Stretch:
 
     def facts(self) -> dict[str, Any]:
         """All but its records, as JSON can hold it."""
-        return {"kind": self.kind, "ended_by": self.ended_by, "count": self.count, "steps": asdict(self.steps)}
+        return {**{name: value for name, value in vars(self).items() if name != "records"}, "steps": asdict(self.steps)}
+
+    @staticmethod
+    def of(facts: Mapping[str, Any], records: Mapping[str, NDArray], dt: float) -> Stretch:
+        """The stretch of a solver with a time step dt [s] that a file holds.
+
+        Raises:
+            KeyError, TypeError, ValueError: a value is missing, or of another type or range.
+        """
+        found = Stretch(**{**facts, "steps": steps_of(facts["steps"], dt), "records": SceneRecords.of(records)})
+        if type(found.count) is not int or found.count < 0 or not isinstance(found.more, dict):
+            raise ValueError(facts)
+        return found
 
 
 def stretch_ended(impact: Impact, kind: str, ended_by: str, following: Steps) -> Stretch:
@@ -57,23 +71,17 @@ def stretch_ended(impact: Impact, kind: str, ended_by: str, following: Steps) ->
     return Stretch(kind=kind, ended_by=ended_by, steps=steps, count=count, records=impact.divide_anew(following)[0])
 
 
-def stored(stretches: Sequence[Stretch]) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Stretches as a place in a run and arrays, see `Checkpoint.store`."""
-    arrays = {f"{k}/{name}": a for k, item in enumerate(stretches) for name, a in item.records.arrays().items()}
-    return ({"stretches": [item.facts() for item in stretches]} if stretches else {}), arrays
-
-
-def restored(place: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> list[Stretch]:
-    """The inverse of `stored`.
+def steps_of(stored: Mapping[str, Any], dt: float) -> Steps:
+    """The steps of a solver with a time step dt [s] that a file holds.
 
     Raises:
-        KeyError, TypeError, ValueError: a value is missing or of another type.
+        TypeError, ValueError: a value is missing, or of another type or range.
     """
-    found = []
-    for k, facts in enumerate(place.get("stretches", ())):
-        own = {name.removeprefix(f"{k}/"): a for name, a in arrays.items() if name.startswith(f"{k}/")}
-        found.append(Stretch(**{**facts, "steps": Steps(**facts["steps"]), "records": SceneRecords.of(own)}))
-    return found
+    steps = Steps(**stored)
+    counts = (steps.per_search, steps.searches, steps.intervals, steps.intervals_per_search)
+    if steps.dt != dt or not all(type(count) is int and count > 0 for count in counts):
+        raise ValueError(stored)
+    return steps
 
 
 def rows_before(scene_run: SceneRun, stretches: Sequence[Stretch], origin: float = 0.0) -> list[Rows]:
