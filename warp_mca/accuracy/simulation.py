@@ -17,6 +17,7 @@ from warp_mca.phases.arguments import (
     check_recorders,
     check_scene,
     one_at_a_time,
+    shows_progress,
     span_of,
     teller,
 )
@@ -24,7 +25,6 @@ from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.every import METHOD, Every, every_of
 from warp_mca.phases.meshing import mesh
 from warp_mca.phases.prepare import Clock, Request
-from warp_mca.phases.progress import shows_progress
 from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.recorders.recorder import Recorder

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,12 @@ from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.watch.mass_report import body_report
 
 NOTHING = "no phase of the run touched anything: give a later t_end, or check positions and speeds"
+TOGETHER: dict[str, Callable[[Iterator[Any]], Any]] = {  # how figures of all impacts are made of those of each
+    **dict.fromkeys(("contact_duration", "n_steps", "simulated_time"), sum),
+    **dict.fromkeys(("max_plastic_strain", "F_n_max", "F_t_max", "max_strain", "max_penetration"), max),
+    "F_t_min": min,
+    **dict.fromkeys(("touched", "F_t_reverses"), any),
+}
 
 
 def cycle_result(setup: Setup, story: Story, said: Sequence[str] = ()) -> Result:
@@ -28,7 +34,7 @@ def cycle_result(setup: Setup, story: Story, said: Sequence[str] = ()) -> Result
     for k, result in enumerate(results, 1):
         warnings += [f"impact {k}: {w}" for w in result.warnings if w not in common]
     stopped = [part.stopped for part in story.parts if part.stopped]
-    summary = results[0].summary if results else summarise(found["history"], _without_impact(setup))
+    summary = results[0].summary if results else summarise(found["history"], _without_impact(setup), found["contacts"])
     summary = {**summary, **_of_all(setup, story, [result.summary for result in results], found["contacts"])}
     summary |= sensor_figures(found["probes"], found["sections"], found["history"])
     return Result(summary=summary, warnings=(*warnings, *stopped, *said), **found)
@@ -43,6 +49,9 @@ def _without_impact(setup: Setup) -> dict[str, Any]:
         "n_nodes": sum(len(item.points) for item in meshes.values()),
         "dt": 0.0,
         "n_steps": 0,
+        "simulated_time": 0.0,
+        "max_plastic_strain": 0.0,
+        "joint_impulse": {},
         "wall": setup.request.clock.wall,
         "device": setup.request.settings.device,
         "precision": setup.request.settings.precision,
@@ -61,44 +70,27 @@ def _of_all(
 ) -> dict[str, Any]:
     """What the summary says of all phases, in place of what it says of the first impact."""
     offsets = [part.start - story.origin for part in story.impacts]
-
-    def spans(key: str) -> list[list[float]]:
-        return list(_shifted(summaries, offsets, key))
-
-    def greatest(key: str) -> float:
-        return max((summary[key] for summary in summaries), default=0.0)
-
-    phases = [rows.facts for rows in story.rows]
+    phases, wall = [rows.facts for rows in story.rows], setup.request.clock.wall
     last = phases[-1]["energy"]
-    steps = sum(summary["n_steps"] for summary in summaries)
-    fe, elements = setup.request.clock.wall["fe"], summaries[0]["n_elements"] if summaries else 0
-    pairs = [
-        _pair(pair, [summary["contacts_by_pair"][k] for summary in summaries], offsets)
-        for k, pair in enumerate(contacts)
-    ]
-    joints = [summary["joint_impulse"] for summary in summaries]
     found: dict[str, Any] = {
         "phases": phases,
-        **{key: spans(key) for key in ("contacts", "F_n_peaks", "sticks")},
-        "contact_duration": sum(summary["contact_duration"] for summary in summaries),
-        "contacts_by_pair": pairs,
-        "touched": any(summary["touched"] for summary in summaries),
-        "contact_open_at_end": bool(summaries) and summaries[-1]["contact_open_at_end"],
-        "n_steps": steps,
-        "simulated_time": sum((summary["simulated_time"] for summary in summaries), 0.0),
         "energy": {**last, "error": story.totals.error(sum(last[k] for k in STORED))},
         "energy_error": story.error / story.scale if story.scale > 0.0 else 0.0,
-        **{key: greatest(key) for key in ("max_plastic_strain", "F_n_max", "F_t_max")},
-        "F_t_min": min((summary["F_t_min"] for summary in summaries), default=0.0),
-        "F_t_reverses": any(summary["F_t_reverses"] for summary in summaries),
-        "joint_impulse": {name: np.sum([j[name] for j in joints], axis=0).tolist() for name in (joints or [{}])[0]},
-        "element_steps_per_s": elements * steps / fe if fe > 0.0 and steps else None,
-        "wall": dict(setup.request.clock.wall),
+        "wall": dict(wall),
     }
-    if summaries:
-        found["extremes"] = _extremes([summary["extremes"] for summary in summaries])
-        found |= {key: greatest(key) for key in ("max_strain", "max_penetration")}
-    return found
+    if not summaries:
+        return found
+    found |= {key: how(summary[key] for summary in summaries) for key, how in TOGETHER.items()}
+    found |= {key: list(_shifted(summaries, offsets, key)) for key in ("contacts", "F_n_peaks", "sticks")}
+    pairs = ([summary["contacts_by_pair"][k] for summary in summaries] for k in range(len(contacts)))
+    joints, elements, fe = [summary["joint_impulse"] for summary in summaries], summaries[0]["n_elements"], wall["fe"]
+    return found | {
+        "contacts_by_pair": [_pair(contact, own, offsets) for contact, own in zip(contacts, pairs, strict=True)],
+        "contact_open_at_end": summaries[-1]["contact_open_at_end"],
+        "joint_impulse": {name: np.sum([j[name] for j in joints], axis=0).tolist() for name in joints[0]},
+        "element_steps_per_s": elements * found["n_steps"] / fe if fe > 0.0 and found["n_steps"] else None,
+        "extremes": _extremes([summary["extremes"] for summary in summaries]),
+    }
 
 
 def _extremes(items: Sequence[Mapping[str, float]]) -> dict[str, float]:
@@ -114,13 +106,12 @@ def _shifted(summaries: Sequence[Mapping[str, Any]], offsets: Sequence[float], k
 
 def _pair(pair: ContactHistory, found: Sequence[Mapping[str, Any]], offsets: Sequence[float]) -> dict[str, Any]:
     """What the summary says of a contact, from what it says of it in each impact."""
-    forces = [item["F_max"] for item in found] or [[0.0, 0.0, 0.0]]
     spans = [(offset, span) for item, offset in zip(found, offsets, strict=True) for span in item["intervals"]]
     return {
         "name": pair.name,
         "intervals": [[start + offset, end + offset] for offset, (start, end) in spans],
-        "contact_open_at_end": bool(found) and found[-1]["contact_open_at_end"],
-        "F_max": max(forces, key=lambda force: float(np.linalg.norm(force))),
-        "impulse": np.sum([[0.0, 0.0, 0.0], *(item["impulse"] for item in found)], axis=0).tolist(),
+        "contact_open_at_end": found[-1]["contact_open_at_end"],
+        "F_max": max((item["F_max"] for item in found), key=lambda force: float(np.linalg.norm(force))),
+        "impulse": np.sum([item["impulse"] for item in found], axis=0).tolist(),
         "normal": None if pair.normal is None else pair.normal.tolist(),
     }

@@ -13,9 +13,8 @@ from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.folder import held
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.arguments import Progress, check_scene, one_at_a_time, span_of, teller
+from warp_mca.phases.arguments import Progress, check_scene, one_at_a_time, shows_progress, span_of, teller
 from warp_mca.phases.prepare import Request
-from warp_mca.phases.progress import shows_progress
 from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.results.result import Result
