@@ -12,7 +12,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.phases.cycle import Cycle
 from warp_mca.phases.impact_driver import bending_period
-from warp_mca.phases.parts import ImpactPart, Part, SwingPart
+from warp_mca.phases.motion import ImpactPart, Part, SwingPart
 from warp_mca.phases.prepare import Request, Setup
 from warp_mca.phases.settings import Settings
 from warp_mca.rigid.handback import HandBack

@@ -24,8 +24,12 @@ DRIVERS = {Settle: settle}  # of phases before the impact; others have `advance`
 Told = Callable[[], None]
 
 
-def begin(ready: Sequence[Prepared], request: Request, span: float | None = None, **shown: Any) -> Impact:
-    """The impact phase of scenes side by side, of a `span` [s] if not that of the request; `shown` as in `Impact`.
+def begin(
+    ready: Sequence[Prepared], request: Request, span: float | None = None, *, first: bool = True, **more: Any
+) -> Impact:
+    """The impact phase of scenes side by side, of a `span` [s] if not that of the request; `more` as in `Impact`.
+
+    The `first` one of a run says what it is.
 
     Raises:
         RequestError: steps cannot be chosen, or bodies overlap that must not.
@@ -34,9 +38,10 @@ def begin(ready: Sequence[Prepared], request: Request, span: float | None = None
 
     warn(sentence for item in ready for sentence in item.warnings)
     request.tell("compile", 0.0)
-    impact = Impact(ready, span or request.span, **request.settings.solver, **shown)
+    impact = Impact(ready, span or request.span, **request.settings.solver, **more)
     request.clock.lap("compile")
-    announce(impact)
+    if first:
+        announce(impact)
     return impact
 
 
@@ -98,7 +103,7 @@ class Course:
                 self.store.store_end(self.impact, self.number)
         self.impact.advance(told=told, ended=ended)
 
-    def keep(self, running: Mapping[str, Any] | None = None) -> None:
+    def keep(self, running: Any = None) -> None:
         """Store the state, and of a phase before the impact what it needs to go on, as JSON can hold it."""
         assert self.store is not None
         if self.number is not None:

@@ -14,8 +14,7 @@ from warp_mca.phases.cycle_result import cycle_result
 from warp_mca.phases.cycle_rows import Story
 from warp_mca.phases.film import Film
 from warp_mca.phases.impact_driver import ImpactDriver
-from warp_mca.phases.motion import Motion
-from warp_mca.phases.parts import Part, SwingPart
+from warp_mca.phases.motion import Motion, Part, SwingPart
 from warp_mca.phases.prepare import Request, place
 from warp_mca.phases.swing_driver import SwingDriver
 from warp_mca.results.result import Result

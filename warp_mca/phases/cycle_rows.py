@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.model.sensors import CHANNELS, Spot
 from warp_mca.phases.history_rows import Rows, phase_facts
-from warp_mca.phases.parts import ImpactPart, Part, SwingPart
+from warp_mca.phases.motion import ImpactPart, Part, SwingPart
 from warp_mca.phases.prepare import Setup
 from warp_mca.results.result import HISTORY_COLUMNS
 from warp_mca.rigid.placement import Placement

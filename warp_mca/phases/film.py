@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from warp_mca.phases.division import divide
 from warp_mca.phases.history_rows import Rows
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.motion import Stress
-from warp_mca.phases.parts import Part, SwingPart
+from warp_mca.phases.motion import Part, Stress, SwingPart
 from warp_mca.phases.prepare import Prepared, Setup
 from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Recorder, RunInfo

@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
-from warp_mca.phases.carry_out import Course
+from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.film import Film
-from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.motion import Motion
-from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.motion import ImpactPart, Motion
 from warp_mca.phases.plastic_history import give_history
 from warp_mca.phases.prepare import Prepared, Setup
 from warp_mca.phases.residual import Relaxation, Shape
@@ -57,19 +55,15 @@ class ImpactDriver:
         assert motion is not None
         setup, self.count = self.setup, self.count + 1
         ready, u, V = self.prepare(motion)
-        setup.request.tell("compile", 0.0)
         relaxation = Relaxation(ready.model, setup.request.settings)
         settled: list[Shape] = []
         span = min(setup.request.span, setup.t_end - motion.t)
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
         film = self.film
         shown = {"skins": film.surfaces, "needs": film.needs} if film else {}
-        impact = Impact([ready], span, **setup.request.settings.solver, **shown, shape=shape)
+        impact = begin([ready], setup.request, span, first=self.count == 1, shape=shape, **shown)
         if film:
             film.watch(impact, motion.t)
-        setup.request.clock.lap("compile")
-        if self.count == 1:
-            announce(impact)
         self._advance(impact)
         setup.request.clock.lap("fe")
         if impact.stopped[0] is not None:

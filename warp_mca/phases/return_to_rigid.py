@@ -9,8 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.phases.motion import Motion, Stress
-from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.motion import ImpactPart, Motion, Stress
 from warp_mca.phases.plastic_history import take_history
 from warp_mca.phases.prepare import Setup
 from warp_mca.phases.residual import Relaxation, Shape

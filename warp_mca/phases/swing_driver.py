@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warp_mca.phases.motion import Motion
-from warp_mca.phases.parts import SwingPart
+from warp_mca.phases.motion import Motion, SwingPart
 from warp_mca.phases.prepare import Setup
 from warp_mca.rigid.chain import Array
 from warp_mca.rigid.placement import link_placements
