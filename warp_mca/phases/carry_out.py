@@ -134,9 +134,9 @@ class Course:
             with damage_explained(self.store.path):
                 self.stretches, steps, wall = restored(place, arrays, self.impact.steps.dt)
                 running = place["running"]
+                for stage, seconds in wall.items():
+                    self.clock.wall[stage] += seconds
             self.impact.steps = steps
-            for stage, seconds in wall.items():
-                self.clock.wall[stage] += seconds
         self.impact.load(path)
         return running
 

@@ -77,11 +77,11 @@ class Cycle:
     def _take(self, motion: Motion | None, part: Part, following: bool) -> None:
         """Keep what a phase adds, and show it."""
         kept = self.story.add(part, following)
-        recorders, clock = self.setup.request.recorders, self.setup.request.clock
-        if recorders and self.impacts.film is None:
+        request = self.setup.request
+        if request.recorders and self.impacts.film is None:
             assert motion is not None
             ready = self.impacts.prepare(motion)[0]
-            self.impacts.film = Film(self.setup, recorders, ready, self.story.origin)
+            self.impacts.film = Film(self.setup, request.recorders, ready, self.story.origin)
         if self.film:
             self.film.take(part, kept, self.story.rows[-1])
-            clock.lap("output")
+            request.clock.lap("output")
