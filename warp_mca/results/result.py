@@ -32,6 +32,10 @@ HISTORY_COLUMNS = (
     "E_friction",
     "E_total_error",
 )  # of every history.csv; a run adds some, see docs/outputs.md
+FACTS = (  # of every summary.json, before what is read off the history; None or empty where a scene lacks them
+    *("scene", "n_elements", "n_nodes", "dt", "n_steps", "simulated_time", "wall", "device", "precision", "element"),
+    *("energy_error", "energy", "max_plastic_strain", "parameters", "t_contact", "v_n", "v_t", "theta", "theta_dot"),
+)
 
 
 @dataclass(frozen=True)
@@ -183,9 +187,9 @@ def summarise(
     contacts = contact_intervals(time, F_n)
     peaks = force_peaks(time, F_n)
     fe_wall = facts["wall"].get("fe", 0.0)
+    given = {"parameters": {}, "theta": [], "theta_dot": [], **facts}
     return {
-        **{"parameters": {}, "t_contact": None, "v_n": None, "v_t": None, "theta": [], "theta_dot": []},
-        **facts,
+        **{key: given.get(key) for key in FACTS},
         "F_n_first_peak": peaks[0][1] if peaks else None,
         "F_n_peaks": [list(peak) for peak in peaks],
         "F_n_max": float(np.max(F_n, initial=0.0)),
@@ -200,4 +204,5 @@ def summarise(
         "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],
         "element_steps_per_s": facts["n_elements"] * facts["n_steps"] / fe_wall if fe_wall > 0.0 else None,
         "version": __version__,
+        **{key: value for key, value in facts.items() if key not in FACTS},
     }
