@@ -114,6 +114,10 @@ def test_a_registered_one_goes_by_its_name(monkeypatch: pytest.MonkeyPatch):
         (["--recorder", "mine"], "--recorder = 'mine': write it as MODULE:NAME or MODULE:NAME,KEY=VALUE"),
         (["--recorder", "mine:Nope"], "--recorder = 'mine:Nope': the module mine has no Nope"),
         (["--recorder", "nope:Peak"], "--recorder = 'nope': there is no such module in "),
+        (
+            ["--recorder", "mine:Peak,unit=1,unit=2"],
+            "--recorder = 'mine:Peak,unit=1,unit=2': write it as",
+        ),
         (["--recorder", "mine:Peak,file"], "--recorder = 'mine:Peak,file': write it as"),
         (["--recorder", "mine:Path"], "--recorder = 'mine:Path': name a class with start, frame, history, finish"),
         (["--recorder", "mine:Peak,unit=a,no=1"], "--recorder = 'mine:Peak,unit=a,no=1': Peak() failed with TypeError"),

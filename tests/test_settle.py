@@ -83,6 +83,16 @@ def test_the_ledger_closes_over_both_phases_and_books_the_damping():
     assert np.abs(result["E_total_error"]).max() < 1e-4 * scale
 
 
+def test_the_ledger_of_a_phase_is_that_of_its_end():
+    """However far its rows are apart: those of a phase that may last 3 s are 6 ms apart, and it rests before."""
+    phase = mca.run(scene(phases=(mca.Settle(duration=3.0),)), precision="float64", threads=1).summary["phases"][0]
+    energy, exact = phase["energy"], settled().summary["phases"][0]["energy"]
+    assert phase["end"] - phase["start"] < 6e-3
+    for name in ("elastic", "contact", "damping", "external_work"):
+        assert energy[name] == pytest.approx(exact[name], rel=1e-3)
+    assert abs(energy["initial"]) < 1e-9 and energy["kinetic"] < 1e-3 * energy["damping"]
+
+
 def test_bodies_at_rest_need_no_time():
     result = mca.run(scene(gravity=(0.0, 0.0, 0.0), impact=mca.ImpactPhase(duration=2e-5)), threads=1)
     assert result.summary["energy"]["damping"] == 0.0
@@ -136,10 +146,17 @@ def test_a_model_file_keeps_the_phases(tmp_path: Path):
 
 FINE = (block(), replace(scene().bodies[1], geometry=mca.Box(size=3 * (0.01,), divisions=(8, 8, 8))))
 REFUSED: tuple[tuple[dict[str, Any], Callable[[mca.Scene], Any], type[Exception], str], ...] = (
-    ({"bodies": FINE}, lambda made: mca.run(made, multi_rate=2), mca.RequestError, "multi_rate = 2: bodies settle"),
+    ({"bodies": FINE}, lambda made: mca.run(made, multi_rate=2), mca.RequestError, "multi_rate = 2: phases before"),
     ({}, lambda made: mca.run_batch([made]), mca.RequestError, "leave phases out"),
     ({"phases": (mca.Settle(duration=5e-5),)}, mca.run, mca.GuardError, "do not rest after Settle.duration = 5e-05 s"),
     ({"contacts": (), "phases": (mca.Settle(duration=1e-3),)}, mca.run, mca.GuardError, "hold what falls"),
+    (
+        {"phases": (mca.Settle(duration=1e-9),)},
+        mca.run,
+        mca.RequestError,
+        "Settle.duration = 1e-09: give a time of more",
+    ),
+    ({"phases": (mca.Settle(duration=1e9),)}, mca.run, mca.RequestError, "Settle.duration = 1000000000.0: give a time"),
 )
 
 
@@ -149,6 +166,19 @@ def test_what_cannot_settle_is_refused(
 ):
     with pytest.raises(kind, match=words):
         run(scene(**change))
+
+
+def test_multi_rate_auto_takes_one_rate():
+    """Cells that grow along the bar give four groups without the phase."""
+    bar = mca.Box(size=(0.01, 0.04, 0.01), divisions=(2, 40, 2)).build()
+    y = bar.points[:, 1] / 0.04
+    bar.points[:, 1] = 0.04 * (0.1 * y + 0.9 * y**3)
+    held = mca.Fixed(body="bar", nodes="ymax")
+    body = mca.Body(name="bar", geometry=bar, material=mca.Elastic(E=1e8, nu=0.3, rho=1e3))
+    phase = mca.ImpactPhase(duration=1e-3, output_interval=2e-5)
+    made = scene(bodies=(body,), contacts=(), fixed=(held,), impact=phase)
+    assert "rate_groups" not in mca.run(made, multi_rate="auto").summary
+    assert len(mca.run(replace(made, phases=()), multi_rate="auto").summary["rate_groups"]) > 1
 
 
 def test_a_phase_that_is_not_known_is_refused():

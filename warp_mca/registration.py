@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import is_dataclass
 from importlib import import_module
 from typing import Any, NamedTuple, TypeVar
 
@@ -11,6 +12,7 @@ from warp_mca.base.validate import brief
 Thing = TypeVar("Thing")
 
 ELEMENT_PARTS = ("name", "cell", "patches", "lumped_masses", "eigenvalue_bounds", "largest_eigenvalues", "stage")
+DATACLASS = "@dataclass(frozen=True, kw_only=True)"
 RECORDER_PARTS = ("start", "frame", "history", "finish")
 
 
@@ -22,6 +24,7 @@ class Table(NamedTuple):
         base: module and class of which its entries are made; empty where `parts` decide.
         parts: attributes that its entries must have.
         whole: whether its entries are classes; False: objects with a `name`.
+        data: whether these must be dataclasses, which model files and checkpoints can hold.
     """
 
     module: str
@@ -29,15 +32,25 @@ class Table(NamedTuple):
     base: tuple[str, str] | None = None
     parts: tuple[str, ...] = ()
     whole: bool = True
+    data: bool = False
 
     def takes(self, thing: object) -> bool:
         """Whether an object or class belongs into this table."""
         if isinstance(thing, type) != self.whole:
             return False
         if self.base is None:
-            return all(hasattr(thing, part) for part in self.parts)
+            return not self.lacks(thing)
         base = getattr(import_module(self.base[0]), self.base[1])
         return issubclass(thing, base) if isinstance(thing, type) else isinstance(thing, base)
+
+    def lacks(self, thing: object) -> list[str]:
+        """Parts that an object or class does not have."""
+        missing = [part for part in self.parts if not hasattr(thing, part)]
+        return missing if is_dataclass(thing) or not self.data else [*missing, DATACLASS]
+
+    def has_some(self, thing: object) -> bool:
+        """Whether an object or class has one of the parts at least that tell what it is meant to be."""
+        return any(hasattr(thing, part) for part in self.parts if part != "name")
 
     @property
     def entries(self) -> dict[str, Any]:
@@ -49,7 +62,8 @@ class Table(NamedTuple):
         """What the table takes, in words."""
         if self.base is not None:
             return f"{'a class made of' if self.whole else 'an object of the class'} {'.'.join(self.base)}"
-        return f"{'a class' if self.whole else 'an object'} with {', '.join(self.parts)}"
+        parts = ", ".join([*self.parts, *self.data * [DATACLASS]])
+        return f"{'a class' if self.whole else 'an object'} with {parts}"
 
 
 # By the word that `kind` takes.
@@ -62,7 +76,7 @@ TABLES = {
         "warp_mca.geometry.cell_types", "CELL_TYPES", ("warp_mca.geometry.cell_types", "CellType"), whole=False
     ),
     "element": Table("warp_mca.scene.elements", "ELEMENTS", parts=ELEMENT_PARTS, whole=False),
-    "phase": Table("warp_mca.scene.phases", "PHASES", parts=("advance",)),
+    "phase": Table("warp_mca.scene.phases", "PHASES", parts=("advance",), data=True),
     "recorder": Table("warp_mca.recorders", "RECORDERS", parts=RECORDER_PARTS),
 }
 
@@ -86,11 +100,13 @@ def register(thing: Thing, *, kind: str | None = None) -> Thing:
     Raises:
         RequestError: it is none of these, or another one has its name.
     """
-    if kind is not None and kind not in TABLES:
+    if kind is not None and kind not in tuple(TABLES):
         raise bad_value("register.kind", brief(kind), f"choose among {', '.join(TABLES)}")
-    found = [name for name, table in TABLES.items() if kind in (None, name) and table.takes(thing)]
+    asked = {name: table for name, table in TABLES.items() if kind in (None, name)}
+    found = [name for name, table in asked.items() if table.takes(thing)]
     if len(found) != 1:
-        wanted = "; ".join(f"as {name} {table.remedy}" for name, table in TABLES.items() if kind in (None, name))
+        near = {name: table for name, table in asked.items() if table.has_some(thing)} or asked
+        wanted = "; ".join(f"as {name} {table.remedy}{_missing(table, thing)}" for name, table in near.items())
         raise bad_value("register", _words(thing), f"give {wanted}")
     entries = TABLES[found[0]].entries
     name = thing.__name__ if isinstance(thing, type) else thing.name  # pyright: ignore[reportAttributeAccessIssue]
@@ -102,6 +118,11 @@ def register(thing: Thing, *, kind: str | None = None) -> Thing:
         raise bad_value(f"register: name of the {found[0]}", name, remedy)
     entries[name] = thing
     return thing
+
+
+def _missing(table: Table, thing: object) -> str:
+    lacks = table.lacks(thing) if table.has_some(thing) else []
+    return f" (this lacks {', '.join(lacks)})" if lacks else ""
 
 
 def _read_again(other: object, thing: object) -> bool:

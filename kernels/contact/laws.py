@@ -46,6 +46,6 @@ def law_functions(law_name: str) -> LawFunctions:
     try:
         module = import_module(law_name)
         return LawFunctions(*(getattr(module, name) for name in names), getattr(module, "dashpot", None))
-    except (ImportError, AttributeError) as error:
-        remedy = f"name a module that has {' and '.join(names)}: {error}"
+    except Exception as error:  # it may be of the user
+        remedy = f"name a module that has {' and '.join(names)}: {type(error).__name__}: {error}"
         raise bad_value("law of a contact", law_name, remedy) from error

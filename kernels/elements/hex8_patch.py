@@ -100,7 +100,7 @@ def element(precision: str, law_name: str) -> PatchElement:
                 list_element(lane, listed_out)
                 keep_rotation(W, lane, force_out)
 
-    return PatchElement("hex8", load_points, load_displacements, compute_element, prepare, flow)
+    return PatchElement("hex8", load_points, load_displacements, compute_element, prepare, flow, lanes=4)
 
 
 force_kernel = partial(patch_force_kernel, element)

@@ -69,9 +69,12 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
             keep_strain(e, largest, extreme_out)
         else:
             if wp.static(plastic):
-                P, Q, largest = small_stress(
-                    x, volume, H, q, y, law[m, 0], law[m, 1], e, m, law, yielded_out, history_out
+                flag = yielded_out[e]
+                P, Q, largest, flows = small_stress(
+                    x, volume, H, q, y, law[m, 0], law[m, 1], e, m, flag, law, history_out
                 )
+                if flows and flag == 0:
+                    yielded_out[e] = 1
             else:
                 P, Q, largest = small_stress(x, volume, H, q, y, law[m, 0], law[m, 1])
             keep_strain(e, strain_square(largest, law[m, 1]), extreme_out)

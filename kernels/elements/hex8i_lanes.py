@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hex8_lanes import HISTORY_SIZE
 from warp_mca.kernels.elements.hex8i_small import (
     conjugate_function,
@@ -17,7 +18,7 @@ from warp_mca.kernels.elements.hex8i_small import (
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
-from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions, pattern_force_function
+from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import law_functions
@@ -234,7 +235,7 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
     stress_modes, conjugate = stress_modes_function(precision), conjugate_function(precision)
     settled, kept = settled_function(precision), kept_function(precision)
     mean_gradients, _ = mean_functions(precision)
-    pattern_forces = pattern_force_function(precision)
+    add_product = fused(precision).add_product
     size = points // 4 * HISTORY_SIZE
     read_row, write_row = row_functions(precision, size)
     keep_strain, _, strain_square = keep_functions(R)
@@ -297,13 +298,20 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         b, scaled_volume = mean_gradients(x)
         volume = R(VOLUME_SCALE) * scaled_volume
         Q = conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w)
-        F = pattern_forces(x, b, volume, W, whole(mean, pressure), Q)
-        base = right * F[0] + far * F[1] + (right * far) * F[5]
-        top = F[2] + far * F[3] + right * F[4] + (right * far) * F[6]
+        P = whole(mean, pressure)
+        for n in range(4):  # amplitudes depend on the mean gradient, too
+            P = P - wp.outer((R(1.0) / volume) * Q[n], x[3 + n])
+        P = R(VOLUME_SCALE) * P
+        # patterns of the forces, as the signs of the lane's corners add them
+        both = right * far
+        base = add_product(both * Q[2], P, right * b[0] + far * b[1] + both * b[5])
+        top = add_product(far * Q[0] + right * Q[1] + both * Q[3], P, b[2] + far * b[3] + right * b[4])
+        base = add_product(base, W, base)
+        top = add_product(top, W, top)
         if valid:
             for i in range(3):
-                force_out[(3 * a + i) * wp.static(ROW) + thread] = base[i] - top[i]
-                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = base[i] + top[i]
+                force_out[(3 * a + i) * wp.static(ROW) + thread] = top[i] - base[i]
+                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = -base[i] - top[i]
         return flows
 
     return flow

@@ -204,12 +204,11 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
         G: R,
         e: int,
         m: int,
+        flag: int,
         law: wp.array2d(dtype=R),
-        yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
     ):
-        flag = yielded_out[e]
-        flag_new = flag
+        flows = bool(False)
         n0, n1, n2 = plastic_tractions(y, e, history_out)
         S, S0, S1, S2, N0, N1, N2, pressure, p = stress_modes(x, H, q, y, n0, n1, n2, K, G)
         mean = tensor()
@@ -233,7 +232,7 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
                 g = wp.static(layer_count) * column + k
                 flowing, dp = flow_at(whole(T, R(0.0)), G, g, e, m, flag, law, history_out)
                 if dp > R(0.0):
-                    flag_new = int(1)
+                    flows = bool(True)
                 total = total + share * tensor_of(flowing)
                 moment = moment + (share * zeta) * tensor_of(flowing)
             mean = mean + total
@@ -244,13 +243,11 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
             M1 = M1 + xi * moment
             M2 = M2 + (xi * eta) * total
         w = vec3(wp.dot(y[0], product(M0, y[0])), wp.dot(y[1], product(M1, y[1])), wp.dot(y[2], product(M2, y[2])))
-        if flag_new != flag:
-            yielded_out[e] = flag_new
         p = R(THIRD) * p
         R0, p0 = settled(R0, p[0], y[0], K, G)
         R1, p1 = settled(R1, p[1], y[1], K, G)
         R2, p2 = settled(R2, p[2], y[2], K, G)
-        return whole(mean, pressure), conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w), largest
+        return whole(mean, pressure), conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w), largest, flows
 
     return flow_stress
 

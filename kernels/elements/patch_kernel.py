@@ -1,7 +1,8 @@
-"""Owns the force kernel of hexahedra on a GPU, at small strain: one thread for each element, lanes where it yields.
+"""Owns the force kernel of hexahedra on a GPU, at small strain: one thread for each element, as if elastic.
 
 Elements that have not yielded need neither history nor registers for it: a thread computes one as if it were elastic.
-Elements that have, or that begin to yield now, may be listed; then lanes compute them, several for each.
+Elements that have, or that begin to yield now, may be listed; then threads compute the listed ones, one or several for
+each.
 """
 
 from collections.abc import Callable
@@ -50,7 +51,7 @@ class PatchElement:
         compute: (points, displacements, e, m, lane, law, yielded_out, history_out, extreme_out, listed_out, force_out);
             stores the element's forces, or lists it.
         prepare: (points, displacements, e, lane, extreme_out, force_out); stores what lanes need of a thread's element.
-        flow: computes an element by four lanes, see `hex8_lanes.flow_function`; None where `compute` does it all.
+        flow: computes an element that may yield by `lanes` threads, see `hex8_lanes`; None where `compute` does it all.
     """
 
     name: str
@@ -59,6 +60,7 @@ class PatchElement:
     compute: Any
     prepare: Any = None
     flow: Any = None
+    lanes: int = 1
 
 
 Maker = Callable[[str, str], PatchElement]  # of a precision and a law
@@ -71,9 +73,9 @@ def list_element(thread: int, listed_out: wp.array(dtype=wp.int32)):
 
 
 @cache
-def listed_function(precision: str, flow: Any) -> Any:
-    """The function that computes the listed elements of a patch by four lanes each, then clears the list."""
-    R, point = scalars(precision).real, POINT[precision]
+def listed_function(precision: str, flow: Any, lanes: int) -> Any:
+    """The function that computes the listed elements of a patch by so many lanes each, then clears the list."""
+    R, point, shift = scalars(precision).real, POINT[precision], lanes.bit_length() - 1
 
     @wp.func
     def flow_listed(
@@ -90,13 +92,13 @@ def listed_function(precision: str, flow: Any) -> Any:
         force_out: wp.array(dtype=R),
     ):
         listed = listed_out[0]
-        for batch in range((4 * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
-            item = (batch * wp.static(PATCH) + lane) >> 2
+        for batch in range((wp.static(lanes) * listed + wp.static(PATCH - 1)) // wp.static(PATCH)):
+            item = (batch * wp.static(PATCH) + lane) >> wp.static(shift)
             thread = listed_out[from_start(1 + wp.min(item, listed - 1))] & wp.static(PATCH - 1)
             mine = from_start(head[0] + thread)
             valid = item < listed
             grid = exponent_of(head)
-            q = lane & 3
+            q = lane & wp.static(lanes - 1)
             flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
         if listed > 0:
             barrier()
@@ -122,7 +124,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str) -> Any:
     point_pool, vector_pool, places_pool = slot_pools(precision)
     point, slots = POINT[precision], SLOTS[precision]
     lanes = bool(law_name) and own.flow is not None
-    flow_listed = listed_function(precision, own.flow) if lanes else None
+    flow_listed = listed_function(precision, own.flow, own.lanes) if lanes else None
     # otherwise lanes of yielding elements still need the nodes of this patch in the place of the next ones
     early = precision == "mixed" or not lanes
     begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)

@@ -193,17 +193,18 @@ def pattern_strain_function(precision: str, finite: bool) -> Any:
 
 
 @cache
-def pattern_force_function(precision: str) -> Any:
-    """The function (x, b, volume, W, P, Q) -> forces by patterns [N], out of frame W.
+def corner_force_function(precision: str) -> Any:
+    """The function (x, b, volume, W, P, Q) -> forces on the corners [N], out of frame W.
 
     P is the mean stress [Pa], Q the forces conjugate to the hourglass amplitudes [N], one row for each pattern.
     """
     t = scalars(precision)
     R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
     add_product, add_matrices = fused(precision).add_product, fused(precision).add_matrices
+    _, to_corners = pattern_functions(precision)
 
     @wp.func
-    def pattern_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
+    def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
         share = R(-1.0) / volume
         for n in range(4):  # amplitudes depend on the mean gradient, too
             P = P + wp.outer(Q[n], share * x[3 + n])
@@ -215,20 +216,6 @@ def pattern_force_function(precision: str) -> Any:
             f[3 + n] = -add_product(Q[n], W, Q[n])
         for n in range(3):
             f[3 + n] = add_product(f[3 + n], P, b[3 + n])
-        return f
-
-    return pattern_forces
-
-
-@cache
-def corner_force_function(precision: str) -> Any:
-    """As `pattern_force_function`, but of the forces on the corners [N]."""
-    t = scalars(precision)
-    R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
-    pattern_forces, (_, to_corners) = pattern_force_function(precision), pattern_functions(precision)
-
-    @wp.func
-    def corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43):
-        return to_corners(pattern_forces(x, b, volume, W, P, Q))
+        return to_corners(f)
 
     return corner_forces

@@ -85,9 +85,11 @@ def law_functions(name: str, precision: str) -> Law:
         module = import_module(name)
         general = hasattr(module, "stress")
         made = {key: getattr(module, key)(precision) for key in (GENERAL if general else FLOW)}
-    except (ImportError, AttributeError) as error:
-        remedy = f"name a module that makes {', '.join(FLOW)}, or {', '.join(GENERAL)}: {error}"
+        history = tuple(module.HISTORY) if general else FLOW_HISTORY
+        row = getattr(module, "PLASTIC_ROW", -1) if general else row_count(FLOW_HISTORY) - 1
+        if not -1 <= row < row_count(history):
+            raise ValueError(f"PLASTIC_ROW = {row} is none of the {row_count(history)} rows of HISTORY")
+    except Exception as error:  # it may be of the user
+        remedy = f"name a module that makes {', '.join(FLOW)}, or {', '.join(GENERAL)}: {type(error).__name__}: {error}"
         raise bad_value("law of a material", name, remedy) from error
-    if not general:
-        return Law(**made, history=FLOW_HISTORY, plastic_row=row_count(FLOW_HISTORY) - 1)
-    return Law(**made, history=tuple(module.HISTORY), plastic_row=getattr(module, "PLASTIC_ROW", -1))
+    return Law(**made, history=history, plastic_row=row)

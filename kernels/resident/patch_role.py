@@ -46,11 +46,12 @@ ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread
 def element_role(maker: Maker, precision: str, law_name: str) -> Any:
     """The function that computes the elements of a patch by all threads of a block.
 
-    Elements with a plastic law are computed by four lanes each, whether they yield or not.
+    Elements with a plastic law are computed as those that yield, whether they do or not.
     """
     t = scalars(precision)
     R, point = t.real, POINT[precision]
     plastic, own = bool(law_name), maker(precision, law_name)
+    lanes, shift = own.lanes, own.lanes.bit_length() - 1
     load_points, load_displacements, compute, prepare, flow = (
         own.load_points,
         own.load_displacements,
@@ -87,13 +88,14 @@ def element_role(maker: Maker, precision: str, law_name: str) -> Any:
                 compute(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, none, force_out)
         if wp.static(plastic):
             barrier()
-            for batch in range((4 * count + wp.static(THREADS - 1)) // wp.static(THREADS)):
-                item = (batch * wp.static(THREADS) + lane) >> 2
+            for batch in range((wp.static(lanes) * count + wp.static(THREADS - 1)) // wp.static(THREADS)):
+                item = (batch * wp.static(THREADS) + lane) >> wp.static(shift)
                 thread = wp.min(item, count - 1)
                 e = from_start(head[0] + thread)
+                q, valid = lane & wp.static(lanes - 1), item < count
                 if flow(
-                    points, pool, 0, exponent_of(head), patches, e, law, thread, lane & 3, item < count,
-                    history_out, extreme_out, force_out,
+                    points, pool, 0, exponent_of(head), patches, e, law, thread, q, valid, history_out, extreme_out,
+                    force_out,
                 ):  # fmt: skip
                     yielded_out[e] = 1
         barrier()

@@ -86,8 +86,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(what_failed(error), 2)
     except MemoryError:
         return _fail("the model does not fit into this machine's memory: take fewer elements", 2)
-    except RuntimeError as error:
-        if "CUDA error" not in str(error):  # Warp's words for what a GPU or its driver answers
+    except Exception as error:
+        if "Error while parsing function" in str(error):  # Warp compiles kinds from outside, too
+            return _fail(f"Warp cannot compile a function, mend it or leave out what needs it: {error}", 2)
+        if not (isinstance(error, RuntimeError) and "CUDA error" in str(error)):  # Warp's words for a GPU's answer
             raise
         remedy = "where processes share the device, take fewer, or start NVIDIA's Multi-Process Service before them"
         return _fail(f"the GPU failed ({error}): try again; {remedy}", 1)

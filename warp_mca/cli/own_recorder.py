@@ -42,8 +42,8 @@ def own_recorder(text: str, cadence: Cadence) -> Recorder:
     options: dict[str, Any] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
-        if not (key.isidentifier() and equals):
-            raise bad_value(FIELD, text, FORM)
+        if not (key.isidentifier() and equals) or key in options:
+            raise bad_value(FIELD, text, f"{FORM}, each KEY once")
         options[key] = _value(value)
     if "cadence" in inspect.signature(kind).parameters:
         options.setdefault("cadence", cadence)

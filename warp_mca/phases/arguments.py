@@ -89,5 +89,9 @@ def check_recorders(recorders: Sequence[Recorder]) -> None:
     remedy = "give a list of recorders, as mca.run(scene, recorders=[RerunStream(FILE)]), or leave it out"
     validate.kind_of("recorders", recorders, (tuple, list), remedy)
     for k, item in enumerate(recorders):
-        if isinstance(item, type) or not all(hasattr(item, name) for name in RECORDER):
-            raise bad_value(f"recorders[{k}]", validate.brief(item), "give a recorder, as RerunStream(FILE)")
+        missing = [name for name in RECORDER if not hasattr(item, name)]
+        if isinstance(item, type) or missing:
+            remedy = "give a recorder, as RerunStream(FILE)"
+            if not isinstance(item, type) and len(missing) < len(RECORDER):
+                remedy += f"; this has no {', '.join(missing)}"
+            raise bad_value(f"recorders[{k}]", validate.brief(item), remedy)

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
 from warp_mca.base.log import warn
 from warp_mca.phases.checkpoint import Checkpoint, damage_explained
+from warp_mca.phases.flexible_swing import FlexibleSwing
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Prepared, Request
 from warp_mca.phases.settle import settle
@@ -20,7 +23,8 @@ from warp_mca.step.steps import Steps
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
 
-DRIVERS = {Settle: settle}  # of phases before the impact; others have `advance`
+# Of phases before the impact; others have `advance`.
+DRIVERS: dict[type, Callable[..., Stretch]] = {Settle: settle, FlexibleSwing: FlexibleSwing.advance}
 Told = Callable[[], None]
 
 
@@ -90,8 +94,7 @@ class Course:
         for phase in phases[len(self.stretches) :]:
             if running is not None:
                 phase.restore(running)
-            driver = DRIVERS.get(type(phase))
-            self.stretches.append(driver(phase, self.impact, tell) if driver else phase.advance(self.impact, tell))
+            self.stretches.append(_before(phase, self.impact, tell))
             found = None
         if found is None:
             opening()
@@ -152,6 +155,22 @@ class Course:
             if impact.stopped[0] is None and store.is_due(impact):
                 self.keep()
         impact.advance(until=last, told=told, ended=ended)
+
+
+def _before(phase: Any, impact: Impact, tell: Callable[[float], None]) -> Stretch:
+    """Carry out a phase that comes before the impact.
+
+    Raises:
+        RequestError: one of the user's own failed, or returned something else than a `Stretch`.
+    """
+    driver = DRIVERS.get(type(phase))
+    if driver:
+        return driver(phase, impact, tell)
+    kind = type(phase).__name__
+    found = validate.call("Scene.phases", kind, "advance()", phase.advance, impact, tell)
+    if not isinstance(found, Stretch):
+        raise bad_value("Scene.phases", kind, f"its advance() must return a Stretch, not a {type(found).__name__}")
+    return found
 
 
 def restored(

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import GuardError
+from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.base.garbage import few_collections
 from warp_mca.base.joining import offsets
 from warp_mca.model.batch_model import join_models
@@ -163,7 +163,12 @@ class Impact:
             until: number of steps since the start of the phase at which to pause; all if None.
             told: called when records have been read.
             ended: asked at each row of the history whether the phase ends there; records are then read as they come.
+
+        Raises:
+            RequestError: all steps are taken already, and it is to pause later.
         """
+        if until is not None and None in self.stopped and self.state.steps > self.steps.count:
+            raise bad_value("Impact.steps.count", self.steps.count, "all are taken; let Impact.take give it more")
         if None not in self.stopped or self.state.steps > self.steps.count:
             return  # with the last record of all
         with suppress(GuardError), few_collections():  # the error is that of the last scene

@@ -94,16 +94,17 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
         device: that it runs on.
         multi_rate: as `check_multi_rate` returns it.
     """
-    if multi_rate is None:
+    if multi_rate is None or (multi_rate == "auto" and any("multi_rate" in load.refuses for load in scene.loads)):
         return None
     most = MOST if multi_rate == "auto" else int(multi_rate)
 
     def choose(model: Model, own: OwnSteps) -> Model:
-        if any(item.damping for item in model.passes):
+        damped = any(item.damping for item in model.passes)
+        if most > 1 and (damped or scene.phases):
             if multi_rate == "auto":
                 return model
-            remedy = "contact laws with a dashpot take steps of one rate; leave it out"
-            raise bad_value("multi_rate", multi_rate, remedy)
+            what = "contact laws with a dashpot" if damped else "phases before the impact"
+            raise bad_value("multi_rate", multi_rate, f"{what} take steps of one rate; leave it out")
         if not model.element_count or (multi_rate == "auto" and model.element_count < cost_of(device).least):
             return model
         choices = list(_choices(scene, span, model, own, most))

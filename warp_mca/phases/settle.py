@@ -18,7 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError, bad_value
-from warp_mca.phases.division import coarser
+from warp_mca.phases.division import MAX_STEPS, coarser
 from warp_mca.phases.stretch import Stretch, stretch_ended
 from warp_mca.scene import Settle
 
@@ -36,13 +36,14 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     """Advance an impact phase that has not begun until its bodies rest; `tell` gets the share of the time.
 
     Raises:
-        RequestError: its elements have steps of their own.
+        RequestError: its duration holds too few steps, or too many.
         GuardError: a guard stopped it, or the bodies do not rest in time.
     """
     solver, state, fine = impact.solver, impact.state, impact.steps
     model = solver.model
-    if model.rates:
-        raise bad_value("multi_rate", model.rates.top + 1, "bodies settle with one time step; leave it or Settle out")
+    if not 2 * STEPS < phase.duration / fine.dt < MAX_STEPS:
+        remedy = f"give a time of more than {2 * STEPS} and fewer than {MAX_STEPS:.0e} steps of {fine.dt:.3g} s"
+        raise bad_value("Settle.duration", phase.duration, remedy)
     joined = max(1, round(phase.duration / ROWS / fine.interval))
     speed = float(np.linalg.norm(impact.ready[0].scene.gravity)) * phase.duration
     steps = coarser(fine, model, joined, math.ceil(phase.duration / (joined * fine.interval)), speed)
@@ -59,8 +60,6 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
                 f"{kinetic / greatest:.2g} of its greatest value; give a longer duration, or hold what falls"
             )
         impact.advance(until=state.steps + STEPS)
-        if impact.stopped[0] is not None:
-            raise GuardError(f"before the impact: {impact.stopped[0]}")
         tell(state.steps / steps.count)
         kinetic, count = motion.look(), count + 1
         if kinetic > greatest:
@@ -83,7 +82,7 @@ class HalfSteps:
 
     def __init__(self, impact: Impact) -> None:
         """Bodies that have a velocity now, at the start, wait from now on."""
-        self.solver, self.state = impact.solver, impact.state
+        self.impact, self.solver, self.state = impact, impact.solver, impact.state
         model = self.solver.model
         self.kept = impact.scene_runs[0].ledger.kept
         self.trial = self.state.copy()
@@ -100,7 +99,13 @@ class HalfSteps:
         self.start = [np.array(array.numpy()) for array, _ in self.places]
 
     def look(self) -> float:
-        """Kinetic energy of the bodies that settle [J]."""
+        """Kinetic energy of the bodies that settle [J].
+
+        Raises:
+            GuardError: a guard has stopped the phase.
+        """
+        if self.impact.stopped[0] is not None:
+            raise GuardError(f"before the impact: {self.impact.stopped[0]}")
         self.now = self._half_steps()
         (before, *_), (after, *_) = self.now
         return self._kinetic(before, after, ~self.waiting[0])

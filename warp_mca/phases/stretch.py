@@ -87,10 +87,23 @@ def steps_of(stored: Mapping[str, Any], dt: float) -> Steps:
 def rows_before(scene_run: SceneRun, stretches: Sequence[Stretch], origin: float = 0.0) -> list[Rows]:
     """Rows of the stretches before an impact; times count from `origin` [s] after its start."""
     found, start = [], 0.0
+    ledgers = [*(item.ledger(scene_run) for item in stretches), scene_run.ledger]
     for k, item in enumerate(stretches):
-        ledger, end = item.ledger(scene_run), start + item.time
-        facts = phase_facts(item.kind, start, end, item.ended_by, ledger.energy())
+        ledger, end = ledgers[k], start + item.time
+        facts = phase_facts(item.kind, start, end, item.ended_by, _end_energy(ledger, ledgers[k + 1]))
         before = sum(later.time for later in stretches[k:])
         found.append(rows_of(scene_run.ready, ledger, facts, before=before, origin=origin))
         start = end
     return found
+
+
+def _end_energy(ledger: Ledger, after: Ledger) -> dict[str, float]:
+    """The ledger at the end of a phase [J]: the first row `after` it, without what bodies that waited gain there.
+
+    Its own last row may be as long before its end as its rows are apart.
+    """
+    if not after.kept.sums:
+        return ledger.energy()
+    found = after.energy(0)
+    given = after.initial_energy - ledger.initial_energy if ledger.kept.sums else 0.0
+    return {**found, "initial": found["initial"] - given, "kinetic": found["kinetic"] - given}

@@ -10,7 +10,7 @@ from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.drops import fall_velocity, resting_place
 from warp_mca.scene.elements import ELEMENTS
-from warp_mca.scene.materials import MATERIALS, Material
+from warp_mca.scene.materials import MATERIALS, Material, check_law
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -68,6 +68,8 @@ class Body:
             known = " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in MATERIALS)
             remedy = f"give {known}, or one for each cell set; register other classes by warp_mca.register"
             raise bad_value(f"Body {self.name}.material", self.material, remedy)
+        for material in materials:
+            check_law(material)
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         if self.kinematics not in ("corotational", "finite"):

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
+
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +48,25 @@ class Penalty(ContactLaw):
     def stiffening(self, depth: float) -> float:
         """1 at any depth."""
         return 1.0
+
+
+def law_values(law: ContactLaw, depth: float) -> dict[str, Any]:
+    """The law, parameters, stiffening and damping that a contact pass has, for depths up to `depth` [m].
+
+    Raises:
+        RequestError: one of them is not what `ContactLaw` describes.
+    """
+    kind, name = type(law).__name__, getattr(law, "law", None)
+    validate.kinds(kind, str, "name the module of its functions", law=name)
+    parameters = validate.call(f"{kind}.law", name, "parameters", lambda: law.parameters)
+    if not validate.is_list(parameters):
+        raise bad_value(f"{kind}.parameters", validate.brief(parameters), "give a tuple of finite numbers")
+    found = {"law": name, "parameters": tuple(parameters)}
+    for key in ("stiffening", "damping"):
+        found[key] = value = validate.call(f"{kind}.law", name, f"{key}()", getattr(law, key), depth)
+        if not (validate.is_number(value) and value >= 0.0):
+            raise bad_value(f"{kind}.{key}({depth:g})", validate.brief(value), "give a finite number, 0 or above")
+    return found
 
 
 CONTACT_LAWS: dict[str, type[ContactLaw]] = {kind.__name__: kind for kind in (Penalty,)}

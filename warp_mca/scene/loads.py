@@ -43,12 +43,12 @@ class Load:
         Raises:
             RequestError: it cannot act so.
         """
-        raise NotImplementedError
+        raise NotImplementedError("its class has no build()")
 
     @classmethod
     def stage(cls) -> type[Any]:
         """The class of its device side, made of `physics.loads.nodal_stage.NodalLoad`."""
-        raise NotImplementedError
+        raise NotImplementedError("its class has no stage()")
 
 
 LOADS: dict[str, type[Load]] = {}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import ClassVar
 
 from warp_mca.base import validate
@@ -100,6 +101,22 @@ class J2Bilinear(Elastic):
     def parameters(self) -> tuple[float, ...]:
         """K, G, sigma_y, H [Pa] and beta [-]."""
         return *super().parameters, self.sigma_y, self.hardening_modulus, self.beta
+
+
+def check_law(material: Elastic) -> None:
+    """Check the law and the parameters of a material, which may be of a class from outside the package.
+
+    Raises:
+        RequestError: the law is no text, or the parameters are not the numbers that `Elastic.parameters` describes.
+    """
+    kind = type(material).__name__
+    validate.kinds(kind, str, "name the module of its functions, or leave it out", law=material.law)
+    row = validate.call(f"{kind}.law", material.law, "parameters", lambda: material.parameters)
+    least = 3 if material.law else 2
+    sound = isinstance(row, tuple | list) and len(row) >= least
+    if not (sound and all(isinstance(entry, Real) and not math.isnan(entry) for entry in row)):
+        remedy = f"give {least} numbers or more: K, G [Pa] and, with a law, the yield stress and what else it reads"
+        raise bad_value(f"{kind}.parameters", row, remedy)
 
 
 Material = Elastic  # for annotations: every material is elastic below yield

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
 from warp_mca.physics.absorbing.stage import AbsorbingStage
 from warp_mca.physics.actor import Actor
 from warp_mca.physics.contact.actor import Contacts
@@ -41,9 +43,15 @@ ACTORS: dict[str, Callable[[Solver], Actor]] = {
 
 
 def actors_of(model: Model) -> dict[str, Callable[[Solver], Actor]]:
-    """All of ACTORS, and behind them the kinds of loads that a model has."""
-    loads = {kind: partial(LOADS[kind].stage(), name=kind) for kind in model.loads}
-    return ACTORS | loads
+    """All of ACTORS, and behind them the kinds of loads that a model has.
+
+    Raises:
+        RequestError: a kind has the name of one of ACTORS, or does not say its stage.
+    """
+    for kind in ACTORS.keys() & model.loads.keys():
+        raise bad_value("Scene.loads", kind, "the solver has a part of this name; give the class another one")
+    stages = {kind: validate.call("Scene.loads", kind, "stage()", LOADS[kind].stage) for kind in model.loads}
+    return ACTORS | {kind: partial(stage, name=kind) for kind, stage in stages.items()}
 
 
 class Made:

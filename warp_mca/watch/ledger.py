@@ -255,9 +255,9 @@ class Ledger:
             if found[PRESSURE] > self.kept.peaks[k, 0]:
                 self.kept.peaks[k] = found[PRESSURE], found[SQUARES]
 
-    def energy(self) -> dict[str, float]:
-        """The ledger at the end [J]; not numbers where no record was taken in."""
-        sums = self.kept.sums[-1] if self.kept.sums else np.full(self._width, np.nan)
+    def energy(self, row: int = -1) -> dict[str, float]:
+        """The ledger at a row of the history, the last one by default [J]; not numbers where no record was taken in."""
+        sums = self.kept.sums[row] if self.kept.sums else np.full(self._width, np.nan)
         last = {key: float(value) for key, value in self._energies(sums).items()}
         error = sum(value for key, value in last.items() if key != "external_work")
         initial = self.initial_energy

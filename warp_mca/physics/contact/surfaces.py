@@ -12,6 +12,7 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
 from warp_mca.scene import Contact, RigidPlane
+from warp_mca.scene.contact_laws import law_values
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -209,10 +210,7 @@ def _surface_pass(
         stiffness=factor * _node_mean(nodes, slave, own),
         face_stiffness=factor * other,
         mu=contact.mu,
-        law=contact.law.law,
-        parameters=contact.law.parameters,
-        stiffening=contact.law.stiffening(0.5 * longest),
-        damping=contact.law.damping(0.5 * longest),
+        **law_values(contact.law, 0.5 * longest),
         slave_face=slave.node,
         slave_offset=slave_offset,
         face_of_slave=around_slave,
@@ -253,10 +251,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
                 stiffness=factor * _node_mean(nodes, slave, own),
                 slave_face=slave.node,
                 mu=contact.mu,
-                law=contact.law.law,
-                parameters=contact.law.parameters,
-                stiffening=contact.law.stiffening(deepest),
-                damping=contact.law.damping(deepest),
+                **law_values(contact.law, deepest),
                 sign=1.0,
                 contact=index,
                 plane=contact.master,

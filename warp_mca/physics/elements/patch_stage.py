@@ -36,7 +36,7 @@ class PatchStage(ElementStage):
         flowing: elements of each patch that took the return map last, shape (patch_count,), int32; empty where no
             order of patches is kept.
         maker: of the element in a patch.
-        lanes: whether several threads compute an element that yields.
+        lanes: threads that compute an element that yields, apart from others; 0 where elements are computed alike.
         most: blocks of threads that the device holds.
         chains: patches of elements up to a level and of one chain, by these two numbers, where there are any.
         beside: blocks of threads of one chain beside that of the fastest nodes.
@@ -56,7 +56,8 @@ class PatchStage(ElementStage):
         super().__init__(block, precision, kernels, points)
         self.force_kernel = patch_kernels.force_kernel(precision, block.law)
         self.maker = patch_kernels.element
-        self.lanes = self.maker(precision, block.law).flow is not None
+        own = self.maker(precision, block.law)
+        self.lanes = own.lanes if own.flow else 0
         mixed = precision == "mixed"
         ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
         halved = self._halved(size)
@@ -74,7 +75,7 @@ class PatchStage(ElementStage):
         self.patches.places = wp.array(host.places.view(np.int32), dtype=wp.vec2i)
         patches_of_levels = np.searchsorted(host.start[:-1], block.level_ends)
         self.slot_level = levels_of(host.slot_start[patches_of_levels].tolist())
-        self.scheduled = block.plastic and self.lanes
+        self.scheduled = block.plastic and self.lanes > 0
         self.patches.turn = wp.clone(self.patches.head) if self.scheduled else self.patches.head
         self.flowing = wp.zeros(len(heads) if self.scheduled else 0, dtype=wp.int32)
         self.flowing_of_run = wp.zeros(patch.SCHEDULERS if self.scheduled else 0, dtype=wp.int32)
@@ -103,7 +104,7 @@ class PatchStage(ElementStage):
     def new_state(self) -> ElementState:
         """As for elements one by one, but lanes read the points of one element together."""
         found = super().new_state()
-        if self.lanes:
+        if self.lanes > 1:
             found.history = wp.zeros(found.history.shape[::-1], dtype=self.real).transpose()
         return found
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import rotation_matrix
@@ -15,7 +16,7 @@ from warp_mca.model.assembly import GROUND, Array, Assembly, Index
 from warp_mca.physics.joints.couplings import Coupling, coupling
 from warp_mca.physics.ties.nodes import TiedNodes
 from warp_mca.scene.joints import Joint
-from warp_mca.scene.ties import Clusters, Rails, Side
+from warp_mca.scene.ties import Clusters, Rails, Side, Ties
 
 
 @joinable
@@ -100,7 +101,8 @@ class _Tied:
 def _tied_pairs(parts: Assembly, joint: Joint, start: int) -> _Tied:
     """What a joint ties, whose pairs begin at `start`."""
     side = _side(parts, joint.body)
-    ties = joint.ties(side, None if joint.other is None else _side(parts, joint.other))
+    other = None if joint.other is None else _side(parts, joint.other)
+    ties = validate.call(joint.title, "ties()", "it", _ties_of, joint, side, other)
     if isinstance(ties, Rails):
         return _on_rails(parts, joint, ties)
     if isinstance(ties, Clusters):
@@ -124,6 +126,21 @@ def _tied_pairs(parts: Assembly, joint: Joint, start: int) -> _Tied:
         remedy = "its ties must give an orthogonal projector, as n n^T or I - a a^T of unit vectors"
         raise bad_value(f"{joint.title}.ties", tied.tolist(), remedy)
     return _Tied(a, b, np.broadcast_to(tied, (len(a), 3, 3)), np.zeros((0, 3), np.int32))
+
+
+def _ties_of(joint: Joint, side: Side, other: Side | None) -> Ties | Rails | Clusters:
+    """What a joint returns, with nodes that its bodies have."""
+    ties = joint.ties(side, other)
+    if not isinstance(ties, Ties | Rails | Clusters):
+        raise TypeError(f"it gives a {type(ties).__name__}, not Ties, Rails or Clusters")
+    of_both = (ties.sliders, ties.rails) if isinstance(ties, Rails) else ((ties.first,), (ties.second,))
+    for owner, lists in zip((side, other), of_both, strict=True):
+        for nodes in lists:
+            if (nodes is None) != (owner is None):
+                raise TypeError("it gives nodes of a second body just where the joint has none")
+            if owner and nodes is not None and not np.isin(nodes, np.arange(len(owner.X))).all():
+                raise IndexError(f"it names other nodes of {owner.body} than 0 to {len(owner.X) - 1}")
+    return ties
 
 
 def _on_rails(parts: Assembly, joint: Joint, ties: Rails) -> _Tied:

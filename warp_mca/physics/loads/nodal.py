@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import SCENE, joinable, of
 from warp_mca.model.assembly import Assembly
-from warp_mca.scene.loads import LOADS
+from warp_mca.scene.loads import LOADS, Load
 
 
 @joinable
@@ -51,12 +52,24 @@ def loaded_nodes(
         for name, body in load.bodies().items():
             if parts.scene.body(body).rigid:
                 raise bad_value(f"{kind}.{name}", body, "loads act on nodes of flexible bodies; leave rigid off")
+        if not isinstance(load.refuses, Mapping):
+            raise bad_value(f"{kind}.refuses", load.refuses, "give a dict of remedies by what it does not go with")
         if several_rates and "multi_rate" in load.refuses:
             raise bad_value("Scene.loads", kind, f"it does not go with multi_rate; {load.refuses['multi_rate']}")
-        item = load.build(parts, start)
-        np.add.at(added, item.node, item.eigenvalues(parts.mass))
+        item = validate.call("Scene.loads", kind, "making its arrays", _arrays, load, parts, start, added)
         found.setdefault(kind, []).append(item)
     return {kind: tuple(found[kind]) for kind in sorted(found)}
+
+
+def _arrays(load: Load, parts: Assembly, start: float, added: NDArray[np.float64]) -> LoadedNodes:
+    """Those of a load, with its nodes as they may be, and what it adds to the eigenvalues."""
+    item = load.build(parts, start)
+    if not isinstance(item, LoadedNodes):
+        raise TypeError(f"build() gives a {type(item).__name__}, not a LoadedNodes")
+    if not (np.isin(item.node, np.arange(len(added))).all() and len(item.node)):
+        raise IndexError(f"LoadedNodes.node names no node, or others than 0 to {len(added) - 1}")
+    np.add.at(added, item.node, item.eigenvalues(parts.mass))
+    return item
 
 
 def check_batch(scenes: Sequence[Mapping[str, object]]) -> None:
