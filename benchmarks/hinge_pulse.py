@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 import warp_mca as mca
-from warp_mca.phases.impact import Impact
-from warp_mca.phases.prepare import Clock, prepare
+from warp_mca.phases.carry_out import begin
+from warp_mca.phases.prepare import Request, prepare
+from warp_mca.phases.settings import Settings
 
 RADIUS, LENGTH = 0.013, 0.21
 METAL = mca.Elastic(E=70e9, nu=0.27, rho=2700.0)
@@ -57,8 +58,8 @@ def rods(hinge: str, section: int, axis: str, pulse: float, duration: float) -> 
 def passed(scene: mca.Scene) -> float:
     """Share of the energy that is at x < LENGTH at the end of a run [-]."""
     meshes = mca.mesh(scene)
-    ready = prepare(scene, meshes, Clock(), lambda stage, done: None)
-    impact = Impact([ready], scene.impact.duration, device="cpu", precision="float64", threads=1)
+    request = Request(span=scene.impact.duration, settings=Settings("cpu", "float64", 1))
+    impact = begin([prepare(scene, meshes, request)], request)
     impact.advance()
     solver, state = impact.solver, impact.state
     model = solver.model

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
-from warp_mca.phases.impact import Impact
-from warp_mca.phases.prepare import Clock, prepare
+from warp_mca.phases.carry_out import begin
+from warp_mca.phases.prepare import Request, prepare
+from warp_mca.phases.settings import Settings
 from warp_mca.scene import model_file
 from warp_mca.scene.catalogue import parse_overrides
 from warp_mca.step.solver import Solver
@@ -58,12 +59,13 @@ def measure(
     scene: mca.Scene, meshes: Mapping[str, Mesh], distance: float, device: str, precision: str
 ) -> dict[str, Any]:
     """Run a scene of hexahedra and say what came of it."""
-    ready, begun = prepare(scene, meshes, Clock(), lambda stage, done: None), time.perf_counter()
-    impact = Impact([ready], scene.impact.duration, device=device, precision=precision, threads=1)
+    request = Request(span=scene.impact.duration, settings=Settings(device, precision, 1))
+    ready, begun = prepare(scene, meshes, request), time.perf_counter()
+    impact = begin([ready], request)
     impact.advance()
     if impact.stopped[0] is not None:
         raise mca.GuardError(impact.stopped[0])
-    result = impact.scene_runs[0].result(Clock().wall, (), None)
+    result = impact.scene_runs[0].result(request.clock.wall, (), None)
     summary = result.summary
     work = plastic_work(impact.solver, impact.state)
     hinges = [joint for joint in scene.joints if isinstance(joint, mca.Revolute)]

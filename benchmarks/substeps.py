@@ -15,9 +15,10 @@ import warp as wp
 
 import warp_mca as mca
 from benchmarks.timing import QUICK, seconds_per_call
+from warp_mca.phases.carry_out import begin
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.prepare import Clock, prepare
-from warp_mca.phases.rate_groups import grouping
+from warp_mca.phases.prepare import Request, prepare
+from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.options import with_options
@@ -34,9 +35,8 @@ def begun(preset: str, device: str, rate: int | None, mass_scaling: float | None
     """The impact phase of `two_link` before its first step."""
     source = load_source("two_link")
     scene = with_options(source.build(source.resolve(preset)), None, mass_scaling, None)
-    groups = grouping(scene, SPAN, device, rate)
-    ready = prepare(scene, mca.mesh(scene), Clock(), lambda stage, done: None, grouping=groups)
-    return Impact([ready], SPAN, device=device, precision="mixed", threads=1)
+    request = Request(span=SPAN, settings=Settings(device, "mixed", 1, rate))
+    return begin([prepare(scene, mca.mesh(scene), request)], request)
 
 
 def repeated(launch: Body) -> Body:

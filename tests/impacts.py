@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.prepare import Clock, Prepared, prepare
-from warp_mca.phases.rate_groups import grouping
+from warp_mca.phases.prepare import Clock, Prepared, Request, prepare
+from warp_mca.phases.settings import Settings
 from warp_mca.step.solver import Solver
 
 # least lengths of ranges that threads take, so short that small models are cut
@@ -38,8 +38,8 @@ def prepared(
     device: str = "cpu",
 ) -> Prepared:
     """A scene at the start of its impact phase."""
-    groups = grouping(scene, scene.impact.duration if duration is None else duration, device, multi_rate)
-    return prepare(scene, meshes, Clock(), lambda stage, done: None, grouping=groups)
+    span, settings = scene.impact.duration if duration is None else duration, Settings(device, "mixed", 1, multi_rate)
+    return prepare(scene, meshes, Request(span=span, settings=settings))
 
 
 def begun(

@@ -15,10 +15,11 @@ from test_full_disk import files_up_to
 
 import warp_mca as mca
 from warp_mca.cli.main import main
+from warp_mca.phases.carry_out import restored
 from warp_mca.phases.checkpoint import FILE, Checkpoint
 from warp_mca.phases.every import Every
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.pure_setup import Place
+from warp_mca.step.records import SceneRecords
 
 BLOCK = mca.Body(
     name="block",
@@ -178,20 +179,28 @@ def test_a_state_that_cannot_be_written_is_a_warning_and_the_run_goes_on(
     assert mca.load(out).summary["n_steps"] == 40 and not (out / FILE).exists()
 
 
+STEPS = {"dt": 1e-7, "per_search": 2, "searches": 5, "intervals": 10, "intervals_per_search": 1, "spare": False}
 PLACES: tuple[dict[str, Any], ...] = (
-    {"phase": "build"},
-    {"swung": -1},
-    {"swung": "1"},
-    {"touch": 1.5},
-    {"joint_impulse": {"O": "none"}},
-    {"wall": {"fe": "1"}},
-    {"more": 1},
+    {"kind": 3, "more": 1},
+    {"count": -1},
+    {"count": "1"},
+    {"ended": "touch"},
+    {"steps": {**STEPS, "dt": 2e-7}},
+    {"steps": {**STEPS, "intervals": 1.5}},
+    {"steps": {**STEPS, "more": 1}},
 )
 
 
 @pytest.mark.parametrize("change", PLACES)
 def test_the_place_of_a_run_that_a_file_holds_is_checked(change: dict[str, Any]):
-    good = {"phase": "swing", "swung": 3, "touch": None, "joint_impulse": {"O": [1.0]}, "wall": {"fe": 1.0}}
-    assert Place.of(good).swung == 3
+    good = {"kind": "swing", "ended_by": "touch", "steps": STEPS, "count": 3, "more": {}}
+    arrays = {f"0/{name}": array for name, array in SceneRecords().arrays().items()}
+
+    def place(stretch: dict[str, Any], fe: object = 1.0) -> dict[str, Any]:
+        return {"stretches": [stretch], "steps": STEPS, "wall": {"fe": fe}}
+
+    assert restored(place(good), arrays, 1e-7)[0][0].count == 3
     with pytest.raises((TypeError, ValueError)):
-        Place.of({**good, **change})
+        restored(place({**good, **change}), arrays, 1e-7)
+    with pytest.raises((TypeError, ValueError)):
+        restored(place(good, "none"), arrays, 1e-7)

@@ -237,10 +237,10 @@ def test_a_built_in_model_takes_new_parameters_unless_they_change_the_mesh(
 
 def finished(**figures: object) -> mca.Result:
     """A run without contact, for tests that are about something else."""
-    from warp_mca.results.result import RunFacts, summarise
+    from warp_mca.results.result import summarise
 
     history = {name: np.zeros(10) for name in HISTORY_COLUMNS} | {"time_s": np.arange(1, 11) * 1e-6}
-    facts = RunFacts(
+    facts = dict(
         scene="none",
         n_elements=1,
         n_nodes=8,

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.phases.cycle import Cycle, begin_cycle
-from warp_mca.phases.cycle_result import cycle_result
-from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.cycle import Cycle
 from warp_mca.phases.impact_driver import bending_period
-from warp_mca.phases.parts import ImpactPart, Part, SwingPart
+from warp_mca.phases.motion import ImpactPart, Part, SwingPart
+from warp_mca.phases.prepare import Request, Setup
 from warp_mca.phases.settings import Settings
 from warp_mca.rigid.handback import HandBack
 from warp_mca.step.state_figures import max_plastic_strain
@@ -46,10 +45,10 @@ def scene(name: str, **parameters) -> mca.Scene:
 @cache
 def cycle(name: str, inertia: str = "mesh", duration: float = 1.5e-3) -> tuple[Setup, list[Part], mca.Result]:
     """A run of two impacts, in float64."""
-    settings = Settings("cpu", "float64", 1)
-    setup = begin_cycle(scene(name, rigid_inertia=inertia), None, duration, settings, lambda stage, done: None)
-    parts = Cycle(setup).run()
-    return setup, parts, cycle_result(setup, parts)
+    request = Request(span=duration, settings=Settings("cpu", "float64", 1))
+    run = Cycle(scene(name, rigid_inertia=inertia), None, request)
+    result = run.run()
+    return run.setup, run.story.parts, result
 
 
 def impacts(name: str, inertia: str = "mesh") -> list[ImpactPart]:

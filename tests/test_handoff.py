@@ -322,7 +322,7 @@ def test_rigid_motion_comes_back_unchanged(inertia):
     np.testing.assert_allclose(back.theta, state.theta, rtol=1e-12)
     np.testing.assert_allclose(back.theta_dot, state.theta_dot, rtol=1e-12)
     assert back.kinetic_energy == pytest.approx(state.nodes.kinetic_energy, rel=1e-12)
-    assert back.vibration_energy < 1e-24 and back.shape_misfit < 1e-15
+    assert back.vibration_energy < 1e-24 and max(np.abs(u).max() for u in back.displacements.values()) < 1e-15
 
 
 def test_vibration_that_no_rigid_motion_carries_is_what_is_left():

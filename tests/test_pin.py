@@ -15,8 +15,8 @@ from test_joint_loads import ALL, SLIDE
 
 import warp_mca as mca
 from warp_mca.base.rotation import mean_pose
-from warp_mca.phases.cycle import Cycle, begin_cycle
-from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.cycle import Cycle
+from warp_mca.phases.prepare import Request
 from warp_mca.phases.settings import Settings
 
 SIZE = (0.1, 0.02, 0.02)
@@ -165,8 +165,9 @@ def test_scenes_side_by_side_give_what_each_gives_alone():
 def test_permanent_shapes_keep_their_hinges_from_impact_to_impact():
     """A three-link arm strikes twice: momenta pass from phase to phase, and no pin pulls before the second touch."""
     scene = cycling("three_link", joint_nodes="pin", pin_radius=0.008, rigid_inertia="mesh")
-    setup = begin_cycle(scene, None, 1.5e-3, Settings("cpu", "float64", 1), lambda stage, done: None)
-    impacts = [part for part in Cycle(setup).run() if isinstance(part, ImpactPart)]
+    run = Cycle(scene, None, Request(span=1.5e-3, settings=Settings("cpu", "float64", 1)))
+    run.run()
+    impacts = run.story.impacts
     assert len(impacts) == 2
     for part in impacts:
         assert part.back is not None

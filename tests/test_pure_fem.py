@@ -17,7 +17,7 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.phases import pure_fem
+from warp_mca.phases import flexible_swing
 from warp_mca.phases.checkpoint import FILE, Checkpoint
 from warp_mca.phases.every import Every
 from warp_mca.recorders import SnapshotFile
@@ -43,10 +43,10 @@ BLOCK, INTERVAL, COMMAND = 2, 2e-6, ["run", "scene.py", "--method", "pure-fem", 
 KILLED = """
 import os, signal, sys
 from warp_mca.cli.main import main
-from warp_mca.phases import pure_fem
+from warp_mca.phases import flexible_swing
 from warp_mca.phases.checkpoint import Checkpoint
 
-pure_fem.BLOCK, store, count = 2, Checkpoint.store, []
+flexible_swing.BLOCK, store, count = 2, Checkpoint.store, []
 
 def store_and_die(self, impact, place, more=None):
     store(self, impact, place, more)
@@ -64,7 +64,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty folder with the scene, and blocks so short that a swing has several."""
     (tmp_path / "scene.py").write_text(SCENE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(pure_fem, "BLOCK", BLOCK)
+    monkeypatch.setattr(flexible_swing, "BLOCK", BLOCK)
     for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
         monkeypatch.setattr(figure, lambda *_: None)  # drawing them takes longer than the runs
 
@@ -155,14 +155,14 @@ def test_the_same_command_goes_on_after_a_kill(monkeypatch: pytest.MonkeyPatch, 
     def store_and_stop(self: Checkpoint, impact: Any, place: Any, more: Any = None) -> None:
         store(self, impact, place, more)
         places.append(place)
-        if place["phase"] == "impact" and len(places) > 3:
+        if place["stretches"] and len(places) > 3:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "store", store_and_stop)
         assert main(COMMAND) == 130
     assert "the same command goes on" in capsys.readouterr().err
-    assert places[0]["phase"] == "swing" and len(places[0]["configuration"]) == 4  # three of the run that was killed
+    assert not places[0]["stretches"] and len(places[0]["running"]) == 4  # three of the run that was killed
     assert main(["resume", "out"]) == 0
     assert not Path("out", FILE).exists()
     equal(mca.load("out"))
@@ -191,6 +191,6 @@ def test_what_cannot_be_run_is_refused(change: dict[str, Any], arguments: dict[s
 
 
 def test_links_that_touch_nothing_in_time_are_an_error(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(pure_fem, "LATEST", (0.3, 0.0))
+    monkeypatch.setattr(flexible_swing, "LATEST", (0.3, 0.0))
     with pytest.raises(mca.GuardError, match=r"nothing touched until t = .* rigid links touch at 0\.001"):
         mca.run(scene(), method="pure-fem", threads=1)

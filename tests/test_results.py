@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from warp_mca.results.force_history import (
     reverses,
     stick_intervals,
 )
-from warp_mca.results.result import HISTORY_COLUMNS, Result, RunFacts, summarise
+from warp_mca.results.result import HISTORY_COLUMNS, Result, summarise
 from warp_mca.results.storage import FILES, check_output, load, save
 
 TIME = np.arange(1, 601) * 1e-6
@@ -37,7 +38,7 @@ def history(**columns: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.zeros(len(TIME)) for name in HISTORY_COLUMNS} | {"time_s": TIME} | columns
 
 
-def facts(**changes: object) -> RunFacts:
+def facts(**changes: object) -> dict[str, Any]:
     """Facts of an imaginary run."""
     values: dict = dict(
         scene="toy",
@@ -55,7 +56,7 @@ def facts(**changes: object) -> RunFacts:
         max_plastic_strain=0.01,
         parameters={"mu": 0.47},
     )
-    return RunFacts(**(values | changes))
+    return values | changes
 
 
 def test_edges_put_the_first_interval_before_the_first_row():
@@ -142,7 +143,7 @@ def test_summary_has_every_figure_of_the_contract():
 def test_saved_results_load_with_every_bit(tmp_path: Path):
     rng = np.random.default_rng(0)
     columns = history(F_n_N=two_bumps(), tip_vx=rng.normal(size=len(TIME)) * 1e-7)
-    result = Result(summarise(columns, facts(more={"penetration": np.float64(1e-6)})), columns, warnings=("look",))
+    result = Result(summarise(columns, facts(penetration=np.float64(1e-6))), columns, warnings=("look",))
     saved = save(result, tmp_path / "a" / "b")
     loaded = load(tmp_path / "a" / "b")
     assert saved.path == loaded.path == tmp_path / "a" / "b"

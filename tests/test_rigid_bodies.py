@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from test_cycle import COARSE
 
 import warp_mca as mca
-from warp_mca.phases.cycle import Cycle, begin_cycle
-from warp_mca.phases.cycle_result import cycle_result
+from warp_mca.phases.cycle import Cycle
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.prepare import Request
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.rigid.rows import independent
 
@@ -276,10 +275,8 @@ def test_a_gpu_computes_what_a_cpu_does(make, names, precision: str):
 @pytest.mark.parametrize(("name", "rigid", "t_end"), [("single_link", "OA", 0.45), ("three_link", "AB", 0.27)])
 def test_cycles_of_swings_and_impacts_go_on_with_rigid_bodies(name: str, rigid: str, t_end: float):
     scene = mca.make_scene(name, **COARSE, t_end=t_end, rigid_bodies=rigid, rigid_inertia="mesh")
-    setup = begin_cycle(scene, None, 1.5e-3, Settings("cpu", "float64", 1), lambda stage, done: None)
-    parts = Cycle(setup).run()
-    result = cycle_result(setup, parts)
-    impacts = [part for part in parts if isinstance(part, ImpactPart)]
+    run = Cycle(scene, None, Request(span=1.5e-3, settings=Settings("cpu", "float64", 1)))
+    result, impacts = run.run(), run.story.impacts
     assert len(impacts) == (2 if name == "single_link" else 1)
     for part in impacts:
         assert part.back is not None

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.phases import carry_out
 from warp_mca.phases.checkpoint import FILE, Checkpoint
 from warp_mca.scene import model_file
 
@@ -131,7 +132,7 @@ def test_a_run_that_is_stopped_after_settling_goes_on(tmp_path: Path, monkeypatc
         with pytest.raises(StoppedError):
             mca.run(made, threads=1, out=tmp_path / "out", checkpoint="2e-5s")
     assert (tmp_path / "out" / FILE).exists()
-    monkeypatch.setitem(__import__("warp_mca.phases.simulate", fromlist=["DRIVERS"]).DRIVERS, mca.Settle, None)
+    monkeypatch.setitem(carry_out.DRIVERS, mca.Settle, None)
     result = mca.run(made, threads=1, out=tmp_path / "out", checkpoint="2e-5s")  # it does not settle again
     assert all(result[name].tobytes() == whole[name].tobytes() for name in whole.history)
     assert result.summary["phases"] == whole.summary["phases"]

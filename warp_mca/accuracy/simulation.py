@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 from warp_mca.accuracy.plan import Plan, planned, run_planned
@@ -17,14 +17,15 @@ from warp_mca.phases.arguments import (
     check_recorders,
     check_scene,
     one_at_a_time,
+    shows_progress,
     span_of,
     teller,
 )
 from warp_mca.phases.checkpoint import Checkpoint
 from warp_mca.phases.every import METHOD, Every, every_of
 from warp_mca.phases.meshing import mesh
-from warp_mca.phases.progress import shows_progress
-from warp_mca.phases.settings import Settings, settings_of
+from warp_mca.phases.prepare import Clock, Request
+from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.result import Result
@@ -96,23 +97,8 @@ def run(
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    request = partial(_result, _Request(scene, meshes, span, tell, settings, recorders, method))
-    return run_planned(plan, partial(_carry_out, request, out, force, every))
-
-
-def _carry_out(
-    request: Callable[[Plan | None, Checkpoint | None], Result],
-    out: str | os.PathLike[str] | None,
-    force: bool,
-    every: Every | None,
-    plan: Plan | None,
-) -> Result:
-    """What came of a run, kept in a folder if it has one; arguments as in `run`."""
-
-    def result(store: Checkpoint | None) -> Result:
-        return request(plan, store)
-
-    return result(None) if out is None else _kept(result, out, force, every)
+    request = Request(span=span, settings=settings, tell=tell, recorders=recorders)
+    return run_planned(plan, partial(_kept, partial(_result, scene, meshes, method, request), out, force, every))
 
 
 def _every(
@@ -137,16 +123,22 @@ def _every(
 
 
 def _kept(
-    result: Callable[[Checkpoint | None], Result], out: str | os.PathLike[str], force: bool, every: Every | None
+    result: Callable[[Checkpoint | None, Plan | None], Result],
+    out: str | os.PathLike[str] | None,
+    force: bool,
+    every: Every | None,
+    plan: Plan | None,
 ) -> Result:
-    """What came of a run that writes to a folder, which it holds meanwhile; arguments as in `run`.
+    """What came of a run, which holds its folder meanwhile if it writes to one; arguments as in `run`.
 
     Raises:
         RequestError: the folder cannot be used.
     """
+    if out is None:
+        return result(None, plan)
     with hold(out, force=force) as folder:
         store = Checkpoint(folder.path, every, force) if every else None
-        found = write(result(store), folder, force=force)
+        found = write(result(store, plan), folder, force=force)
         if store:
             store.remove()
         return found
@@ -164,53 +156,40 @@ def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | No
     check_files(recorders, None if out is None else check_output(out, force=force))
 
 
-@dataclass(frozen=True)
-class _Request:
-    """What is run, and how; fields as in `simulate`."""
-
-    scene: Scene
-    meshes: Mapping[str, Mesh] | None
-    span: float
-    tell: Progress
-    settings: Settings
-    recorders: Sequence[Recorder]
-    method: str
-
-
-def _result(request: _Request, plan: Plan | None, store: Checkpoint | None) -> Result:
+def _result(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    method: str,
+    request: Request,
+    store: Checkpoint | None,
+    plan: Plan | None,
+) -> Result:
     """What came of a request, or of what was planned in its place.
 
     Raises:
         RequestError: the request cannot be carried out.
         GuardError: the run lost its footing, or nothing touched.
     """
-    if plan is None or request.method == METHOD:
-        return _phases(request, store)
+    request = replace(request, store=store, clock=Clock())
+    if plan is None or method == METHOD:
+        return _phases(scene, meshes, method, request)
+    if plan.ready is not None and not request.recorders:
+        return plan.judged(plan.ready)
     settings = replace(request.settings, **plan.variant.options)
-    ready = None if request.recorders else plan.ready
-    return plan.judged(ready or _phases(replace(request, scene=plan.scene, settings=settings)))
+    return plan.judged(_phases(plan.scene, meshes, method, replace(request, settings=settings)))
 
 
-def _phases(request: _Request, store: Checkpoint | None = None) -> Result:
+def _phases(scene: Scene, meshes: Mapping[str, Mesh] | None, method: str, request: Request) -> Result:
     """Finite elements from the release on, swings and impacts in turn, or one impact; raises as `_result`."""
-    scene, meshes, span, tell, settings, recorders, method = vars(request).values()
     if method == METHOD:
-        from warp_mca.phases.pure_fem import PureRun
-        from warp_mca.phases.pure_result import pure_result
+        from warp_mca.phases.pure_fem import run_pure
 
-        run = PureRun(scene, meshes, span, settings, tell)
-        run.run(store)
-        tell("impact", 1.0)
-        return pure_result(run)
+        return run_pure(scene, meshes, request)
     if scene.t_end is not None:
-        from warp_mca.phases.cycle import Cycle, begin_cycle
-        from warp_mca.phases.cycle_result import cycle_result
+        from warp_mca.phases.cycle import Cycle
 
-        cycle = Cycle(begin_cycle(scene, meshes, span, settings, tell), store, recorders)
-        parts, film = cycle.run(), cycle.film
-        result = cycle_result(cycle.setup, parts, film.said if film else ())
-        return replace(result, failed=film.failed if film else ())
-    (found,) = simulate([scene], None if meshes is None else [meshes], span, tell, settings, recorders, store)
+        return Cycle(scene, meshes, request).run()
+    (found,) = simulate([scene], None if meshes is None else [meshes], request)
     if found.stopped is not None:
         raise GuardError(found.stopped)
     return found

@@ -1,4 +1,4 @@
-"""Owns the arguments that runs and batches share: what they may be, and that runs of several threads wait."""
+"""Owns the arguments that runs and batches share: what they may be, progress, and that runs wait for each other."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import ParamSpec, TypeVar
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.base.progress import progress_bar
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.scene import Scene
 
@@ -29,6 +30,20 @@ def one_at_a_time(run: Callable[P, T]) -> Callable[P, T]:
             return run(*args, **kwargs)
 
     return wait_and_run
+
+
+def shows_progress(run: Callable[P, T]) -> Callable[P, T]:
+    """`run`, whose keyword `progress` may also be True, for a bar or lines, or False for nothing."""
+
+    @wraps(run)
+    def run_and_show(*args: P.args, **kwargs: P.kwargs) -> T:
+        if kwargs.get("progress") is not True:
+            return run(*args, **kwargs)
+        with progress_bar() as tell:
+            kwargs["progress"] = tell
+            return run(*args, **kwargs)
+
+    return run_and_show
 
 
 def check_scene(field: str, scene: object) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,61 +144,6 @@ class Checkpoint:
     def _wanted(self, steps: Steps) -> int:
         """Steps from one checkpoint to the next."""
         return max(1, round(self.every.count if self.every.unit == "steps" else self.every.count / steps.dt))
-
-
-def advance(
-    impact: Impact,
-    checkpoint: Checkpoint,
-    told: Callable[[], None],
-    ended: Callable[[], bool] | None = None,
-    number: int | None = None,
-    before: tuple[Mapping[str, Any], Mapping[str, NDArray]] = ({}, {}),
-) -> None:
-    """Advance an impact phase to its end, from where an earlier run of the same request was, and store it on the way.
-
-    Args:
-        impact: the phase.
-        checkpoint: that stores it.
-        told: as in `Impact.advance`.
-        ended: likewise.
-        number: of the impact, in a run of several: the state at its end is kept until the run is over.
-        before: place and arrays of what came before it, to be stored too.
-
-    Raises:
-        RequestError: the folder holds the state of another request.
-    """
-    place, more = before
-    place = place if number is None else {**place, "impact": number}
-    found = checkpoint.stored(number)
-    if found is not None:
-        impact.load(found[2])
-    if found is None or found[2] == checkpoint.path:
-        last = None if number is None else impact.steps.count - 1
-        go_on(impact, checkpoint, told, lambda: checkpoint.store(impact, place, more), ended, last)
-        if number is not None and impact.stopped[0] is None:
-            checkpoint.store_end(impact, number)
-    impact.advance(told=told, ended=ended)
-
-
-def go_on(
-    impact: Impact,
-    checkpoint: Checkpoint | None,
-    told: Callable[[], None],
-    store: Callable[[], None],
-    ended: Callable[[], bool] | None = None,
-    last: int | None = None,
-) -> None:
-    """Advance to the end, or so many steps as `last`, and `store` as often as the checkpoint says."""
-    if checkpoint:
-        checkpoint.begin(impact)
-    most = impact.steps.count if last is None else last
-    while checkpoint and impact.stopped[0] is None and (stop := checkpoint.next_stop(impact)) < most:
-        impact.advance(until=stop, told=told, ended=ended)
-        if impact.state.steps < stop:
-            return  # it has ended
-        if impact.stopped[0] is None and checkpoint.is_due(impact):
-            store()
-    impact.advance(until=last, told=told, ended=ended)
 
 
 def stored_command(folder: Path) -> dict[str, Any]:

@@ -5,38 +5,23 @@ Each kind of phase has a driver, which takes a `Motion` and returns the next one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import Checkpoint
-from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.cycle_result import cycle_result
+from warp_mca.phases.cycle_rows import Story
 from warp_mca.phases.film import Film
 from warp_mca.phases.impact_driver import ImpactDriver
-from warp_mca.phases.motion import Motion
-from warp_mca.phases.parts import Part, SwingPart
-from warp_mca.phases.prepare import Clock, place
-from warp_mca.phases.settings import Settings
+from warp_mca.phases.motion import Motion, Part, SwingPart
+from warp_mca.phases.prepare import Request, place
 from warp_mca.phases.swing_driver import SwingDriver
-from warp_mca.recorders.recorder import Recorder
+from warp_mca.results.result import Result
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import Scene
 
 Phase = Callable[[Motion | None], tuple[Motion | None, Part]]
-
-
-def begin_cycle(
-    scene: Scene, meshes: Mapping[str, Mesh] | None, span: float, settings: Settings, tell: Progress
-) -> Setup:
-    """Mesh a scene with `t_end`, and swing it to its first touch; each impact will last at most `span` [s].
-
-    Raises:
-        RequestError: the scene cannot be built as written.
-    """
-    clock = Clock()
-    placed = place(scene, meshes, clock, tell, by=partial(hand_off, t_end=scene.t_end))
-    return Setup(**vars(placed), span=span, settings=settings, clock=clock, tell=tell)
 
 
 class Cycle:
@@ -44,21 +29,24 @@ class Cycle:
 
     Attributes:
         setup: what the phases share.
-        parts: what each phase so far adds to the run.
+        story: what the phases so far add to the run.
         film: what recorders see of it, from the first touch on; None without recorders.
     """
 
-    def __init__(self, setup: Setup, store: Checkpoint | None = None, recorders: Sequence[Recorder] = ()) -> None:
-        """Of a run that goes on from what `store` has, and stores its state there."""
-        self.setup, self.recorders = setup, recorders
-        self.swings, self.impacts = SwingDriver(setup), ImpactDriver(setup, store)
-        self.parts: list[Part] = []
+    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh] | None, request: Request) -> None:
+        """Mesh a scene with `t_end`, and swing it to its first touch.
+
+        Raises:
+            RequestError: the scene cannot be built as written.
+        """
+        self.setup = place(scene, meshes, request, by=partial(hand_off, t_end=scene.t_end))
+        self.story, self.swings, self.impacts = Story(self.setup), SwingDriver(self.setup), ImpactDriver(self.setup)
 
     @property
     def film(self) -> Film | None:
         return self.impacts.film
 
-    def run(self) -> list[Part]:
+    def run(self) -> Result:
         """Until the time is up: each phase takes the motion that the one before left, its event says which one follows.
 
         Raises:
@@ -67,18 +55,18 @@ class Cycle:
         """
         phase: Phase | None = self.swings.first
         motion: Motion | None = None
+        done = False
         try:
             while phase is not None:
                 motion, part = phase(motion)
                 phase = self._after(motion, part)
                 self._take(motion, part, phase is not None)
-        except BaseException:
+            done = True
+        finally:
             if self.film:
-                self.film.finish(False)
-            raise
-        if self.film:
-            self.film.finish(True)
-        return self.parts
+                self.film.finish(done)
+        result = cycle_result(self.setup, self.story, self.film.said if self.film else ())
+        return replace(result, failed=self.film.failed if self.film else ())
 
     def _after(self, motion: Motion | None, part: Part) -> Phase | None:
         """The phase that follows the event that ended another one."""
@@ -88,10 +76,12 @@ class Cycle:
 
     def _take(self, motion: Motion | None, part: Part, following: bool) -> None:
         """Keep what a phase adds, and show it."""
-        self.parts.append(part)
-        if self.recorders and self.impacts.film is None:
+        kept = self.story.add(part, following)
+        request = self.setup.request
+        if request.recorders and self.impacts.film is None:
             assert motion is not None
-            self.impacts.film = Film(self.setup, self.recorders, self.impacts.prepare(motion)[0])
+            ready = self.impacts.prepare(motion)[0]
+            self.impacts.film = Film(self.setup, request.recorders, ready, self.story.origin)
         if self.film:
-            self.film.take(part, following)
-            self.setup.clock.lap("output")
+            self.film.take(part, kept, self.story.rows[-1])
+            request.clock.lap("output")

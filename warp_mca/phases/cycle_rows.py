@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.phases.cycle_setup import Setup
-from warp_mca.phases.parts import ImpactPart, Part, SwingPart
+from warp_mca.model.sensors import CHANNELS, Spot
+from warp_mca.phases.history_rows import Rows, phase_facts
+from warp_mca.phases.motion import ImpactPart, Part, SwingPart
+from warp_mca.phases.prepare import Setup
 from warp_mca.results.result import HISTORY_COLUMNS
-from warp_mca.rigid.placement import Placement, link_placements
+from warp_mca.rigid.placement import Placement
 from warp_mca.scene import Point
 
 Array = NDArray[np.float64]
-Columns = dict[str, Array]
 
 MORE_COLUMNS = ("tip_vz", "plate_vy", "plate_vz", "closing_speed")
 STORED = ("kinetic", "elastic", "plastic", "hourglass", "contact")
@@ -53,142 +54,127 @@ class Totals:
         return stored + spent - self.external_work - self.hand_off - self.initial
 
 
-@dataclass
 class Story:
-    """The phases of a run, one after the other.
+    """The phases of a cycle, one after the other.
 
     Attributes:
-        rows: columns of the history of each phase.
-        phases: what `summary.json` says of each.
-        totals: so far.
+        parts: what each phase added.
+        rows: of each phase. Times count from the first touch.
+        totals: energies so far.
         error: greatest energy that was not explained [J].
         scale: greatest initial energy and external work so far [J].
     """
 
-    rows: list[Columns] = field(default_factory=list)
-    phases: list[dict[str, Any]] = field(default_factory=list)
-    totals: Totals = field(default_factory=Totals)
-    error: float = 0.0
-    scale: float = 0.0
+    def __init__(self, setup: Setup) -> None:
+        self.setup, self.totals, self.error, self.scale = setup, Totals(), 0.0, 0.0
+        self.parts: list[Part] = []
+        self.rows: list[Rows] = []
 
-    def add(self, rows: Columns, phase: dict[str, Any]) -> None:
-        """Take in a phase."""
-        self.rows.append(rows)
-        self.phases.append(phase)
-        self.error = max(self.error, float(np.abs(rows["E_total_error"]).max(initial=0.0)))
+    @property
+    def impacts(self) -> list[ImpactPart]:
+        """The parts that are impacts."""
+        return [part for part in self.parts if isinstance(part, ImpactPart)]
+
+    @property
+    def origin(self) -> float:
+        """Time of the first touch that could be computed, from the release [s]; 0 without one."""
+        return 0.0 if self.parts[0].stopped else self.setup.start.t_contact or 0.0
+
+    def add(self, part: Part, following: bool) -> slice:
+        """Take in a phase that is over; `following`: another one follows.
+
+        Returns:
+            Which samples of a swing are rows: not those whose times an impact before or after has too.
+        """
+        kept = slice(int(bool(self.parts)), -1 if following else None)
+        self.parts.append(part)
+        rows = self._swing(part, kept) if isinstance(part, SwingPart) else self._impact(part)
+        history = dict(rows.history)
+        history["time_s"] = history["time_s"] - self.origin
+        self.rows.append(replace(rows, history=history))
+        self.error = max(self.error, float(np.abs(history["E_total_error"]).max(initial=0.0)))
         self.scale = max(self.scale, abs(self.totals.initial) + abs(self.totals.external_work))
+        return kept
 
+    def _swing(self, part: SwingPart, kept: slice) -> Rows:
+        """Rows of a rigid phase. Sections of bodies that are rigid for the time being have nan."""
+        motion, run, totals, setup = part.motion, part.swing, self.totals, self.setup
+        unknown = np.full(CHANNELS * len(setup.sensors.cuts), np.nan)
+        kinetic, potential, tip, plate, sensors = [], [], [], [], []
+        for k, (theta, rate) in enumerate(zip(run.theta_t, run.theta_dot_t, strict=True)):
+            chain, placed = part.chain(k), part.placements(k)
+            kinetic.append(chain.kinetic_energy(theta, rate) + part.kinetic)
+            shift = np.subtract(chain.origin, motion.chain.origin)
+            potential.append(chain.potential_energy(theta) - chain.mass * float(shift @ np.asarray(chain.gravity)))
+            tip.append(_point(placed, setup.scene.tip))
+            plate.append(_point(placed, setup.scene.target))
+            spots = [placed[spot.body].place(self._spot(part, spot)[None]) for spot in setup.sensors.spots]
+            sensors.append(np.concatenate([*(column[0] for spot in spots for column in spot), unknown]))
+        if not self.rows:
+            totals.initial = kinetic[0]
+        work = np.asarray(potential[0]) - np.asarray(potential) + run.work_t[:, 0] + run.work_t[:, 2]
+        heat = run.work_t[:, 1]
+        error = totals.error(np.asarray(kinetic) + motion.strain_energy) + heat - work
+        count = len(run.t)
+        rows = {name: np.zeros(count) for name in (*HISTORY_COLUMNS, *MORE_COLUMNS)}
+        rows |= {"time_s": run.t, "closing_speed": np.full(count, np.nan)}
+        rows |= _velocities(np.array(tip), np.array(plate))
+        rows |= {
+            "E_kinetic": np.asarray(kinetic),
+            "E_internal": np.full(count, motion.strain_energy),
+            "E_plastic": np.full(count, motion.plastic),
+            "E_friction": np.full(count, totals.friction),
+            "E_total_error": error,
+            "E_lost": np.full(count, totals.lost),
+            "external_work": totals.external_work + work,
+        }
+        rows |= self._angles(motion.chain.angles(run.theta_t).T)
+        totals.external_work += float(work[-1])
+        totals.joint += float(heat[-1])
+        bodies = {"elastic": motion.elastic, "plastic": motion.plastic, "hourglass": motion.hourglass, "contact": 0.0}
+        energy = {"kinetic": kinetic[-1], **bodies, **vars(totals)}
+        return Rows(
+            history={name: column[kept] for name, column in rows.items()},
+            facts=phase_facts("rigid", float(run.t[0]), run.t_end, run.ended_by, energy),
+            sensors=sensors[kept],
+        )
 
-def tell_story(setup: Setup, parts: Sequence[Part]) -> Story:
-    """The phases of a cycle that is over."""
-    story = Story()
-    for k, part in enumerate(parts):
-        add_part(setup, part, story, kept_rows(part, k == 0, k + 1 < len(parts)))
-    return story
+    def _spot(self, part: SwingPart, spot: Spot) -> Array:
+        """Where a probe is in its body's frame [m], shape (3,)."""
+        return spot.weight @ part.motion.points(spot.body, self.setup.meshes[spot.body].points)[spot.node]
 
+    def _impact(self, part: ImpactPart) -> Rows:
+        """Rows of an impact, and what the ways there and back book."""
+        scene_run, totals, back = part.impact.scene_runs[0], self.totals, part.back
+        totals.hand_off += part.jump
+        totals.lost += part.settled
+        own, energies = scene_run.rows(), scene_run.ledger.energies()
+        rows = dict(own.history)
+        stored = np.sum([energies[key] for key in STORED], axis=0)
+        spent = np.sum([energies[key] for key in SPENT], axis=0)
+        rows["time_s"] = part.start + rows["time_s"]
+        rows["E_total_error"] = totals.error(stored) + spent - energies["external_work"]
+        rows["E_friction"] = totals.friction + rows["E_friction"]
+        rows["E_lost"] = np.full(len(stored), totals.lost)
+        rows["external_work"] = totals.external_work + energies["external_work"]
+        rows |= self._angles(_link_angles(self.setup, part))
+        last = {key: float(column[-1]) for key, column in energies.items()}
+        totals.external_work += last["external_work"] - (back.drive_work if back else 0.0)
+        for key in SPENT:
+            setattr(totals, key, getattr(totals, key) + last[key])
+        totals.lost += part.lost
+        totals.hand_off += part.jump_back
+        energy = {**{key: last[key] for key in STORED}, **vars(totals)}
+        facts = phase_facts("impact", part.start, part.end, part.ended_by, energy)
+        facts |= {"lost": part.lost, "settled": part.settled, "jump": part.jump, "jump_back": part.jump_back}
+        facts["hinge_impulse"] = {name: impulse.tolist() for name, impulse in part.hinge_impulse.items()}
+        if back:
+            facts["vibration"] = {"kinetic": back.vibration_energy, "elastic": part.lost - back.vibration_energy}
+        return replace(own, history=rows, facts=facts)
 
-def kept_rows(part: Part, first: bool, following: bool) -> slice:
-    """Rows of a phase that the history has: of swings not those whose times an impact before or after has too."""
-    return slice(int(not first), -1 if following else None) if isinstance(part, SwingPart) else slice(None)
-
-
-def add_part(setup: Setup, part: Part, story: Story, kept: slice) -> None:
-    """Let a story take in a phase that is over."""
-    if isinstance(part, SwingPart):
-        _add_swing(setup, part, story, kept)
-    else:
-        _add_impact(setup, part, story)
-
-
-def _add_swing(setup: Setup, part: SwingPart, story: Story, kept: slice) -> None:
-    """Rows of a rigid phase; the first and last are left out where an impact's own rows hold these times."""
-    motion, run, totals = part.motion, part.swing, story.totals
-    kinetic, potential, tip, plate = [], [], [], []
-    for t, theta, rate in zip(run.t, run.theta_t, run.theta_dot_t, strict=True):
-        chain = motion.chain.moved_to(t)
-        kinetic.append(chain.kinetic_energy(theta, rate) + part.kinetic)
-        shift = np.subtract(chain.origin, motion.chain.origin)
-        potential.append(chain.potential_energy(theta) - chain.mass * float(shift @ np.asarray(chain.gravity)))
-        links = link_placements(chain, theta, rate)
-        others = {name: p.after(t - run.t[0]) for name, p in motion.placements.items() if name not in links}
-        placed = {**others, **links}
-        tip.append(_point(placed, setup.scene.tip))
-        plate.append(_point(placed, setup.scene.target))
-    if not story.rows:
-        totals.initial = kinetic[0]
-    work = np.asarray(potential[0]) - np.asarray(potential) + run.work_t[:, 0] + run.work_t[:, 2]
-    heat = run.work_t[:, 1]
-    stored = np.asarray(kinetic) + motion.strain_energy
-    error = totals.error(stored) + heat - work
-    rows = {name: np.zeros(len(run.t)) for name in ("t", *HISTORY_COLUMNS[1:], *MORE_COLUMNS)}
-    rows |= {"t": run.t, "closing_speed": np.full(len(run.t), np.nan)}
-    rows |= _velocities(np.array(tip), np.array(plate))
-    rows |= {
-        "E_kinetic": np.asarray(kinetic),
-        "E_internal": np.full(len(run.t), motion.strain_energy),
-        "E_plastic": np.full(len(run.t), motion.plastic),
-        "E_friction": np.full(len(run.t), totals.friction),
-        "E_total_error": error,
-        "E_lost": np.full(len(run.t), totals.lost),
-        "external_work": totals.external_work + work,
-    }
-    rows |= _angles(setup, motion.chain.angles(run.theta_t).T)
-    totals.external_work += float(work[-1])
-    totals.joint += float(heat[-1])
-    energy = {
-        "kinetic": kinetic[-1],
-        "elastic": motion.elastic,
-        "plastic": motion.plastic,
-        "hourglass": motion.hourglass,
-        "contact": 0.0,
-    }
-    phase = _phase("rigid", float(run.t[0]), run.t_end, run.ended_by, energy, totals)
-    story.add({name: column[kept] for name, column in rows.items()}, phase)
-
-
-def _add_impact(setup: Setup, part: ImpactPart, story: Story) -> None:
-    """Rows of an impact, and what the ways there and back book."""
-    scene_run, totals = part.impact.scene_runs[0], story.totals
-    totals.hand_off += part.jump
-    totals.lost += part.settled
-    rows, energies = scene_run.history(), scene_run.ledger.energies()
-    stored = np.sum([energies[key] for key in STORED], axis=0)
-    spent = np.sum([energies[key] for key in SPENT], axis=0)
-    rows["t"] = part.start + rows.pop("time_s")
-    rows["E_total_error"] = totals.error(stored) + spent - energies["external_work"]
-    rows["E_friction"] = totals.friction + rows["E_friction"]
-    rows["E_lost"] = np.full(len(stored), totals.lost)
-    rows["external_work"] = totals.external_work + energies["external_work"]
-    rows |= _angles(setup, _link_angles(setup, part))
-    last = {key: float(column[-1]) for key, column in energies.items()}
-    back = part.back
-    totals.external_work += last["external_work"] - (back.drive_work if back else 0.0)
-    for key in SPENT:
-        setattr(totals, key, getattr(totals, key) + last[key])
-    totals.lost += part.lost
-    totals.hand_off += part.jump_back
-    energy = {key: last[key] for key in STORED}
-    phase = _phase("impact", part.start, part.end, part.ended_by, energy, totals)
-    more: dict[str, Any] = {"lost": part.lost, "settled": part.settled, "jump": part.jump, "jump_back": part.jump_back}
-    more["hinge_impulse"] = {name: impulse.tolist() for name, impulse in part.hinge_impulse.items()}
-    if back:
-        more["vibration"] = {"kinetic": back.vibration_energy, "elastic": part.lost - back.vibration_energy}
-    story.add(rows, {**phase, **more})
-
-
-def _phase(
-    kind: str, start: float, end: float, ended_by: str, energy: Mapping[str, float], totals: Totals
-) -> dict[str, Any]:
-    """What the summary says of a phase: its ledger at the end, what follows from the way back included."""
-    spent = {name: getattr(totals, name) for name in vars(totals)}
-    return {
-        "kind": kind,
-        "start": start,
-        "end": end,
-        "ended_by": ended_by,
-        "energy": {**energy, **spent},
-        "lost": 0.0,
-    }
+    def _angles(self, angles: Array) -> dict[str, Array]:
+        """Columns of the links' angles [rad], from an array of shape (link_count, row_count)."""
+        return {f"theta_{link.body}": own for link, own in zip(self.setup.chain.links, angles, strict=True)}
 
 
 def _point(placements: Mapping[str, Placement], point: Point | None) -> Array:
@@ -198,13 +184,9 @@ def _point(placements: Mapping[str, Placement], point: Point | None) -> Array:
     return placements[point.body].place(np.array([point.at]))[1][0]
 
 
-def _velocities(tip: Array, plate: Array) -> Columns:
+def _velocities(tip: Array, plate: Array) -> dict[str, Array]:
     columns = {f"tip_v{axis}": tip[:, k] for k, axis in enumerate("xyz")}
     return columns | {f"plate_v{axis}": plate[:, k] for k, axis in enumerate("xyz")}
-
-
-def _angles(setup: Setup, angles: Array) -> Columns:
-    return {f"theta_{link.body}": column for link, column in zip(setup.chain.links, angles, strict=True)}
 
 
 def _link_angles(setup: Setup, part: ImpactPart) -> Array:

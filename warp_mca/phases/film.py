@@ -7,16 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.phases.cycle_rows import Story, add_part, kept_rows
-from warp_mca.phases.cycle_setup import Setup
 from warp_mca.phases.division import divide
+from warp_mca.phases.history_rows import Rows
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.motion import Stress
-from warp_mca.phases.parts import Part, SwingPart
-from warp_mca.phases.prepare import Prepared
+from warp_mca.phases.motion import Part, Stress, SwingPart
+from warp_mca.phases.prepare import Prepared, Setup
 from warp_mca.recorders.frames import Recording, skins
 from warp_mca.recorders.recorder import CONTACT, PATHS, SURFACE, VOLUME, Recorder, RunInfo
-from warp_mca.rigid.placement import link_placements
 
 Array = NDArray[np.float64]
 COMPONENTS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # of a tensor among xx, yy, zz, xy, yz, xz
@@ -32,18 +29,17 @@ class Film:
         failed: names of those that failed.
     """
 
-    def __init__(self, setup: Setup, recorders: Sequence[Recorder], ready: Prepared) -> None:
-        """Start the recorders; `ready` is the scene at its first touch.
+    def __init__(self, setup: Setup, recorders: Sequence[Recorder], ready: Prepared, origin: float) -> None:
+        """Start the recorders; `ready` is the scene at its first touch, at the time `origin` from the release [s].
 
         Raises:
             RequestError: an output cannot be made.
         """
-        self.setup, self.model, self.story = setup, ready.model, Story()
+        self.setup, self.model, self.origin = setup, ready.model, origin
         self.said: list[str] = []
-        self.origin = setup.start.t_contact or 0.0
         self.needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
         self.surfaces = skins(ready.model, ready.meshes)
-        steps, paths = divide(ready.scene, ready.model, setup.span), ready.probes.position
+        steps, paths = divide(ready.scene, ready.model, setup.request.span), ready.probes.position
         length, told = setup.t_end - self.origin, self.said.append
         info = RunInfo(
             ready.scene, ready.model, self.surfaces, paths, steps.dt, steps.interval, length, told, phases=True
@@ -63,15 +59,11 @@ class Film:
         self.recording.follow(begin, steps.interval, steps.intervals, output=output, shift=shift)
         impact.recording = self.recording
 
-    def take(self, part: Part, following: bool) -> None:
-        """Show a phase that is over: the frames of a swing, and the rows of the history; `following`: it has a next."""
-        kept = kept_rows(part, not self.story.rows, following)
+    def take(self, part: Part, kept: slice, rows: Rows) -> None:
+        """Show a phase that is over: the frames of a swing, at the samples `kept`, and the `rows` of the history."""
         if isinstance(part, SwingPart):
             self._show(part, kept)
-        add_part(self.setup, part, self.story, kept)
-        rows = dict(self.story.rows[-1])
-        rows = {"time_s": rows.pop("t") - self.origin, **rows}
-        self.recording.history(lambda: rows)
+        self.recording.history(lambda: rows.history)
 
     def finish(self, ok: bool) -> None:
         """Close the recorders of a run that ended as it should, or did not."""
@@ -90,9 +82,7 @@ class Film:
 
     def _frame(self, part: SwingPart, row: int, needs: frozenset[str]) -> dict[tuple[str, str], NDArray]:
         """Arrays of a frame as an `Output` has them: bodies without vibration, and nothing touches."""
-        motion, run, model = part.motion, part.swing, self.model
-        placed = {name: item.after(run.t[row] - run.t[0]) for name, item in motion.placements.items()}
-        placed |= link_placements(motion.chain.moved_to(run.t[row]), run.theta_t[row], run.theta_dot_t[row])
+        motion, model, placed = part.motion, self.model, part.placements(row)
         x, v, rest = np.zeros_like(model.X), np.zeros_like(model.X), motion.rest or _no_stress(len(model.X))
         stress = rest.stress.copy()
         for name, mesh in self.setup.meshes.items():

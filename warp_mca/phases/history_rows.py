@@ -1,9 +1,10 @@
-"""Owns the columns of the history of a run, and the history of each contact, from the rows that a ledger keeps."""
+"""Owns the rows of a phase in the history of a run, from what its ledger keeps, and how those of all become one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,88 @@ from warp_mca.kernels.records.columns import (
     STICK_IMPULSE,
 )
 from warp_mca.model.columns import added_columns
-from warp_mca.results.contact_history import ContactHistory
+from warp_mca.results.contact_history import ContactHistory, contact_names
+from warp_mca.results.paths import path_histories
+from warp_mca.results.sensor_history import sensor_histories
 
 if TYPE_CHECKING:
+    from warp_mca.model.paths import Probes
+    from warp_mca.phases.prepare import Prepared
+    from warp_mca.scene import Scene
     from warp_mca.watch.ledger import Ledger
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """What a phase adds to the histories of a run.
+
+    Attributes:
+        history: columns of history.csv, each shape (row_count,), float64.
+        facts: what `summary.json` says of the phase.
+        sensors: as `SceneRecords.sensors`.
+        contacts: each of the scene's contacts; empty where none can act, as in a swing of rigid links.
+        path_stress: as `SceneRecords.path_stress`; empty where it is not known.
+    """
+
+    history: Mapping[str, Array]
+    facts: Mapping[str, Any]
+    sensors: Sequence[Array]
+    contacts: tuple[ContactHistory, ...] = ()
+    path_stress: Sequence[NDArray[np.float32]] = ()
+
+
+def joined(scene: Scene, probes: Probes | None, parts: Sequence[Rows]) -> dict[str, Any]:
+    """The rows of all phases as the fields of a `Result`: history, contacts, paths, probes and sections.
+
+    Args:
+        scene: that was run.
+        probes: of its paths; None where stress is not known in any phase.
+        parts: rows of each phase in turn.
+    """
+    history = {name: np.concatenate([part.history[name] for part in parts]) for name in parts[0].history}
+    counts = [len(part.history["time_s"]) for part in parts]
+    known = [part.contacts or _open(scene, count) for part, count in zip(parts, counts, strict=True)]
+    stress = []
+    for part, count in zip(parts, counts, strict=True) if probes else ():
+        unknown = np.full((count, len(probes.corner) if probes else 0, 6), np.nan, dtype=np.float32)
+        stress += part.path_stress or [unknown]
+    seen, cut = sensor_histories(scene, history["time_s"], [row for part in parts for row in part.sensors])
+    contacts = tuple(_one_contact(own) for own in zip(*known, strict=True))
+    paths = path_histories(probes, stress) if probes else ()
+    return {"history": history, "contacts": contacts, "paths": paths, "probes": seen, "sections": cut}
+
+
+def _one_contact(parts: Sequence[ContactHistory]) -> ContactHistory:
+    """A contact over all phases."""
+    names = ("force", "pressure", "normal_force", "closing_speed")
+    return replace(parts[0], **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+def _open(scene: Scene, count: int) -> tuple[ContactHistory, ...]:
+    """Contacts in so many rows without force."""
+    none, nothing, never = np.zeros((count, 3)), np.zeros(count), np.full(count, np.nan)
+    return tuple(
+        ContactHistory(name=name, force=none, pressure=nothing, normal_force=none, closing_speed=never)
+        for name in contact_names(scene.contacts)
+    )
+
+
+def rows_of(
+    ready: Prepared, ledger: Ledger, facts: Mapping[str, Any], *, before: float = 0.0, origin: float = 0.0
+) -> Rows:
+    """The rows of a ledger; times count from `origin` [s] after a moment that lies `before` [s] after the first row."""
+    history = history_columns(ledger)
+    history["time_s"] = history["time_s"] - before - origin
+    contacts = contact_histories(ledger, contact_names(ready.scene.contacts))
+    kept = ledger.kept
+    return Rows(history=history, facts=facts, sensors=kept.sensors, contacts=contacts, path_stress=kept.path_stress)
+
+
+def phase_facts(kind: str, start: float, end: float, ended_by: str, energy: Mapping[str, float]) -> dict[str, Any]:
+    """What `summary.json` says of a phase: its ledger at the end."""
+    return {"kind": kind, "start": start, "end": end, "ended_by": ended_by, "energy": dict(energy), "lost": 0.0}
 
 
 def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:

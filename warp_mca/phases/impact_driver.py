@@ -11,17 +11,12 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
-from warp_mca.model.precision import check_range
-from warp_mca.phases.checkpoint import Checkpoint, advance
-from warp_mca.phases.cycle_setup import Setup
+from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.film import Film
-from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.motion import Motion
-from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.motion import ImpactPart, Motion
 from warp_mca.phases.plastic_history import give_history
-from warp_mca.phases.prepare import Prepared
-from warp_mca.phases.rate_groups import grouping
+from warp_mca.phases.prepare import Prepared, Setup
 from warp_mca.phases.residual import Relaxation, Shape
 from warp_mca.phases.return_to_rigid import return_to_rigid
 from warp_mca.physics.elements.cells import body_materials
@@ -46,9 +41,8 @@ class ImpactDriver:
         open_time: how long all contacts must be open for an impact to end [s].
     """
 
-    def __init__(self, setup: Setup, store: Checkpoint | None = None) -> None:
-        """Of a run that goes on from what `store` has, and stores its state there."""
-        self.setup, self.store, self.count, self.open_time = setup, store, 0, open_time(setup)
+    def __init__(self, setup: Setup) -> None:
+        self.setup, self.count, self.open_time = setup, 0, open_time(setup)
         self.film: Film | None = None
         self._prepared: tuple[Motion | None, tuple[Prepared, ByBody, ByBody]] | None = None
 
@@ -61,26 +55,22 @@ class ImpactDriver:
         assert motion is not None
         setup, self.count = self.setup, self.count + 1
         ready, u, V = self.prepare(motion)
-        setup.clock.lap("mesh")
-        setup.tell("compile", 0.0)
-        relaxation = Relaxation(ready.model, setup.settings)
+        relaxation = Relaxation(ready.model, setup.request.settings)
         settled: list[Shape] = []
-        span = min(setup.span, setup.t_end - motion.t)
+        span = min(setup.request.span, setup.t_end - motion.t)
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
         film = self.film
         shown = {"skins": film.surfaces, "needs": film.needs} if film else {}
-        impact = Impact([ready], span, **setup.settings.solver, **shown, shape=shape)
+        impact = begin([ready], setup.request, span, first=self.count == 1, shape=shape, **shown)
         if film:
             film.watch(impact, motion.t)
-        setup.clock.lap("compile")
-        if self.count == 1:
-            announce(impact)
         self._advance(impact)
-        setup.clock.lap("fe")
+        setup.request.clock.lap("fe")
         if impact.stopped[0] is not None:
             raise GuardError(f"impact {self.count}: {impact.stopped[0]}")
         rows = impact.scene_runs[0].ledger.kept.count - 1
-        ended_by = "separation" if rows < impact.steps.intervals else "duration" if span == setup.span else "t_end"
+        in_full = "duration" if span == setup.request.span else "t_end"
+        ended_by = "separation" if rows < impact.steps.intervals else in_full
         part = ImpactPart(
             start=motion.t,
             end=motion.t + rows * impact.steps.interval,
@@ -96,7 +86,7 @@ class ImpactDriver:
             why = f"impact {self.count} had not ended after duration = {span:g} s; give a longer one"
             return None, replace(part, stopped=f"the run ends at t = {part.end:.4g} s: {why}")
         back = return_to_rigid(setup, motion, part, relaxation, film is not None)
-        setup.clock.lap("rigid")
+        setup.request.clock.lap("rigid")
         return back
 
     def prepare(self, motion: Motion) -> tuple[Prepared, ByBody, ByBody]:
@@ -120,12 +110,9 @@ class ImpactDriver:
                 deformed, V[name] = motion.placements[name].place(motion.points(name, points))
                 u[name] = deformed - X[name]
         watched = [(link.body, node) for link in setup.chain.links for node in setup.link_ends(link.body)]
-        settings, span = setup.settings, min(setup.span, setup.t_end - motion.t)
-        groups = grouping(setup.scene, span, settings.device, settings.multi_rate)
         mismatch = dict.fromkeys(("momentum_mismatch", "angular_momentum_mismatch", "energy_mismatch"), 0.0)
         start = None if first else replace(setup.start, **mismatch)  # those are of the first hand-off
-        ready = setup.ready(X, V, motion.t, start=start, grouping=groups, watched=watched, said=first)
-        check_range(ready.model, settings.precision)
+        ready = setup.ready(X, V, motion.t, start=start, watched=watched, said=first)
         return ready, u, V
 
     def _shape(
@@ -135,12 +122,12 @@ class ImpactDriver:
         rotations = {name: placement.rotation for name, placement in motion.placements.items()}
 
         def shape(solver: Solver, state: State) -> None:
-            self.setup.clock.lap("compile")
+            self.setup.request.clock.lap("compile")
             give_history(solver, state, motion.history, rotations)
             found = relaxation.settle(np.concatenate([u[body.name] for body in self.setup.scene.bodies]), state)
             found.give(state)
             settled.append(found)
-            self.setup.clock.lap("rigid")
+            self.setup.request.clock.lap("rigid")
 
         return shape
 
@@ -150,7 +137,7 @@ class ImpactDriver:
         contacts = len(scene_run.ready.model.passes)
 
         def told() -> None:
-            self.setup.tell("impact", impact.rows / (impact.steps.intervals + 1))
+            self.setup.request.tell("impact", impact.rows / (impact.steps.intervals + 1))
 
         def ended() -> bool:
             rows = _rows_read(impact)
@@ -158,12 +145,10 @@ class ImpactDriver:
                 return False
             return not self._pressed(impact, rows - math.ceil(wait / interval), rows)
 
-        if self.store:
-            self.store.is_for(impact, impact.steps.interval * impact.steps.intervals, self.setup.settings, "mca")
-            self.store.rows = ROWS // math.gcd(ROWS, impact.steps.checks)
-            advance(impact, self.store, told, ended, self.count)
-        else:
-            impact.advance(told=told, ended=ended)
+        if store := self.setup.request.store:
+            store.rows = ROWS // math.gcd(ROWS, impact.steps.checks)
+        span = impact.steps.interval * impact.steps.intervals
+        Course(impact, replace(self.setup.request, span=span), number=self.count).run((), told, ended=ended)
 
     def _pressed(self, impact: Impact, first: int, end: int | None = None) -> bool:
         """Whether a contact was closed in the rows of the history from `first` to the one before `end`."""

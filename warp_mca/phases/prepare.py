@@ -5,21 +5,34 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.build import Grouping, build_model
+from warp_mca.model.build import build_model
 from warp_mca.model.model import Model
 from warp_mca.model.paths import Found, Probes, locate
+from warp_mca.model.precision import check_range
 from warp_mca.model.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.meshing import mesh
+from warp_mca.phases.rate_groups import grouping
+from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.cells import nodal_masses
+from warp_mca.rigid.body_motion import held_axes
+from warp_mca.rigid.chain import Array, Chain
 from warp_mca.rigid.handoff import HandOff, hand_off
-from warp_mca.scene import Scene
+from warp_mca.rigid.placement import Placement
+from warp_mca.scene import RigidPhase, Scene, Surface
 from warp_mca.watch.table import told_before
+
+if TYPE_CHECKING:
+    from warp_mca.phases.checkpoint import Checkpoint
+    from warp_mca.phases.motion import Motion
+    from warp_mca.recorders.recorder import Recorder
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,28 @@ class Clock:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Placed:
+class Request:
+    """How scenes are run, and who is told.
+
+    Attributes:
+        span: time that an impact lasts, the longest with `t_end` [s].
+        settings: device, precision, threads, groups of elements.
+        tell: told of stages.
+        recorders: of a lone scene.
+        store: where a lone scene stores its state, and from which it goes on; None for never.
+        clock: wall time by stage.
+    """
+
+    span: float
+    settings: Settings
+    tell: Progress = lambda stage, done: None
+    recorders: Sequence[Recorder] = ()
+    store: Checkpoint | None = None
+    clock: Clock = field(default_factory=Clock)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
     """A scene with its meshes, and where its bodies stand when finite elements take over.
 
     Attributes:
@@ -71,24 +105,25 @@ class Placed:
         masses: lumped nodal masses [kg] by body, each shape (node_count,), float64; none without a rigid phase.
         sensors: its probes and sections.
         start: the hand-off.
+        request: how it is run.
         places: of paths that were found so far, see `locate`.
     """
 
     scene: Scene
     meshes: Mapping[str, Mesh]
-    masses: Mapping[str, NDArray[np.float64]]
+    masses: Mapping[str, Array]
     sensors: Sensors
     start: HandOff
+    request: Request
     places: Found = field(default_factory=dict)
 
     def ready(
         self,
-        X: Mapping[str, NDArray[np.float64]],
-        V: Mapping[str, NDArray[np.float64]],
+        X: Mapping[str, Array],
+        V: Mapping[str, Array],
         time: float = 0.0,
         *,
         start: HandOff | None = None,
-        grouping: Grouping | None = None,
         watched: Sequence[tuple[str, int]] = (),
         said: bool = True,
     ) -> Prepared:
@@ -98,29 +133,98 @@ class Placed:
             X, V: of the nodes by body, each shape (node_count, 3), float64.
             time: from the release [s].
             start: what results say of the hand-off, if not that of this scene.
-            grouping, watched: as in `build_model`.
+            watched: as in `build_model`.
             said: whether its meshes are warned of.
 
         Raises:
             RequestError: the scene cannot be built as written.
         """
-        scene, meshes = self.scene, self.meshes
-        model = build_model(scene, meshes, X, V, watched, chain=self.start.chain, start=time, grouping=grouping)
+        scene, meshes, settings, span = self.scene, self.meshes, self.request.settings, self.request.span
+        if scene.t_end is not None:
+            span = min(span, scene.t_end - time)
+        groups = grouping(scene, span, settings.device, settings.multi_rate)
+        model = build_model(scene, meshes, X, V, watched, chain=self.start.chain, start=time, grouping=groups)
         probes = locate(scene, model, meshes, self.places)
         warnings = told_before(scene, meshes, model) if said else ()
+        check_range(model, settings.precision)
+        self.request.clock.lap("mesh")
         return Prepared(scene, meshes, start or self.start, model, probes, self.sensors, warnings)
+
+    @property
+    def rigid(self) -> RigidPhase:
+        """The rigid phase."""
+        assert self.scene.rigid is not None
+        return self.scene.rigid
+
+    @property
+    def t_end(self) -> float:
+        """Time from the release at which the run ends [s]."""
+        assert self.scene.t_end is not None
+        return self.scene.t_end
+
+    @property
+    def chain(self) -> Chain:
+        """Rigid links, without deformation."""
+        assert self.start.chain is not None
+        return self.start.chain
+
+    @cached_property
+    def held(self) -> Mapping[str, NDArray[np.bool_]]:
+        """Axes of nodes that are fixed, by body, each shape (node_count, 3), bool."""
+        return held_axes(self.scene, self.meshes)
+
+    def others(self, placements: Mapping[str, Placement]) -> float:
+        """Kinetic energy of the bodies that are no links [J]."""
+        links = {link.body for link in self.chain.links}
+        moving = {name: p.place(self.meshes[name].points)[1] for name, p in placements.items() if name not in links}
+        return float(sum(0.5 * self.masses[name] @ (V**2).sum(axis=1) for name, V in moving.items()))
+
+    def slaves(self) -> dict[str, NDArray[np.int32]]:
+        """Nodes of each link that a contact keeps out of the target."""
+        target, found = self.rigid.target, {}
+        for contact in self.scene.contacts:
+            sides = [(contact.slave, contact.master)]
+            if isinstance(contact.master, Surface):
+                sides.append((contact.master, contact.slave))
+            for own, other in sides:
+                meets = other == target or (
+                    isinstance(other, Surface) and isinstance(target, Surface) and other.body == target.body
+                )
+                if meets and isinstance(own, Surface):
+                    nodes = np.unique(self.meshes[own.body].surface(own.nodes)[0])
+                    found[own.body] = np.union1d(found.get(own.body, nodes), nodes)
+        return found
+
+    def kinetic(self, V: Mapping[str, Array]) -> float:
+        """Kinetic energy of the nodes [J]."""
+        return float(sum(0.5 * self.masses[name] @ (v**2).sum(axis=1) for name, v in V.items()))
+
+    def carriage_kinetic(self, motion: Motion) -> float:
+        """Kinetic energy of the carriage [J]."""
+        _, velocities = self.chain.moved_to(motion.t).hinges(motion.theta, motion.theta_dot)
+        return float(0.5 * self.chain.carriage_mass * (velocities[0] ** 2).sum())
+
+    def rigid_kinetic(self, motion: Motion) -> float:
+        """Kinetic energy of the chain and the other bodies [J]."""
+        chain = motion.chain.moved_to(motion.t)
+        return chain.kinetic_energy(motion.theta, motion.theta_dot) + self.others(motion.placements)
+
+    def link_ends(self, name: str) -> tuple[int, int]:
+        """Nodes of a link whose motion tells its angle: at its inbound hinge, and farthest from it."""
+        link = next(link for link in self.chain.links if link.body == name)
+        away = np.linalg.norm(self.meshes[name].points[:, :2] - np.asarray(link.hinge_in), axis=1)
+        return int(away.argmin()), int(away.argmax())
 
 
 def place(
     scene: Scene,
     meshes: Mapping[str, Mesh] | None,
-    clock: Clock,
-    tell: Progress,
+    request: Request,
     *,
     by: Callable[..., HandOff] = hand_off,
     found: Found | None = None,
     made: dict[object, Mesh] | None = None,
-) -> Placed:
+) -> Setup:
     """Mesh a scene, unless its `meshes` are given, and place its bodies `by` a hand-off.
 
     `found` as in `locate`, `made` as in `mesh`.
@@ -128,35 +232,29 @@ def place(
     Raises:
         RequestError: the scene cannot be meshed, or does not swing as written.
     """
-    tell("mesh", 0.0)
+    request.tell("mesh", 0.0)
     meshes = mesh(scene, made, meshes)
     masses = nodal_masses(scene, meshes) if scene.rigid else {}
-    clock.lap("mesh")
-    tell("rigid", 0.0)
+    request.clock.lap("mesh")
+    request.tell("rigid", 0.0)
     start = by(scene, meshes, masses)
-    clock.lap("rigid")
-    sensors = locate_sensors(scene, meshes)
-    return Placed(
-        scene=scene, meshes=meshes, masses=masses, sensors=sensors, start=start, places={} if found is None else found
-    )
+    request.clock.lap("rigid")
+    own = {"scene": scene, "meshes": meshes, "masses": masses, "start": start, "request": request}
+    return Setup(**own, sensors=locate_sensors(scene, meshes), places={} if found is None else found)
 
 
 def prepare(
     scene: Scene,
     meshes: Mapping[str, Mesh] | None,
-    clock: Clock,
-    tell: Progress,
+    request: Request,
     found: Found | None = None,
     made: dict[object, Mesh] | None = None,
-    grouping: Grouping | None = None,
 ) -> Prepared:
-    """A scene at its first touch, or where its bodies start without a rigid phase; arguments as in `place` and `ready`.
+    """A scene at its first touch, or where its bodies start without a rigid phase; arguments as in `place`.
 
     Raises:
         RequestError: the scene cannot be built as written.
     """
-    placed = place(scene, meshes, clock, tell, found=found, made=made)
-    start = placed.start
-    ready = placed.ready(start.positions, start.velocities, start.t_contact or 0.0, grouping=grouping)
-    clock.lap("mesh")
-    return ready
+    setup = place(scene, meshes, request, found=found, made=made)
+    start = setup.start
+    return setup.ready(start.positions, start.velocities, start.t_contact or 0.0)

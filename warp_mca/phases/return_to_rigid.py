@@ -9,10 +9,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.phases.cycle_setup import Setup
-from warp_mca.phases.motion import Motion, Stress
-from warp_mca.phases.parts import ImpactPart
+from warp_mca.phases.motion import ImpactPart, Motion, Stress
 from warp_mca.phases.plastic_history import take_history
+from warp_mca.phases.prepare import Setup
 from warp_mca.phases.residual import Relaxation, Shape
 from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import HandBack, carriage_motion, deformed_chain, hand_back

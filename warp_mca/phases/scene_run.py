@@ -9,13 +9,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.phases.history_rows import contact_histories, history_columns
+from warp_mca.phases.history_rows import Rows, history_columns, joined, phase_facts, rows_of
 from warp_mca.phases.rate_groups import rate_figures
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.results.contact_history import contact_names
-from warp_mca.results.paths import path_histories
-from warp_mca.results.result import Result, RunFacts, summarise
-from warp_mca.results.sensor_history import sensor_figures, sensor_histories
+from warp_mca.results.result import Result, summarise
+from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.step.state_figures import (
     joint_impulses,
     max_normal_force,
@@ -99,30 +98,49 @@ class SceneRun:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
         return history_columns(self.ledger, first)
 
+    def rows(self, start: float = 0.0, origin: float = 0.0) -> Rows:
+        """Its rows, as those of an impact that began at `start` [s]; times count from `origin` [s] after the first."""
+        end = start + self.steps.dt * self.step_count
+        facts = phase_facts("impact", start, end, "duration", self.ledger.energy())
+        return rows_of(self.ready, self.ledger, facts, origin=origin)
+
     def result(
-        self, wall: Mapping[str, float], said: Sequence[str] = (), stopped: str | None = None, origin: float = 0.0
+        self,
+        wall: Mapping[str, float],
+        said: Sequence[str] = (),
+        stopped: str | None = None,
+        *,
+        before: Sequence[Rows] = (),
+        origin: float = 0.0,
     ) -> Result:
-        """What came of it, in `wall` seconds by stage, with what recorders `said` and why a guard `stopped` it.
+        """What came of it; figures of the summary are those of the impact, but for the probes and sections.
 
-        Times count from `origin` [s] after the first row.
+        Args:
+            wall: seconds by stage.
+            said: what recorders said.
+            stopped: why a guard stopped it.
+            before: rows of the phases before it.
+            origin: times count from then on [s], after the first row of the impact.
         """
-        history = self.history()
-        history["time_s"] = history["time_s"] - origin
-        names = contact_names(self.ready.scene.contacts)
-        contacts = contact_histories(self.ledger, names)
-        shares = spring_shares(self.ledger, self.ready.model, names)
-        facts = self._facts(wall, shares)
-        paths = path_histories(self.ready.probes, self.ledger.kept.path_stress)
-        probes, sections = sensor_histories(self.ready.scene, history["time_s"], self.ledger.kept.sensors)
-        summary = summarise(history, facts, contacts) | sensor_figures(probes, sections, history)
-        told = self._told(stopped is not None, history=history, contacts=contacts, shares=shares, origin=origin)
-        own = {"contacts": contacts, "probes": probes, "sections": sections}
-        return Result(summary, history, None, (*told, *said), paths, stopped, **own)
+        ready, own = self.ready, self.rows(before[-1].facts["end"] if before else 0.0, origin)
+        shares = spring_shares(self.ledger, ready.model, contact_names(ready.scene.contacts))
+        summary = summarise(own.history, self._facts(wall, shares), own.contacts)
+        told = self._told(stopped is not None, history=own.history, contacts=own.contacts, shares=shares, origin=origin)
+        found = joined(ready.scene, ready.probes, [*before, own])
+        summary |= sensor_figures(found["probes"], found["sections"], found["history"])
+        if before:
+            summary["phases"] = [part.facts for part in (*before, own)]
+        return Result(summary=summary, warnings=(*told, *said), stopped=stopped, **found)
 
-    def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> RunFacts:
+    @property
+    def step_count(self) -> int:
+        """Steps that its rows cover [-], fewer than asked where it ended early."""
+        return self.steps.per_interval * max(self.ledger.kept.count - 1, 0)
+
+    def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> dict[str, Any]:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
-        count = self.steps.per_interval * max(ledger.kept.count - 1, 0)  # fewer than asked where it ended early
-        more: dict[str, object] = {
+        count = self.step_count
+        more: dict[str, Any] = {
             **self._hand_off(),
             "max_penetration": max_penetration(self.solver, self.state, self.index),
             "max_strain": ledger.kept.max_strain,
@@ -152,27 +170,27 @@ class SceneRun:
             body = scene.body(scene.stress_paths[0].lines[0].body)
             more["path_headings"] = {path.name: path.heading for path in scene.stress_paths}
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
-        return RunFacts(
+        return dict(
             scene=scene.name,
             n_elements=model.element_count,
             n_nodes=model.node_count,
             dt=self.steps.dt,
             n_steps=count,
             simulated_time=self.steps.dt * count,
-            wall=wall,
+            wall=dict(wall),
             device=f"{self.solver.device} ({wp.get_device(self.solver.device).name})",
             precision=self.solver.precision,
             element=" ".join(sorted({block.element for block in model.blocks})) or "none",
             energy_error=ledger.kept.energy_error,
             energy=ledger.energy(),
             max_plastic_strain=max_plastic_strain(self.solver, self.state, self.index),
-            parameters=scene.parameters,
+            parameters=dict(scene.parameters),
             t_contact=start.t_contact if scene.rigid else None,
             v_n=start.v_n,
             v_t=start.v_t,
-            theta=tuple(float(x) for x in start.angles(start.theta)),
-            theta_dot=tuple(float(x) for x in start.angles(start.theta_dot)),
-            more=more,
+            theta=start.angles(start.theta).tolist(),
+            theta_dot=start.angles(start.theta_dot).tolist(),
+            **more,
         )
 
     def _hand_off(self) -> dict[str, object]:

@@ -2,54 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
-from warp_mca.base import validate
-from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.base.log import warn
+from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.paths import Found
-from warp_mca.model.precision import check_range
-from warp_mca.phases.arguments import Progress
-from warp_mca.phases.checkpoint import Checkpoint, damage_explained
-from warp_mca.phases.checkpoint import advance as advance_stored
-from warp_mca.phases.forecast import announce
-from warp_mca.phases.prepare import Clock, Prepared, prepare
-from warp_mca.phases.rate_groups import grouping
-from warp_mca.phases.settings import Settings
-from warp_mca.phases.settle import settle
-from warp_mca.phases.stretch import Stretch, joined, restored, stored
-from warp_mca.recorders.recorder import Recorder, RunInfo
+from warp_mca.phases.carry_out import Course, begin
+from warp_mca.phases.prepare import Prepared, Request, prepare
+from warp_mca.phases.stretch import rows_before
+from warp_mca.recorders.recorder import RunInfo
 from warp_mca.results.result import Result
-from warp_mca.scene import Scene, Settle
-
-if TYPE_CHECKING:
-    from warp_mca.phases.impact import Impact
-
-DRIVERS = {Settle: settle}  # of phases before the impact
+from warp_mca.scene import Scene
 
 
-def simulate(
-    scenes: Sequence[Scene],
-    meshes: Sequence[Mapping[str, Mesh]] | None,
-    span: float,
-    tell: Progress,
-    settings: Settings,
-    recorders: Sequence[Recorder] = (),
-    store: Checkpoint | None = None,
-) -> list[Result]:
+def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Result]:
     """Run scenes side by side.
 
     Args:
-        scenes: as `run_batch` checks them; a lone one may have `recorders`.
+        scenes: as `run_batch` checks them.
         meshes: finished meshes by body of each scene, or None.
-        span: of the impact phase [s].
-        tell: told of stages.
-        settings: device, precision and threads.
-        recorders: of a lone scene.
-        store: where a lone scene without recorders stores its state, and goes on from it.
+        request: how they are run.
 
     Returns:
         The result of each scene; where a guard stopped one, `Result.stopped` says so.
@@ -57,114 +30,60 @@ def simulate(
     Raises:
         RequestError: the request cannot be carried out.
     """
-    from warp_mca.phases.impact import Impact
     from warp_mca.recorders.frames import Recording, skins
 
-    clock = Clock()
-    ready = _prepare(scenes, meshes, span, settings, clock, tell)
-    warn(sentence for item in ready for sentence in item.warnings)
-    tell("compile", 0.0)
+    recorders, tell, clock = request.recorders, request.tell, request.clock
+    ready = _prepare(scenes, meshes, request)
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
-    impact = Impact(ready, span, **settings.solver, skins=surfaces, needs=needs)
-    clock.lap("compile")
+    impact = begin(ready, request, skins=surfaces, needs=needs)
     said: list[str] = []
-    steps, first = impact.steps, ready[0]
+    recording, steps, lone = None, impact.steps, ready[0]
     if recorders:
-        paths = first.probes.position
-        info = RunInfo(first.scene, first.model, surfaces, paths, steps.dt, steps.interval, span, said.append)
-        impact.recording = Recording(recorders, info, steps.intervals, steps.per_interval, impact.solver.output)
-    if store:
-        store.is_for(impact, span, settings, "mca")
-    announce(impact)
-    stretches = _advance(impact, tell, store)
-    clock.lap("fe")
-    failed: tuple[str, ...] = ()
-    if impact.recording:
-        impact.recording.finish(impact.stopped[0] is None)
-        failed = tuple(impact.recording.failed)
-        clock.lap("output")
+        paths = lone.probes.position
+        info = RunInfo(lone.scene, lone.model, surfaces, paths, steps.dt, steps.interval, request.span, said.append)
+        recording = Recording(recorders, info, steps.intervals, steps.per_interval, impact.solver.output)
+    passed = 0
+
+    def opening() -> None:  # recorders see the impact
+        impact.recording = recording
+
+    def told() -> None:
+        nonlocal passed
+        if impact.recording and impact.rows > passed:
+            first, passed = passed, impact.rows
+            impact.recording.history(lambda: impact.scene_runs[0].history(first))
+        tell("impact", impact.rows / (impact.steps.intervals + 1))
+
+    course, done = Course(impact, request), False
+    try:
+        course.run(lone.scene.phases, told, tell=lambda share: tell("impact", share), opening=opening)
+        done = True
+    finally:
+        clock.lap("fe")
+        if recording:
+            recording.finish(done and impact.stopped[0] is None)
+            clock.lap("output")
+    failed = tuple(recording.failed) if recording else ()
     tell("impact", 1.0)
     results = []
     for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True):
-        found = joined(item.result(clock.wall, said, stopped), item, stretches)
+        found = item.result(clock.wall, said, stopped, before=rows_before(item, course.stretches))
         results.append(replace(found, failed=failed))
     return results
 
 
-def _advance(impact: Impact, tell: Progress, store: Checkpoint | None = None) -> list[Stretch]:
-    """The phases before the impact, and this one with its recorders or its checkpoint.
-
-    Returns:
-        What comes before the impact.
-    """
-    passed = 0  # rows that recorders have
-
-    def told() -> None:
-        nonlocal passed
-        if recording and impact.rows > passed:
-            first, passed = passed, impact.rows
-            recording.history(lambda: impact.scene_runs[0].history(first))
-        tell("impact", impact.rows / (impact.steps.intervals + 1))
-
-    recording, impact.recording = impact.recording, None  # they see the impact
-    try:
-        kept = store.stored() if store else None
-        if store and kept:
-            with damage_explained(store.path):
-                stretches = restored(*kept[:2])
-        else:
-            phases = impact.ready[0].scene.phases
-            stretches = [_before(phase, impact, lambda done: tell("impact", done)) for phase in phases]
-        impact.recording = recording
-        if store:
-            advance_stored(impact, store, told, before=stored(stretches))
-        else:
-            impact.advance(told=told)
-    except BaseException:
-        if recording:
-            recording.finish(False)
-        raise
-    return stretches
-
-
-def _before(phase: Any, impact: Impact, tell: Callable[[float], None]) -> Stretch:
-    """Carry out a phase that comes before the impact: one of `DRIVERS`, or of the user's own, which has `advance`."""
-    driver = DRIVERS.get(type(phase))
-    if driver:
-        return driver(phase, impact, tell)
-    kind = type(phase).__name__
-    found = validate.call("Scene.phases", kind, "advance()", phase.advance, impact, tell)
-    if not isinstance(found, Stretch):
-        raise bad_value("Scene.phases", kind, f"its advance() must return a Stretch, not a {type(found).__name__}")
-    return found
-
-
-def _prepare(
-    scenes: Sequence[Scene],
-    meshes: Sequence[Mapping[str, Mesh]] | None,
-    span: float,
-    settings: Settings,
-    clock: Clock,
-    tell: Progress,
-) -> list[Prepared]:
+def _prepare(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Prepared]:
     """Every scene at the start of its impact phase."""
     made: dict[object, Mesh] = {}
     places: Found = {}
     ready = []
     for k, scene in enumerate(scenes):
+        own = replace(request, tell=lambda stage, _, k=k: request.tell(stage, k / len(scenes)))
         try:
-            own = None if meshes is None else meshes[k]
-            groups = grouping(scene, span, settings.device, settings.multi_rate)
-            ready.append(prepare(scene, own, clock, _share(tell, k / len(scenes)), places, made, groups))
-            check_range(ready[-1].model, settings.precision)
+            ready.append(prepare(scene, None if meshes is None else meshes[k], own, places, made))
         except RequestError as error:
             if len(scenes) == 1:
                 raise
             raise RequestError(f"scenes[{k}]: {error}") from error
     return ready
-
-
-def _share(tell: Progress, done: float) -> Progress:
-    """Tells of every stage that this share of the scenes is done with it."""
-    return lambda stage, _: tell(stage, done)

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warp_mca.phases.cycle_setup import Setup
-from warp_mca.phases.motion import Motion
-from warp_mca.phases.parts import SwingPart
+from warp_mca.phases.motion import Motion, SwingPart
+from warp_mca.phases.prepare import Setup
 from warp_mca.rigid.chain import Array
 from warp_mca.rigid.placement import link_placements
 from warp_mca.rigid.swing import Swing, swing_until
@@ -47,7 +46,7 @@ class SwingDriver:
         """From a separation to the next touch of any link."""
         assert motion is not None
         setup = self.setup
-        setup.tell("rigid", motion.t / setup.t_end)
+        setup.request.tell("rigid", motion.t / setup.t_end)
         plane = self._plane(motion)
         gaps = [
             node_gap(motion.chain, k, motion.points(link.body, setup.meshes[link.body].points), plane)
@@ -61,7 +60,7 @@ class SwingDriver:
         placements = {name: p.after(run.t_end - motion.t) for name, p in motion.placements.items()} | links
         after = replace(motion, t=run.t_end, theta=run.theta, theta_dot=run.theta_dot, placements=placements)
         stopped = self._unknown_touch(after, run, plane) if run.ended_by == "touch" else None
-        setup.clock.lap("rigid")
+        setup.request.clock.lap("rigid")
         return after, SwingPart(motion=motion, swing=run, kinetic=setup.others(motion.placements), stopped=stopped)
 
     def _plane(self, motion: Motion) -> TargetPlane | TurningPlane:

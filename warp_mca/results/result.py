@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,10 @@ HISTORY_COLUMNS = (
     "E_friction",
     "E_total_error",
 )  # of every history.csv; a run adds some, see docs/outputs.md
+FACTS = (  # of every summary.json, before what is read off the history; None or empty where a scene lacks them
+    *("scene", "n_elements", "n_nodes", "dt", "n_steps", "simulated_time", "wall", "device", "precision", "element"),
+    *("energy_error", "energy", "max_plastic_strain", "parameters", "t_contact", "v_n", "v_t", "theta", "theta_dot"),
+)
 
 
 @dataclass(frozen=True)
@@ -168,70 +172,24 @@ class Result:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunFacts:
-    """Figures of a run that the summary reports and the history does not hold; None where a scene lacks them.
-
-    Attributes:
-        scene: its name.
-        n_elements, n_nodes: size of the model.
-        dt: time step [s].
-        n_steps: finite-element steps done.
-        simulated_time: of the impact phase [s].
-        wall: wall-clock seconds by stage: rigid, mesh, compile, fe, output.
-        device, precision, element: what it ran on and with.
-        energy_error: largest imbalance as a share of initial energy and external work [-].
-        energy: ledger at the end [J].
-        max_plastic_strain: greatest equivalent plastic strain [-].
-        parameters: of the scene.
-        t_contact: when the rigid phase ended [s].
-        v_n, v_t: velocity of the tip's centre at hand-off [m/s], downwards and along +x.
-        theta, theta_dot: of the links at hand-off [rad], [rad/s].
-        more: further figures, added to the summary as they are.
-    """
-
-    scene: str
-    n_elements: int
-    n_nodes: int
-    dt: float
-    n_steps: int
-    simulated_time: float
-    wall: Mapping[str, float]
-    device: str
-    precision: str
-    element: str
-    energy_error: float
-    energy: Mapping[str, float]
-    max_plastic_strain: float
-    parameters: Mapping[str, object] = field(default_factory=dict)
-    t_contact: float | None = None
-    v_n: float | None = None
-    v_t: float | None = None
-    theta: tuple[float, ...] = ()
-    theta_dot: tuple[float, ...] = ()
-    more: Mapping[str, object] = field(default_factory=dict)
-
-
-def summarise(history: Mapping[str, Array], facts: RunFacts, pairs: Sequence[ContactHistory] = ()) -> dict[str, Any]:
+def summarise(
+    history: Mapping[str, Array], facts: Mapping[str, Any], pairs: Sequence[ContactHistory] = ()
+) -> dict[str, Any]:
     """The contents of `summary.json`: `facts`, and what is read off the history.
 
     Args:
         history: by column, see `HISTORY_COLUMNS`.
-        facts: of the run.
+        facts: figures of the run that the history does not hold, by key (docs/outputs.md), `n_elements`, `n_steps` and
+            `wall`, the seconds by stage, among them.
         pairs: the scene's contacts, each by itself.
     """
     time, F_n, F_t = history["time_s"], history["F_n_N"], history["F_t_N"]
     contacts = contact_intervals(time, F_n)
     peaks = force_peaks(time, F_n)
-    known = {f.name: getattr(facts, f.name) for f in fields(facts) if f.name != "more"}
-    fe_wall = facts.wall.get("fe", 0.0)
+    fe_wall = facts["wall"].get("fe", 0.0)
+    given = {"parameters": {}, "theta": [], "theta_dot": [], **facts}
     return {
-        **known,
-        "wall": dict(facts.wall),
-        "energy": dict(facts.energy),
-        "parameters": dict(facts.parameters),
-        "theta": list(facts.theta),
-        "theta_dot": list(facts.theta_dot),
+        **{key: given.get(key) for key in FACTS},
         "F_n_first_peak": peaks[0][1] if peaks else None,
         "F_n_peaks": [list(peak) for peak in peaks],
         "F_n_max": float(np.max(F_n, initial=0.0)),
@@ -244,7 +202,7 @@ def summarise(history: Mapping[str, Array], facts: RunFacts, pairs: Sequence[Con
         "contact_open_at_end": unfinished(F_n) or any(pair.unfinished for pair in pairs),
         "contacts_by_pair": [pair.summary(time) for pair in pairs],
         "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],
-        "element_steps_per_s": facts.n_elements * facts.n_steps / fe_wall if fe_wall > 0.0 else None,
+        "element_steps_per_s": facts["n_elements"] * facts["n_steps"] / fe_wall if fe_wall > 0.0 else None,
         "version": __version__,
-        **facts.more,
+        **{key: value for key, value in facts.items() if key not in FACTS},
     }

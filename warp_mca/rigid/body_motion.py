@@ -25,23 +25,30 @@ HELD = 1e-4  # least share of a rigid motion that shows at held nodes; less than
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyMotion:
-    """The rigid motion of a body that fits its nodes best, and what it leaves out.
+class Fit:
+    """What a rigid motion that fits nodes best has, and what it leaves out.
 
     Attributes:
-        placement: pose and motion, with the centre of mass as pivot.
         kinetic_energy: of the rigid motion [J].
         vibration_energy: kinetic energy of the motion that is left over [J].
-        drive_work: kinetic energy of the nodes less these two [J]; 0 where held axes are at rest.
-        momenta: that the free rigid motions have, of the rigid motion and of the nodes [kg m/s], translations and
-            rotations about the centre over the radius of inertia, shape (2, free_count), float64.
+        drive_work: kinetic energy of the nodes and the carriage less these two [J]: the rigid motion has less because
+            driven nodes and a driven base keep their velocity; 0 where they are at rest.
+        momenta: generalised momenta J^T m V of the rigid motion and of the nodes, shape (2, free_count), float64: for
+            the coordinates of a chain [kg m^2/s]; for what held axes leave free of a body's translations and rotations
+            about its centre over the radius of inertia [kg m/s].
     """
 
-    placement: Placement
     kinetic_energy: float
     vibration_energy: float
     drive_work: float
     momenta: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyMotion(Fit):
+    """The rigid motion of a body; its `placement` has the centre of mass as pivot."""
+
+    placement: Placement
 
 
 def held_axes(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, NDArray[np.bool_]]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.rotation import mean_pose, point_velocity
-from warp_mca.rigid.body_motion import BodyMotion, body_motion
+from warp_mca.rigid.body_motion import Fit, body_motion
 from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, mesh_link, perpendicular
 from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.scene.ties import Pin
@@ -18,37 +18,23 @@ MAX_ITERATIONS = 50  # of the fit of the angles; elastic shapes need three or fo
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandBack:
-    """Rigid motion that fits the nodes best, and what it leaves out.
-
-    Kinetic energy, vibration energy and drive work add up to the kinetic energy of the nodes and the carriage.
+class HandBack(Fit):
+    """Rigid motion that fits the nodes best, and what it leaves out. Momenta of the chain come before those of bodies.
 
     Attributes:
         chain: the chain that was handed in, its links with mass, centre and inertia of the nodes in their `points`.
         theta: its coordinates (`Swing`), shape (coordinate_count,), float64.
         theta_dot: their rates, shape (coordinate_count,), float64.
         placements: rigid pose and motion of every body by name.
-        kinetic_energy: of the rigid motion [J].
-        vibration_energy: kinetic energy of the motion that is left over [J].
-        drive_work: what the rigid motion has less because driven nodes and a driven base keep their velocity [J]; 0
-            where they are at rest.
-        shape_misfit: largest distance of a node from the rigid shape [m].
         displacements: of each node from the rigid shape, in its body's frame [m], by body name, each shape
             (node_count, 3), float64.
-        momenta: generalised momenta J^T m V of the rigid motion and of the nodes, first those of the chain [kg m^2/s],
-            then those of the other bodies' free motions [kg m/s], shape (2, count), float64.
     """
 
     chain: Chain | None
     theta: Array
     theta_dot: Array
     placements: dict[str, Placement]
-    kinetic_energy: float
-    vibration_energy: float
-    drive_work: float
-    shape_misfit: float
-    displacements: dict[str, Array]
-    momenta: Array
+    displacements: dict[str, Array] = field(default_factory=dict)
 
 
 def hand_back(
@@ -91,9 +77,8 @@ def hand_back(
     }
     nodes = (points, nodal_masses, positions, velocities)
     fitted = None if chain is None else _fit_chain(chain, *nodes, near, t, carriage)
-    parts: list[_ChainMotion | BodyMotion] = [*([] if fitted is None else [fitted]), *bodies.values()]
+    parts: list[Fit] = [*([] if fitted is None else [fitted]), *bodies.values()]
     placements = {name: body.placement for name, body in bodies.items()} | (fitted.placements if fitted else {})
-    displacements = {name: placements[name].to_body(positions[name]) - points[name] for name in points}
     return HandBack(
         chain=fitted.chain if fitted else None,
         theta=fitted.theta if fitted else np.zeros(0),
@@ -102,8 +87,7 @@ def hand_back(
         kinetic_energy=sum(part.kinetic_energy for part in parts),
         vibration_energy=sum(part.vibration_energy for part in parts),
         drive_work=sum(part.drive_work for part in parts),
-        shape_misfit=float(max(np.linalg.norm(u, axis=1).max() for u in displacements.values())),
-        displacements=displacements,
+        displacements={name: placements[name].to_body(positions[name]) - points[name] for name in points},
         momenta=np.concatenate([part.momenta for part in parts], axis=1),
     )
 
@@ -187,20 +171,6 @@ def _on_axis(reference: Array, hinge: Array) -> NDArray[np.bool_]:
     return np.linalg.norm(reference[:, :2] - hinge, axis=1) <= 1e-6 * np.ptp(reference, axis=0).max()
 
 
-@dataclass(frozen=True, kw_only=True)
-class _ChainMotion:
-    """The chain's part of a `HandBack`."""
-
-    chain: Chain
-    theta: Array
-    theta_dot: Array
-    placements: dict[str, Placement]
-    kinetic_energy: float
-    vibration_energy: float
-    drive_work: float
-    momenta: Array
-
-
 def _fit_chain(
     chain: Chain,
     points: Mapping[str, Array],
@@ -210,7 +180,7 @@ def _fit_chain(
     near: Array | None,
     t: float,
     carriage: Vec2,
-) -> _ChainMotion:
+) -> HandBack:
     """Coordinates and rates of the chain, as `hand_back` describes."""
     links = [
         mesh_link(k.body, points[k.body], nodal_masses[k.body], hinge_out=k.hinge_out, hinge_in=k.hinge_in)
@@ -241,7 +211,7 @@ def _fit_chain(
         slip = carriage[1] - theta_dot[0]
         energy += chain.carriage_mass * slip**2
         forced += chain.carriage_mass * slip * (moving[:2] @ np.asarray(chain.slide))
-    return _ChainMotion(
+    return HandBack(
         chain=chain,
         theta=theta,
         theta_dot=theta_dot,
@@ -271,7 +241,7 @@ def _project(
     theta: Array,
     points: Mapping[str, Array],
     nodal_masses: Mapping[str, Array],
-    field: Mapping[str, Array],
+    motion: Mapping[str, Array],
     carriage: float,
 ) -> tuple[Array, Array]:
     """(J^T m J)^-1 J^T m w and J^T m w, shape (coordinate_count,), float64, for w of the nodes and of the carriage.
@@ -285,7 +255,7 @@ def _project(
     for j in reversed(range(len(angles))):
         link = chain.links[j]
         u = points[link.body][:, :2] - np.asarray(link.hinge_in)
-        weighted = nodal_masses[link.body][:, None] * field[link.body][:, :2]
+        weighted = nodal_masses[link.body][:, None] * motion[link.body][:, :2]
         arms = u[:, :1] * d[j] + u[:, 1:] * f[j]
         hinge = link.hinge_out[0] * d[j] + link.hinge_out[1] * f[j]
         right[j] = -(perpendicular(arms) * weighted).sum() - perpendicular(hinge) @ beyond

@@ -131,7 +131,8 @@ def hand_off(
         t_contact=run.t_end if touched else None,
         theta=run.theta,
         theta_dot=run.theta_dot,
-        **(_approach(centre, velocity, tip.radius, plane) if touched else {}),
+        **(speeds(velocity, plane) if touched else {}),
+        contact_point=centre - tip.radius * plane.normal if touched else None,
         energy_drift=run.energy_drift,
         **_balance(placed, run, positions, velocities, nodal_masses),
         chain=chain,
@@ -209,11 +210,11 @@ def _check_bodies(scene: Scene, target: Surface | RigidPlane, chain: Chain) -> N
         raise bad_value("RigidPhase.target.body", target.body, "the target must not be a link of the chain")
 
 
-def _approach(centre: Array, velocity: Array, radius: float, plane: TargetPlane) -> dict:
-    """Velocity of the tip's centre against the plane's normal n and along (n_y, -n_x, 0), and the point of contact."""
+def speeds(velocity: Array, plane: TargetPlane) -> dict[str, float]:
+    """Velocity of the tip [m/s] against the plane's normal n, `v_n`, and along (n_y, -n_x, 0), `v_t`."""
     n = plane.normal
     along = np.array([n[1], -n[0], 0.0]) / np.hypot(n[0], n[1])
-    return {"v_n": float(-velocity @ n), "v_t": float(velocity @ along), "contact_point": centre - radius * n}
+    return {"v_n": float(-velocity @ n), "v_t": float(velocity @ along)}
 
 
 def _balance(chain: Chain, run: Swing, X: Mapping, V: Mapping, nodal_masses: Mapping[str, Array]) -> dict:

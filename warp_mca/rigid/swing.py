@@ -40,10 +40,8 @@ class Swing:
         theta_t: coordinates at those times, shape (sample_count, coordinate_count), float64.
         theta_dot_t: their rates at those times, shape (sample_count, coordinate_count), float64.
         closest: the smallest gap on the way [m] and its time [s]; (inf, t_end) if no gap was watched.
-        torque_work: put in by the joints' prescribed torques [J].
-        friction_heat: of the joints [J].
-        base_work: put in by the base's prescribed motion [J].
-        work_t: these three at the sampled times [J], shape (sample_count, 3), float64.
+        work_t: put in by the joints' prescribed torques, heat of the joints, and put in by the base's prescribed
+            motion, at the sampled times [J], shape (sample_count, 3), float64.
     """
 
     ended_by: Literal["touch", "t_end"]
@@ -57,9 +55,6 @@ class Swing:
     theta_dot_t: Array
     closest: tuple[float, float]
     work_t: Array
-    torque_work: float = 0.0
-    friction_heat: float = 0.0
-    base_work: float = 0.0
 
 
 def swing(
@@ -211,7 +206,6 @@ def _record(
     samples = end[None] if path is None else path(t).T
     kinetic, total = _energies(chain, steps, states)
     scale = kinetic.max()
-    work = states[-1, 2 * count :] if chain.loads is not None else np.zeros(3)
     return Swing(
         ended_by="t_end" if touch is None else "touch",
         touched=None if touch is None else touch[1],
@@ -224,9 +218,6 @@ def _record(
         theta_dot_t=samples[:, count : 2 * count],
         closest=closest,
         work_t=samples[:, 2 * count :] if chain.loads is not None else np.zeros((len(t), 3)),
-        torque_work=float(work[0]),
-        friction_heat=float(work[1]),
-        base_work=float(work[2]),
     )
 
 

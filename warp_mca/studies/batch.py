@@ -13,8 +13,8 @@ from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
 from warp_mca.base.folder import held
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.arguments import Progress, check_scene, one_at_a_time, span_of, teller
-from warp_mca.phases.progress import shows_progress
+from warp_mca.phases.arguments import Progress, check_scene, one_at_a_time, shows_progress, span_of, teller
+from warp_mca.phases.prepare import Request
 from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.results.result import Result
@@ -74,7 +74,7 @@ def run_batch(
     settings = settings_of(device, precision, threads)
     _check_meshes(meshes, len(scenes))
     with hold_scenes(out, len(scenes), force) as folders:
-        return save_scenes(simulate(scenes, meshes, span, tell, settings), folders, force)
+        return save_scenes(simulate(scenes, meshes, Request(span=span, settings=settings, tell=tell)), folders, force)
 
 
 def _check_meshes(meshes: object, count: int) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.phases.impact import Impact
-from warp_mca.phases.prepare import Clock, prepare
+from warp_mca.phases.carry_out import begin
+from warp_mca.phases.prepare import Request, prepare
+from warp_mca.phases.settings import Settings
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
 from warp_mca.verify.case import Row, Setup, case
@@ -124,8 +125,8 @@ def _speed(wave: str) -> float:
 
 def _kept(setup: Setup, scene: mca.Scene, span: float, shape: Callable[[Solver, State], None]) -> float:
     """Share of the energy that `shape` gives a state that absorbing boundaries leave in it after a time [s]."""
-    ready = prepare(scene, None, Clock(), lambda stage, done: None)
-    impact = Impact([ready], span, device=setup.device, precision=setup.precision, threads=1, shape=shape)
+    request = Request(span=span, settings=Settings(setup.device, setup.precision, 1))
+    impact = begin([prepare(scene, None, request)], request, shape=shape)
     impact.advance()
     energy = impact.scene_runs[0].ledger.energy()
     return (energy["kinetic"] + energy["elastic"] + energy["hourglass"]) / energy["initial"]
