@@ -26,7 +26,7 @@ from benchmarks.rates import measure_host, measure_rates, measure_savings
 from benchmarks.startup import startup
 from benchmarks.timing import QUICK, Care
 from warp_mca import __version__
-from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements import ELEMENTS, of_hexahedra
 
 PARTS = ("ceilings", "flops", "rates", "savings", "host", "startup")
 KEY = ("element", "size", "precision", "case")
@@ -54,7 +54,7 @@ def main(words: list[str] | None = None) -> dict[str, Any]:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.splitlines()[0])
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--sizes", nargs="+", help=f"out of {' '.join(SIZES)}, or numbers of elements")
-    parser.add_argument("--elements", nargs="+", default=list(ELEMENTS), choices=list(ELEMENTS))
+    parser.add_argument("--elements", nargs="+", default=of_hexahedra(), choices=of_hexahedra())
     parser.add_argument("--precision", nargs="+", default=["mixed", "float64"], choices=["mixed", "float64"])
     parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
     parser.add_argument("--cases", nargs="+", default=list(RATES), choices=list(RATES), help="of the rates")

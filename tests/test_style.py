@@ -21,6 +21,7 @@ STRUCTS = {  # classes of arrays that kernels take whole
     for path in KERNEL_FILES
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
     if isinstance(node, ast.ClassDef) and any(ast.unparse(mark) == "wp.struct" for mark in node.decorator_list)
+    if any(isinstance(field, ast.AnnAssign) and "wp.array" in ast.unparse(field.annotation) for field in node.body)
 }
 
 

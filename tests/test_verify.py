@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.deliberate import MUTATIONS
 from warp_mca.base.errors import GuardError
-from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements import of_hexahedra
 from warp_mca.verify import Setup, bending, cases
 from warp_mca.verify.case import Row
 from warp_mca.verify.report import lines
@@ -23,7 +23,7 @@ ROOT = Path(__file__).parent.parent
 SHORT = [
     (case, element)
     for case in cases()
-    for element in ELEMENTS
+    for element in of_hexahedra()
     if element == "hex8" or (case.uses_elements and case.group in ("elements", "material", "friction"))
     if element != "tet4" or case.name not in ("cantilever_vibration", "near_incompressible_bending", "rolling_sphere")
 ]

@@ -52,6 +52,20 @@ def cell_names(nodes: NDArray[np.integer]) -> NDArray[np.str_]:
     return names
 
 
+def among(cells: Cells, name: str) -> NDArray[np.bool_]:
+    """Which cells of a stored type are of the type `name` that is stored so, shape (cell_count,); all of its own type.
+
+    Args:
+        cells: nodes, shape (cell_count, corners of the stored type).
+        name: the type, out of CELL_TYPES.
+    """
+    if CELL_TYPES[name].stored_as == name:
+        return np.ones(len(cells), dtype=bool)
+    found = cells[:, 6] == cells[:, 7]  # a quick first look
+    found[found] = cell_names(cells[found]) == name
+    return found
+
+
 def cut_to(mesh: Mesh, name: str) -> Mesh:
     """The mesh with cells that can be cut to those of the type `name`, or made into them, cut so; others stay."""
     if name == TETRAHEDRON.name:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
-from warp_mca.geometry.degenerate import cut_to
+from warp_mca.geometry.degenerate import among, cut_to
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined
 from warp_mca.geometry.shape_volume import built
@@ -137,16 +137,18 @@ def _cut(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
 
 
 def _check_elements(scene: Scene, meshes: Mapping[str, Mesh]) -> None:
-    """Refuses elements that were chosen, as other than the first of their cell type, and compute no cell.
+    """Refuses elements that compute no cell and were chosen, as other than the first of a type that meshes store.
 
     Raises:
         RequestError: there is one.
     """
     for element in ELEMENTS.values():
         asked = [body for body in scene.bodies if body.element == element.name]
-        taken = any(len(meshes[body.name].cells[element.cell]) for body in asked if not body.rigid)
-        if asked and not taken and element is not default_element(element.cell):
+        kind = CELL_TYPES[element.cell]
+        stored = [meshes[body.name].cells[kind.stored_as] for body in asked if not body.rigid]
+        usual = element is default_element(kind.name) and kind.stored_as == kind.name
+        if asked and not usual and not any(among(cells, kind.name).any() for cells in stored):
             names = ", ".join(body.name for body in asked)
-            cell = CELL_TYPES[element.cell].field
+            cell = kind.field or f"{kind.name}s"
             remedy = f"it computes {cell}, of which {names} {'has' if len(asked) == 1 else 'have'} none that deform"
             raise bad_value("element", element.name, f"{remedy}; leave it out")

@@ -96,15 +96,16 @@ def cells(model: Model) -> tuple[list[tuple[CellType, NDArray[np.int64]]], NDArr
     Cells come in the order of the concatenated meshes, which is not the model's.
     """
     count = len(model.element_of)
-    most = max((len(block.conn) for block in (*model.blocks, *model.rigid_blocks)), default=0)
+    blocks = [(block, CELL_TYPES[ELEMENTS[block.element].cell]) for block in (*model.blocks, *model.rigid_blocks)]
+    most = max((len(cell.stored_corners) for _, cell in blocks), default=0)
     nodes, names = np.full((count, most), -1, dtype=np.int64), np.full(count, "", dtype=object)
     material = np.empty(count, dtype=np.int32)
-    for block in (*model.blocks, *model.rigid_blocks):
+    for block, cell in blocks:
         index = model.element_of[block.first : block.first + block.conn.shape[1]]
-        nodes[index, : len(block.conn)] = block.conn.T
+        stored = block.conn[list(cell.stored_corners)].T
+        nodes[index, : len(cell.stored_corners)] = stored
         material[index] = block.material
-        cell = ELEMENTS[block.element].cell
-        names[index] = cell_names(block.conn.T) if cell == HEXAHEDRON.name else cell
+        names[index] = cell_names(stored) if cell.name == HEXAHEDRON.name else cell.name
     ends = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), len(names)]
     runs = []
     for first, end in itertools.pairwise(ends):

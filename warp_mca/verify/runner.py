@@ -9,7 +9,7 @@ from pathlib import Path
 
 from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.files import check_folder
-from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements import of_hexahedra
 from warp_mca.step.device import check_device
 from warp_mca.verify import cases
 from warp_mca.verify.case import Case, Level, Setup
@@ -61,7 +61,7 @@ def verify(
     check_device(device)
     if out is not None:
         check_folder("out", out)
-    elements = [element] if element else list(ELEMENTS)
+    elements = [element] if element else of_hexahedra()
     outcomes = []
     for case in chosen:
         for item in elements if case.uses_elements else elements[:1]:

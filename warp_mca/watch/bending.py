@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry.cell_types import HEXAHEDRON, WEDGE
-from warp_mca.geometry.degenerate import cell_names
+from warp_mca.geometry.degenerate import among
 from warp_mca.watch import bent_hexahedra, strain_jumps
 from warp_mca.watch.bent_cells import BENT, COLUMNS, FLOW, FLOWING, MISSED, RIGHT, SPENT, Cells
 from warp_mca.watch.row import Array, Finished, Values, When, row
@@ -90,9 +90,7 @@ def _wedges(block: Block) -> NDArray[np.bool_]:
     """Which cells of a block are wedges, shape (element_count,)."""
     if len(block.conn) != HEXAHEDRON.corners:
         return np.zeros(block.conn.shape[1], dtype=bool)
-    found = block.conn[2] == block.conn[3]  # a quick first look
-    found[found] = cell_names(block.conn[:, found].T) == WEDGE.name
-    return found
+    return among(block.conn.T, WEDGE.name)
 
 
 def _with_neighbours(conn: NDArray[np.int32], chosen: NDArray[np.intp], own: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
+from warp_mca.geometry.degenerate import among
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.shape_volume import of_cells
 from warp_mca.physics.elements import ELEMENTS, Element, default_element
@@ -90,8 +91,17 @@ def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
                 remedy = f"its mesh holds {CELL_TYPES[name].field}; pass meshes through warp_mca.mesh"
                 raise bad_value(f"Body {body.name}.element", body.element, remedy)
             index = np.arange(first, first + len(conn), dtype=np.int32)
-            found.append(Cells(own if name == own.cell else default_element(name), finite, conn, index))
             first += len(conn)
+            element = own if name == own.cell else default_element(name)
+            others = {own.cell, *getattr(element, "leaves", ())} - {name}
+            for kind in sorted(kind for kind in others if CELL_TYPES[kind].stored_as == name):
+                mine = among(conn, kind)
+                if mine.any():
+                    other = own if kind == own.cell else default_element(kind)
+                    found.append(Cells(other, finite, conn[mine][:, CELL_TYPES[kind].own_corners], index[mine]))
+                    conn, index = conn[~mine], index[~mine]
+            if len(conn):
+                found.append(Cells(element, finite, conn, index))
     return found
 
 

@@ -22,8 +22,9 @@ class Element(Protocol):
 
     Attributes:
         name: in `Body.element` and on the command line.
-        cell: name of the cell type that it computes, out of `geometry.cell_types.stored_types`.
+        cell: name of the cell type that it computes, out of `geometry.cell_types.CELL_TYPES`.
         patches: whether its stage may compute compact patches of elements, so that the model orders them that way.
+        leaves: may be left out; types stored as this cell that other elements compute, the default ones of their types.
         one_rate: may be left out; True where forces depend on neighbouring elements too, so that all of a block take
             the same step.
     """

@@ -1,0 +1,162 @@
+"""Owns the wedge that bends right: mean gradient, assumed transverse shear, an internal vector of its thickness.
+
+`wedge_strain` has its equations.
+"""
+
+from functools import cache, partial
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.elements.formulation import OWN, Formulation
+from warp_mca.kernels.elements.readings import energy_kernel as energy_of
+from warp_mca.kernels.elements.readings import stress_kernel as stress_of
+from warp_mca.kernels.elements.wedge_shape import CORNERS, POINTS, SIXTH, place_function
+from warp_mca.kernels.elements.wedge_strain import force_function, shape_functions
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.laws import Law, law_functions
+from warp_mca.kernels.materials.point import material_point
+from warp_mca.kernels.records.extremes import keep_functions
+
+wp.set_module_options({"enable_backward": False})
+
+__all__ = ["energy_kernel", "force_kernel", "kept", "stress_kernel"]
+
+
+def kept(law: Law, finite: bool) -> tuple[str, ...]:
+    """Covariant components of the inelastic part of the internal vector, and energy that its changes took [J]."""
+    return ("scalar",) * 4 if law.history else ()
+
+
+@cache
+def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
+    """Its six points, of which each shows its stress at the nearest corner."""
+    t = scalars(precision)
+    R = t.real
+    Wedge6, load_shape, enriched, strain_at = shape_functions(precision, law_name, finite)
+    lost = POINTS * law_functions(law_name, precision).size + 3
+
+    @wp.func
+    def gradient(shape: Wedge6, g: int):
+        Y = strain_at(shape, g)
+        if wp.static(finite):
+            Y = Y + Y * shape.H
+        return R(SIXTH) * shape.volume, shape.H + Y
+
+    @wp.func
+    def rotation(shape: Wedge6):
+        return shape.W
+
+    @wp.func
+    def corner_of(g: int, j: int):
+        return g
+
+    @wp.func
+    def modes(shape: Wedge6, K: R, G: R, flag: int, history: wp.array2d(dtype=R), e: int):
+        return R(0.0), history[wp.static(lost), e]
+
+    given = (OWN, Wedge6, load_shape, gradient, rotation, 1, corner_of)
+    return Formulation("wedge6", CORNERS, POINTS, *given, modes=modes if law_name else None, enriched=enriched)
+
+
+@cache
+def vector_function(precision: str, law_name: str, finite: bool) -> Any:
+    """The function that changes the kept part of the internal vector by what tractions have left for it.
+
+    `left` and `loose` are those of `force_function`. The vector changes by -loose / 2, since the sum of zeta^2 over the
+    points is 2. The energy falls by half of the work of these tractions.
+    """
+    R, vec3 = scalars(precision).real, scalars(precision).vec3
+    Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
+    first = POINTS * law_functions(law_name, precision).size
+
+    @wp.func
+    def keep_vector(shape: Wedge6, left: vec3, loose: vec3, e: int, history_out: wp.array2d(dtype=R)):
+        change = R(0.5) * (shape.G * loose)
+        for i in range(3):
+            history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
+        spent = R(0.25) * R(SIXTH) * shape.volume * wp.dot(left, loose)
+        history_out[wp.static(first + 3), e] = history_out[wp.static(first + 3), e] + spent
+
+    return keep_vector
+
+
+@cache
+def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+    """Kernel: forces of each element on its nodes, plastic history, and the inelastic part of the internal vector."""
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    _, load_shape, enriched, strain_at = shape_functions(precision, law_name, finite)
+    gradient, place_of = formulation(precision, law_name, finite).gradient, place_function(precision)
+    forces, keep_vector = force_function(precision, law_name, finite), vector_function(precision, law_name, finite)
+    point, k = material_point(precision, law_name, finite), kinematics(precision, finite)
+    plastic, general, update = bool(law_name), point.general, point.update
+    dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
+    keep_strain, keep_volume, _ = keep_functions(R)
+
+    @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
+    def wedge6_force(
+        X: wp.array(dtype=wp.vec3d),
+        conn: wp.array2d(dtype=wp.int32),
+        material: wp.array(dtype=wp.int32),
+        law: wp.array2d(dtype=R),
+        u: wp.array(dtype=wp.vec3d),
+        slot: int,
+        count: int,
+        dt: R,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+        force_out: wp.array(dtype=vec3),
+    ):
+        e = wp.tid()
+        m = material[e]
+        flag = int(0)
+        if wp.static(plastic):
+            flag = yielded_out[e]
+        shape = enriched(load_shape(X, u, conn, e), e, m, flag, law, history_out)
+        flows = int(flag)
+        identity = wp.identity(n=3, dtype=R)
+        largest = R(0.0)
+        smallest = wp.determinant(identity + shape.H_world)
+        A = mat33()
+        M = mat33()
+        Mz = mat33()
+        Mr = mat33()
+        Ms = mat33()
+        for g in range(wp.static(POINTS)):
+            _weight, H = gradient(shape, g)
+            strain, N, d = deviator(H)
+            theta = dilatation_of(H)
+            largest = wp.max(largest, wp.ddot(strain, strain))
+            smallest = wp.min(smallest, wp.determinant(identity + H))
+            S, pressure, dp = update(strain, theta, law[m, 1], g, e, m, flag, law, dt, history_out)
+            if dp > R(0.0):
+                flows = int(1)
+            if wp.static(not general):
+                pressure = pressure_of(law[m, 0], theta)
+            P = nominal(H, S, N, d, pressure)
+            zeta, r, s = place_of(g)
+            M = M + P
+            Mz = Mz + zeta * P
+            Mr = Mr + r * P
+            Ms = Ms + s * P
+            if wp.static(finite):
+                A = A + strain_at(shape, g) * P
+        f, left, loose = forces(shape, law[m, 0], law[m, 1], A, M, Mz, Mr, Ms)
+        if wp.static(plastic):
+            if wp.static(general) or flows != 0:
+                keep_vector(shape, left, loose, e, history_out)
+            if flows != flag:
+                yielded_out[e] = flows
+        keep_strain(e, largest, extreme_out)
+        keep_volume(e, R(1.0) - smallest, extreme_out)
+        for a in range(wp.static(CORNERS)):
+            for i in range(3):  # by components, as in `hexahedron.store_function`
+                force_out[slot + a * count + e][i] = f[a, i]
+
+    return wedge6_force
+
+
+energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)
