@@ -4,13 +4,14 @@ Two patterns, zeta r and zeta s, have amplitudes q_1 and q_2 beside the mean gra
 base g_k of the middle with its dual n_k, from the components a_i = g_r . q_i, b_i = g_s . q_i, c_i = g_zeta . q_i:
 
     Y = ((a_1 - a_2 - b_1) n_r n_zeta + (b_2 - b_1 - a_2) n_s n_zeta) / 6 + zeta (E + d n_zeta)
-      + dev(r (c_1 n_zeta n_zeta - tau n_s n_zeta) + s (c_2 n_zeta n_zeta + tau n_r n_zeta)),
-    E = a_1 n_r n_r + b_2 n_s n_s + (a_2 + b_1) n_r n_s, tau = (a_2 - b_1) / 2
+      + dev(r (kappa c_1 n_zeta n_zeta - tau n_s n_zeta) + s (kappa c_2 n_zeta n_zeta + tau n_r n_zeta)),
+    E = a_1 n_r n_r + b_2 n_s n_s + (a_2 + b_1) n_r n_s, tau = (a_2 - b_1) / 2, kappa^2 = 3 (1 + nu) / 2
 
 with symmetric products n n. The transverse shear is that of MITC3 (Lee and Bathe, Comput. Struct. 82 (2004) 945), which
-is zero along edges in pure bending. Of the dilatation only what is linear in zeta is left. Y adds to a small mean
-strain; at finite strain it is that of the stretched element, with the base F_mean g_k, and F = (I + Y) F_mean, so that
-forces are the exact slope of the energy.
+is zero along edges in pure bending. Of the dilatation only what is linear in zeta is left, so that incompressible
+bodies do not lock; with kappa the strain along the axis has the energy of a bar that is free beside it all the same.
+Y adds to a small mean strain; at finite strain it is that of the stretched element, with the base F_mean g_k, and
+F = (I + Y) F_mean, so that forces are the exact slope of the energy.
 
 The internal vector d makes the tractions of layers free of what is linear in zeta, so that the thickness may follow
 (Buechter, Ramm and Roehl, Int. J. Numer. Meth. Engng 37 (1994) 2551) and leaning columns do not lock:
@@ -57,7 +58,7 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
 
         In the rotated frame: base G and dual base N by rows; amplitudes q1 and q2, and their components a, b, c in c1
         and c2; parts of Y, which are constant in Y0, linear in zeta in Yz, and in r and s, with their dilatation, in Yr
-        and Ys; E, the internal vector d and its part h.
+        and Ys; E, kappa, the internal vector d and its part h.
         """
 
         x: mat53
@@ -79,6 +80,7 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
         Ys: mat33
         d: vec3
         h: vec3
+        kappa: R
 
     @wp.func
     def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
@@ -100,7 +102,6 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
         c2 = G * q2
         rz = dyad(N[0], N[2])
         sz = dyad(N[1], N[2])
-        zz = wp.outer(N[2], N[2])
         tau = R(0.5) * (c2[0] - c1[1])
         shape.x = x
         shape.b = b
@@ -117,8 +118,8 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
         shape.Y0 = R(SIXTH) * ((c1[0] - c2[0] - c1[1]) * rz + (c2[1] - c1[1] - c2[0]) * sz)
         both = c2[0] + c1[1]
         shape.E = c1[0] * wp.outer(N[0], N[0]) + c2[1] * wp.outer(N[1], N[1]) + both * dyad(N[0], N[1])
-        shape.Yr = c1[2] * zz - tau * sz
-        shape.Ys = c2[2] * zz + tau * rz
+        shape.Yr = -tau * sz
+        shape.Ys = tau * rz
         return shape
 
     @wp.func
@@ -134,6 +135,10 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
         shape.h = h
         shape.d = d + h
         shape.Yz = shape.E + dyad(shape.d, n)
+        zz = wp.outer(n, n)
+        shape.kappa = wp.sqrt(R(13.5) * K / (R(6.0) * K + R(2.0) * G))
+        shape.Yr = shape.Yr + (shape.kappa * shape.c1[2]) * zz
+        shape.Ys = shape.Ys + (shape.kappa * shape.c2[2]) * zz
         return shape
 
     @wp.func
@@ -193,8 +198,8 @@ def force_function(precision: str, law_name: str, finite: bool) -> Any:
         shear_s = R(SIXTH) * wp.dot(s, S * z)
         tau = R(0.5) * (wp.dot(r, Ss * z) - wp.dot(s, Sr * z))
         both = wp.dot(r, relaxed * s) - shear_r - shear_s
-        p1 = v * vec3(wp.dot(r, relaxed * r) + shear_r, both - tau, wp.dot(z, Sr * z))
-        p2 = v * vec3(both + tau, wp.dot(s, relaxed * s) + shear_s, wp.dot(z, Ss * z))
+        p1 = v * vec3(wp.dot(r, relaxed * r) + shear_r, both - tau, shape.kappa * wp.dot(z, Sr * z))
+        p2 = v * vec3(both + tau, wp.dot(s, relaxed * s) + shear_s, shape.kappa * wp.dot(z, Ss * z))
         B = v * M
         if wp.static(finite):  # base and dual base depend on the mean gradient, too
             F = wp.identity(n=3, dtype=R) + shape.H

@@ -77,7 +77,8 @@ def _strains(x: Array, K: Array, G: Array) -> tuple[Array, Array]:
     even = mean + part(((c1[0] - both) / 6.0, y[0, 2]), ((c2[1] - both) / 6.0, y[1, 2]))
     thick = part((c1[0], y[0, 0]), (c2[1], y[1, 1]), (both, y[0, 1]))
     thick += _relief(thick, N[:, 2], K, G)
-    flat = np.stack([part((c1[2], y[2, 2]), (-tau, y[1, 2])), part((c2[2], y[2, 2]), (tau, y[0, 2]))])
+    kappa = np.sqrt(13.5 * K / (6.0 * K + 2.0 * G))[:, None, None]
+    flat = np.stack([part((kappa * c1[2], y[2, 2]), (-tau, y[1, 2])), part((kappa * c2[2], y[2, 2]), (tau, y[0, 2]))])
     flat -= np.einsum("meiipk,jl->mejlpk", flat, np.eye(3)) / 3.0
     places = [even + zeta * thick + r * flat[0] + s * flat[1] for zeta, r, s in _PLACE]
     return np.stack(places, axis=1), volume
