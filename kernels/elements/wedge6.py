@@ -26,7 +26,7 @@ __all__ = ["energy_kernel", "force_kernel", "kept", "stress_kernel"]
 
 def kept(law: Law, finite: bool) -> tuple[str, ...]:
     """Covariant components of the inelastic part of the internal vector, and energy that its changes took [J]."""
-    return ("scalar",) * 4 if law.history else ()
+    return ("scalar",) * 4 if law.general or law.history else ()
 
 
 @cache

@@ -132,23 +132,14 @@ def tensor_functions(precision: str) -> tuple[Any, Any]:
 
 
 @cache
-def elastic_functions(precision: str) -> tuple[Any, Any]:
-    """Functions ((strain, K, G) -> Hooke's stress C strain; (traction t, n, K, G) -> A^-1 t).
-
-    A a = (C (a n)) n with the symmetric product a n, or (K + G / 3) (n.a) n + G (n.n) a.
-    """
+def hooke_function(precision: str) -> Any:
+    """The function (strain, K, G) -> stress of isotropic elasticity [Pa]."""
     t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    R, mat33 = t.real, t.mat33
 
     @wp.func
     def hooke(E: mat33, K: R, G: R):
         pressure = (K - R(2.0) * R(THIRD) * G) * wp.trace(E)
         return R(2.0) * G * E + pressure * wp.identity(n=3, dtype=R)
 
-    @wp.func
-    def vector_of(t: vec3, n: vec3, K: R, G: R):
-        square = wp.dot(n, n)
-        share = (K + R(THIRD) * G) / ((K + R(4.0) * R(THIRD) * G) * square)
-        return (t - (share * wp.dot(n, t)) * n) / (G * square)
-
-    return hooke, vector_of
+    return hooke

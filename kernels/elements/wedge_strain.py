@@ -15,8 +15,8 @@ F = (I + Y) F_mean, so that forces are the exact slope of the energy.
 
 The internal vector d makes the tractions of layers free of what is linear in zeta, so that the thickness may follow
 (Buechter, Ramm and Roehl, Int. J. Numer. Meth. Engng 37 (1994) 2551) and leaning columns do not lock:
-d = -A^-1 (C E) n_zeta + h. That is exact in an elastic element; h, which is F_mean^-T times what the history keeps,
-takes what is left of the tractions away after each step.
+d = -A^-1 (C E) n_zeta + h with A as in `internal_modes`. That is exact in an elastic element. After each step h, whose
+covariant components are history, takes away what is left of the tractions.
 """
 
 from functools import cache
@@ -24,12 +24,13 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.internal_modes import mode_functions
 from warp_mca.kernels.elements.patterns import mean_frame
 from warp_mca.kernels.elements.wedge_shape import (
     POINTS,
     SIXTH,
-    elastic_functions,
     gradient_functions,
+    hooke_function,
     pattern_functions,
     place_function,
     tensor_functions,
@@ -48,7 +49,7 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
     load_patterns, _ = pattern_functions(precision)
     volume_gradients, mean_gradient = gradient_functions(precision)
     dyad, without_trace = tensor_functions(precision)
-    (hooke, vector_of), place_of = elastic_functions(precision), place_function(precision)
+    hooke, vector_of, place_of = hooke_function(precision), mode_functions(precision).solve, place_function(precision)
     rotated = mean_frame(precision, finite)
     plastic, first = bool(law_name), POINTS * law_functions(law_name, precision).size
 
@@ -160,7 +161,8 @@ def force_function(precision: str, law_name: str, finite: bool) -> Any:
     R, vec3, mat33, mat53 = t.real, t.vec3, t.mat33, wp.types.matrix((5, 3), t.real)
     Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
     _, to_corners = pattern_functions(precision)
-    (dyad, without_trace), (hooke, vector_of) = tensor_functions(precision), elastic_functions(precision)
+    dyad, without_trace = tensor_functions(precision)
+    hooke, vector_of = hooke_function(precision), mode_functions(precision).solve
 
     @wp.func
     def conjugate(shape: Wedge6, M: mat33):

@@ -40,9 +40,10 @@ LOOKS = 8  # in a run, besides that at its end
 # What finds the energies, and what prepares it, by element and whether cells are wedges.
 _ENERGIES: dict[tuple[str, bool], tuple[Callable[[Array, Cells], Array], Callable[[Cells], object]]] = {
     ("hex8", False): (bent_hexahedra.full_hexahedra, bent_hexahedra.bricks_of),
-    ("hex8", True): (partial(strain_jumps.wedges, one_point=False), strain_jumps.wedges_of),
+    ("hex8", True): (partial(strain_jumps.wedges, element="hex8"), strain_jumps.wedges_of),
     ("hex8r", False): (bent_hexahedra.one_point_hexahedra, bent_hexahedra.bricks_of),
-    ("hex8r", True): (partial(strain_jumps.wedges, one_point=True), strain_jumps.one_point_wedges_of),
+    ("hex8r", True): (partial(strain_jumps.wedges, element="hex8r"), strain_jumps.one_point_wedges_of),
+    ("wedge6", True): (partial(strain_jumps.wedges, element="wedge6"), strain_jumps.wedges_of),
     ("tet4", False): (strain_jumps.tetrahedra, strain_jumps.slopes_of),
 }
 
@@ -74,10 +75,11 @@ def _sample(
     jumps = wedge or block.element == "tet4"
     chosen = own if len(own) <= WHOLE[jumps] else own[_spread(len(own), SAMPLE[jumps])]
     cells = _with_neighbours(block.conn, chosen, own) if jumps else chosen
+    conn = block.conn[list(WEDGE.stored_corners)] if block.element == "wedge6" else block.conn
     K, G = model.law[material, :2]
     energies, prepare = _ENERGIES[block.element, wedge]
     share = len(own) / len(chosen)
-    return Cells(body, energies, block.conn[:, cells].T, len(chosen), K, G, sigma_y, share, model.X, prepare)
+    return Cells(body, energies, conn[:, cells].T, len(chosen), K, G, sigma_y, share, model.X, prepare)
 
 
 def _spread(total: int, count: int) -> NDArray[np.intp]:
@@ -88,6 +90,8 @@ def _spread(total: int, count: int) -> NDArray[np.intp]:
 
 def _wedges(block: Block) -> NDArray[np.bool_]:
     """Which cells of a block are wedges, shape (element_count,)."""
+    if block.element == "wedge6":
+        return np.ones(block.conn.shape[1], dtype=bool)
     if len(block.conn) != HEXAHEDRON.corners:
         return np.zeros(block.conn.shape[1], dtype=bool)
     return among(block.conn.T, WEDGE.name)

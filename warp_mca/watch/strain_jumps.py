@@ -122,8 +122,8 @@ def _wedge_strains(u: Array, cells: Cells) -> tuple[Array, Array, Array, Array]:
     return R, strain, B, r
 
 
-def wedges(u: Array, cells: Cells, one_point: bool) -> Array:
-    """What `bent_cells` names of wedges of `hex8`, or `hex8r`, that are looked at, shape (COLUMNS,)."""
+def wedges(u: Array, cells: Cells, element: str) -> Array:
+    """What `bent_cells` names of wedges of `hex8`, `hex8r` or `wedge6` that are looked at, shape (COLUMNS,)."""
     w, own = cast(Wedges, cells.shape), slice(cells.looked_at)
     R, strain, B, r = _wedge_strains(u, cells)
     flat = np.eye(3)[:, :, None] - np.einsum("in,jn->ijn", w.normal, w.normal)
@@ -134,9 +134,12 @@ def wedges(u: Array, cells: Cells, one_point: bool) -> Array:
     mean = w.volume * (0.5 * cells.K * theta**2 + cells.G * deviator_square(strain))
     tilt = np.einsum("in,ijn,jn->n", along, w.moment, along) / w.half**2
     bent, free, driven = _wedge_bending(S, w, flat, cells)
-    jump = _wedge_jumps(strain, S, r, w, cells)
+    jump = _wedge_jumps(strain, S, r, w, cells, flat if element == "wedge6" else None)
     right = mean + w.volume * 0.5 * cells.E * tilt - jump
-    if one_point:
+    if element == "wedge6":  # each bends right by itself
+        right, bent = right + driven, 0.0 * driven
+        spent = right + jump
+    elif element == "hex8r":
         spent = _one_point_energy(u, R, w, cells)
         right, bent = right + driven, driven
     else:
@@ -165,13 +168,15 @@ def _wedge_bending(S: Array, w: Wedges, flat: Array, cells: Cells) -> tuple[Arra
     return bent, free, driven
 
 
-def _wedge_jumps(strain: Array, S: Array, r: Array, w: Wedges, cells: Cells) -> Array:
-    """Energy in jumps of strain between wedges [J], shape (cell_count,)."""
+def _wedge_jumps(strain: Array, S: Array, r: Array, w: Wedges, cells: Cells, flat: Array | None) -> Array:
+    """Energy in jumps of strain between wedges [J], shape (cell_count,); in planes `flat` alone, if these are given."""
     ends = np.stack([strain - S, strain + S])[:, :, :, None]
     stretched = np.einsum("in,jn,kn,akn->ijan", w.normal, w.normal, w.normal, r) / w.half
     corner = (ends + stretched).transpose(1, 2, 0, 3, 4).reshape(3, 3, 6, -1)
     conn = cells.conn[:, _OWN]
     left = (corner - _nodal(corner, w.volume, conn)).reshape(3, 3, 2, 3, -1).mean(axis=3)
+    if flat is not None:
+        left = np.einsum("ijn,jkan,kln->ilan", flat, left, flat)
     theta = np.einsum("iin->n", strain)
     around = np.einsum("iian->an", _nodal(np.repeat(strain[:, :, None], 6, axis=2), w.volume, conn)).mean(axis=0)
     return w.volume * (cells.G * deviator_square(left).mean(axis=0) + 0.5 * cells.K * (theta - around) ** 2)

@@ -66,6 +66,7 @@ class Hex8i:
     """
 
     cell = "hexahedron"
+    leaves = ("wedge",)
     patches = True
     lumped_masses = staticmethod(lumped_masses)
 
