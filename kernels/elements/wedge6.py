@@ -25,15 +25,14 @@ __all__ = ["energy_kernel", "force_kernel", "kept", "stress_kernel"]
 
 
 def kept(law: Law, finite: bool) -> tuple[str, ...]:
-    """Covariant components of the inelastic part of the internal vector, and energy that its changes took [J]."""
+    """Covariant components of the inelastic part of the internal vector, and the energy that its lag took [J]."""
     return ("scalar",) * 4 if law.general or law.history else ()
 
 
 @cache
 def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
     """Its six points, of which each shows its stress at the nearest corner."""
-    t = scalars(precision)
-    R = t.real
+    R = scalars(precision).real
     Wedge6, load_shape, enriched, strain_at = shape_functions(precision, law_name, finite)
     lost = POINTS * law_functions(law_name, precision).size + 3
 
@@ -54,18 +53,18 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
 
     @wp.func
     def modes(shape: Wedge6, K: R, G: R, flag: int, history: wp.array2d(dtype=R), e: int):
-        return R(0.0), history[wp.static(lost), e]
+        return history[wp.static(lost), e], R(0.0)
 
     given = (OWN, Wedge6, load_shape, gradient, rotation, 1, corner_of)
-    return Formulation("wedge6", CORNERS, POINTS, *given, modes=modes if law_name else None, enriched=enriched)
+    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, modes=modes if law_name else None)
 
 
 @cache
 def vector_function(precision: str, law_name: str, finite: bool) -> Any:
-    """The function that changes the kept part of the internal vector by what tractions have left for it.
+    """The function that changes the kept part of the internal vector by -`loose` / 2, see `force_function`.
 
-    `left` and `loose` are those of `force_function`. The vector changes by -loose / 2, since the sum of zeta^2 over the
-    points is 2. The energy falls by half of the work of these tractions.
+    The sum of zeta^2 over the points is 2. The energy falls by half of the work of the tractions `left` in that, and
+    the flow that they drove while the vector lagged took as much.
     """
     R, vec3 = scalars(precision).real, scalars(precision).vec3
     Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
@@ -76,8 +75,8 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
         change = R(0.5) * (shape.G * loose)
         for i in range(3):
             history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
-        spent = R(0.25) * R(SIXTH) * shape.volume * wp.dot(left, loose)
-        history_out[wp.static(first + 3), e] = history_out[wp.static(first + 3), e] + spent
+        work = R(0.5) * R(SIXTH) * shape.volume * wp.dot(left, loose)
+        history_out[wp.static(first + 3), e] = history_out[wp.static(first + 3), e] + work
 
     return keep_vector
 

@@ -152,10 +152,10 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
 
 @cache
 def force_function(precision: str, law_name: str, finite: bool) -> Any:
-    """The function (shape, K, G, A, M, Mz, Mr, Ms) -> (forces on the corners [N], what is left of tractions, in d).
+    """The function (shape, K, G, A, M, Mz, Mr, Ms) -> (forces on the corners [N], tractions, A^-1 times these).
 
     M, Mz, Mr, Ms are the sums over the points of the stress and of zeta, r and s times it; A is that of Y times it
-    where strains are finite, all in Pa. The last are tractions in Pa, and A^-1 times these.
+    where strains are finite, all in Pa. The tractions are what is left of those that the internal vector relieves.
     """
     t = scalars(precision)
     R, vec3, mat33, mat53 = t.real, t.vec3, t.mat33, wp.types.matrix((5, 3), t.real)
