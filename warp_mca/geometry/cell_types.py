@@ -1,7 +1,8 @@
 """Owns the table of cell types: corners, faces, edges and the codes of file formats, for all that reads meshes.
 
 Corners are numbered as in VTK, meshio and gmsh, which agree for linear cells. A mesh stores two types, hexahedra and
-tetrahedra, and those from outside the package. Wedges and pyramids are stored as hexahedra whose corners coincide.
+tetrahedra, and those from outside the package. Wedges and pyramids are stored as hexahedra whose corners coincide; an
+element may compute them with their own corners (`physics.elements.cells.body_cells`).
 """
 
 from __future__ import annotations
