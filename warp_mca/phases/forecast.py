@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SPEED_UP = 0.65  # power of the number of threads with which elements go faster; measured on up to 16
 DOUBLE = {"cpu": 1.6, "cuda": 1.7}  # time of an element in float64 over that in mixed
-ELEMENTS = {"hex8r": 0.7, "tet4": 0.6}  # time of an element over that of hex8
+ELEMENTS = {"hex8r": 0.7, "tet4": 0.6, "wedge6": 0.7}  # time of an element over that of hex8
 SPRINGS = 0.05  # share of the greatest eigenvalue from which on contact springs are said to set the step too
 
 

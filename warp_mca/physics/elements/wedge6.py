@@ -27,61 +27,62 @@ _PATTERNS = np.array(
 _PLACE = np.array([(zeta, *rs) for zeta in (-(3.0**-0.5), 3.0**-0.5) for rs in np.eye(3)[:, 1:] / 2.0 - 1.0 / 6.0])
 _FLAT = np.column_stack([1 / 3 - _PLACE[:, 1] - _PLACE[:, 2], 1 / 3 + _PLACE[:, 1], 1 / 3 + _PLACE[:, 2]])
 _SHAPE = 0.5 * np.column_stack([(1.0 - _PLACE[:, :1]) * _FLAT, (1.0 + _PLACE[:, :1]) * _FLAT])
+_ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 _CHUNK = 5000
 
 
-def _dyads(N: Array) -> Array:
-    """Symmetric products n_k n_j of the rows of matrices, shape (3, 3, n, 3, 3)."""
-    products = np.einsum("eki,ejl->kjeil", N, N)
-    return 0.5 * (products + products.transpose(1, 0, 2, 3, 4))
+def _rows(a: Array, b: Array) -> Array:
+    """Strain a b, symmetric, of vectors: rows xx, yy, zz and twice xy, yz, xz, shape (n, 6)."""
+    return np.stack([a[:, i] * b[:, j] + (i != j) * a[:, j] * b[:, i] for i, j in _ROWS], axis=1)
 
 
-def _relief(strain: Array, n: Array, K: Array, G: Array) -> Array:
-    """What the internal vector adds to elastic strains that are linear in zeta, shape (n, 3, 3, 5, 3) both."""
-    stress = 2.0 * G[:, None, None, None] * np.einsum("eijpk,ej->eipk", strain, n)
-    stress += (K - 2.0 / 3.0 * G)[:, None, None, None] * np.einsum("eiipk,ej->ejpk", strain, n)
-    square = np.einsum("ei,ei->e", n, n)
-    share = (K + G / 3.0) / ((K + 4.0 / 3.0 * G) * square)
-    stress -= np.einsum("e,ei,ej,ejpk->eipk", share, n, n, stress)
-    d = np.einsum("e,eipk,ej->eijpk", -0.5 / (G * square), stress, n)
-    return d + d.transpose(0, 2, 1, 3, 4)
+def _gradient_rows(b: Array) -> Array:
+    """The same rows of sums of u_a b_a with gradients b, shape (n, corners, 3), for each u_a: (n, 6, corners * 3)."""
+    found = np.zeros((len(b), 6, *b.shape[1:]))
+    for row, (i, j) in enumerate(_ROWS):
+        found[:, row, :, i] += b[:, :, j]
+        if i != j:
+            found[:, row, :, j] += b[:, :, i]
+    return found.reshape(len(b), 6, -1)
 
 
-def _strains(x: Array, K: Array, G: Array) -> tuple[Array, Array]:
-    """Strain at the points for each pattern and direction, shape (n, 6, 3, 3, 5, 3), and volumes, shape (n,)."""
+def _deviator(rows: Array) -> Array:
+    found = rows.copy()
+    found[:, :3] -= rows[:, :3].mean(axis=1, keepdims=True)
+    return found
+
+
+def _stress(strain: Array, K: Array, G: Array) -> Array:
+    """Of isotropic elasticity [Pa], shape as `strain`, (n, 6, count); each shear once."""
+    found = strain * (G[:, None] * [2.0, 2.0, 2.0, 1.0, 1.0, 1.0])[..., None]
+    found[:, :3] += (K - 2.0 / 3.0 * G)[:, None, None] * strain[:, :3].sum(axis=1, keepdims=True)
+    return found
+
+
+def _strains(x: Array, K: Array, G: Array, scale: Array) -> tuple[list[tuple[float, Array]], Array]:
+    """Parts of the strain that are orthogonal over the points: weight and rows for each corner and direction, shape (n,
+    6, 18); volumes, shape (n,)."""
     p = np.einsum("pa,eai->epi", _PATTERNS, x)
-    b = np.stack(
-        [
-            np.cross(p[:, 1], p[:, 2]),
-            np.cross(p[:, 2], p[:, 0]),
-            np.cross(p[:, 0], p[:, 1]) + np.cross(p[:, 3], p[:, 4]) / 3.0,
-            np.cross(p[:, 4], p[:, 2]) / 3.0,
-            np.cross(p[:, 2], p[:, 3]) / 3.0,
-        ],
-        axis=1,
-    )
+    b = np.cross(p[:, [1, 2, 0, 4, 2]], p[:, [2, 0, 1, 2, 3]]) / np.array([1.0, 1.0, 1.0, 3.0, 3.0])[:, None]
+    b[:, 2] += np.cross(p[:, 3], p[:, 4]) / 3.0
     volume = np.einsum("ei,ei->e", b[:, 2], p[:, 2])
     b /= volume[:, None, None]
-    mean = np.einsum("ik,epj->eijpk", np.eye(3), b)
-    mean = 0.5 * (mean + mean.transpose(0, 2, 1, 3, 4))
     base = p[:, :3]
-    N = np.linalg.inv(base).transpose(0, 2, 1)
-    gamma = np.eye(5)[3:] - np.einsum("emi,epi->emp", p[:, 3:], b)
-    c1, c2 = np.einsum("emp,eki->mkepi", gamma, base)
-    y = {(k, j): dyad for k, row in enumerate(_dyads(N)) for j, dyad in enumerate(row)}
-
-    def part(*terms: tuple[Array, Array]) -> Array:
-        return sum((np.einsum("epk,eij->eijpk", factor, dyad) for factor, dyad in terms), np.zeros(mean.shape))
-
-    both, tau = c2[0] + c1[1], 0.5 * (c2[0] - c1[1])
-    even = mean + part(((c1[0] - both) / 6.0, y[0, 2]), ((c2[1] - both) / 6.0, y[1, 2]))
-    thick = part((c1[0], y[0, 0]), (c2[1], y[1, 1]), (both, y[0, 1]))
-    thick += _relief(thick, N[:, 2], K, G)
-    kappa = np.sqrt(13.5 * K / (6.0 * K + 2.0 * G))[:, None, None]
-    flat = np.stack([part((kappa * c1[2], y[2, 2]), (-tau, y[1, 2])), part((kappa * c2[2], y[2, 2]), (tau, y[0, 2]))])
-    flat -= np.einsum("meiipk,jl->mejlpk", flat, np.eye(3)) / 3.0
-    places = [even + zeta * thick + r * flat[0] + s * flat[1] for zeta, r, s in _PLACE]
-    return np.stack(places, axis=1), volume
+    r, s, z = np.linalg.inv(base).transpose(2, 0, 1)
+    gamma = (np.eye(5)[3:] - np.einsum("emi,epi->emp", p[:, 3:], b)) @ _PATTERNS * scale[:, None]
+    a1, b1, c1, a2, b2, c2 = np.einsum("ema,eki->mkeai", gamma, base).reshape(6, len(x), 1, 18)
+    rz, sz, zz, both = _rows(r, z)[..., None], _rows(s, z)[..., None], _rows(z, z)[..., None], a2 + b1
+    even = _gradient_rows(np.einsum("pa,epi->eai", _PATTERNS, b) * scale[..., None])
+    even += (rz * (a1 - both) + sz * (b2 - both)) / 6.0
+    thick = _rows(r, r)[..., None] * a1 + _rows(s, s)[..., None] * b2 + _rows(r, s)[..., None] * both
+    tractions = _gradient_rows(z[:, None])
+    stiffness = tractions.transpose(0, 2, 1) @ _stress(tractions, K, G)
+    thick -= tractions @ np.linalg.solve(stiffness, tractions.transpose(0, 2, 1) @ _stress(thick, K, G))
+    kappa, tau = np.sqrt(13.5 * K / (6.0 * K + 2.0 * G))[:, None, None], 0.5 * (a2 - b1)
+    along_r, along_s = _deviator(kappa * zz * c1 - sz * tau), _deviator(kappa * zz * c2 + rz * tau)
+    # means over the points: zeta^2 1/3, r^2 and s^2 1/18, r s -1/36
+    parts = [(1.0, even), (1.0 / 3.0, thick), (1.0 / 72.0, along_r + along_s), (1.0 / 24.0, along_r - along_s)]
+    return parts, volume
 
 
 class Wedge6:
@@ -100,15 +101,21 @@ class Wedge6:
         return (rho[:, None] / 6.0) * (det @ _SHAPE)
 
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
-        """The largest eigenvalues themselves, or norms."""
+        """Norms: of the eighth power, or coarse ones of the matrix."""
         bound = np.empty(len(x))
         for part in chunks(len(x), _CHUNK):
-            bound[part] = largest(self.stiffness(x[part], K[part], G[part], 1.0 / np.sqrt(mass[part])), coarse)
+            matrix = self.stiffness(x[part], K[part], G[part], 1.0 / np.sqrt(mass[part]))
+            size = largest(matrix, coarse=True)
+            if not coarse:
+                square = matrix / size[:, None, None]
+                square = square @ square
+                size = size * largest(square @ square, coarse=True) ** 0.25
+            bound[part] = size
         return bound
 
     def largest_eigenvalues(self, x: Array, K: Array, G: Array, mass: Array) -> Array:
         """Of the 18 x 18 problem."""
-        return self.eigenvalue_bounds(x, K, G, mass)
+        return largest(self.stiffness(x, K, G, 1.0 / np.sqrt(mass)))
 
     def stiffness(self, x: Array, K: Array, G: Array, scale: Array) -> Array:
         """Stiffness of elastic wedges [N/m], shape (element_count, 18, 18).
@@ -117,14 +124,9 @@ class Wedge6:
             x, K, G: as in `Element`.
             scale: factors on the displacements of the corners [-], shape (element_count, 6).
         """
-        strain, volume = _strains(x, K, G)
-        n = len(x)
-        found = np.einsum("egijpk,pa,ea->egijak", strain, _PATTERNS, scale, optimize=True)
-        trace = np.einsum("egiiak->egak", found).reshape(n, 6, 18)
-        flat = found.reshape(n, 54, 18)
-        stiff = 2.0 * G[:, None, None] * (flat.transpose(0, 2, 1) @ flat)
-        stiff += (K - 2.0 / 3.0 * G)[:, None, None] * (trace.transpose(0, 2, 1) @ trace)
-        return volume[:, None, None] / 6.0 * stiff
+        parts, volume = _strains(x, K, G, scale)
+        sums = (weight * (strain.transpose(0, 2, 1) @ _stress(strain, K, G)) for weight, strain in parts)
+        return volume[:, None, None] * sum(sums, np.zeros((len(x), 18, 18)))
 
     def stage(self, block: Block, X: Array, precision: str) -> ElementStage:
         """Its arrays and kernels on the current device."""
