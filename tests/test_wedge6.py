@@ -180,21 +180,16 @@ def test_a_bar_strikes_a_rigid_block(device: str, kinematics: str, tmp_path: Pat
     assert result.summary["max_plastic_strain"] > 1e-4
 
 
-def test_wedges_have_their_element_beside_others(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """In a body of all cells `hex8` computes the wedges, unless it leaves them; recorders and masses do not differ."""
+def test_wedges_have_their_element_beside_others(tmp_path: Path):
+    """In a body of all cells `hex8` computes the wedges, `hex8i` leaves them; recorders and masses do not differ."""
     cube = mixed_cube()
-    assert [block.element for block in held_of(cube, "hex8", "corotational").solver.model.blocks] == ["hex8", "tet4"]
-    named = held_of(cube, "wedge6", "corotational").solver.model
-    monkeypatch.setattr(ELEMENTS["hex8"], "leaves", ("wedge",), raising=False)
-    left = held_of(cube, "hex8", "corotational").solver.model
-    for model in (named, left):
-        assert [(b.element, b.conn.shape) for b in model.blocks] == [
-            ("hex8", (8, 9)),
-            ("tet4", (4, 4)),
-            ("wedge6", (6, 4)),
-        ]
+    of_hex8, named, left = (held_of(cube, name, "corotational").solver.model for name in ("hex8", "wedge6", "hex8i"))
+    assert [block.element for block in of_hex8.blocks] == ["hex8", "tet4"]
+    for model, first in ((named, "hex8"), (left, "hex8i")):
+        found = [(block.element, block.conn.shape) for block in model.blocks]
+        assert found == [(first, (8, 9)), ("tet4", (4, 4)), ("wedge6", (6, 4))]
     np.testing.assert_allclose(left.mass.sum(), STEEL.rho, rtol=1e-12)
-    body = mca.Body(name="cube", geometry=cube, material=STEEL, angular_velocity=(1e-3, 2e-3, 0.0))
+    body = mca.Body(name="cube", geometry=cube, material=STEEL, element="hex8i", angular_velocity=(1e-3, 2e-3, 0.0))
     scene = mca.Scene(name="free", bodies=(body,), impact=mca.ImpactPhase(duration=2e-5, output_interval=1e-5))
     mca.run(scene, recorders=(VtkHdfFile(tmp_path / "cube.vtkhdf"),))
     with h5py.File(tmp_path / "cube.vtkhdf") as file:

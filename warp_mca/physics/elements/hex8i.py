@@ -59,7 +59,7 @@ def _modes_stiffness(volume: Array, tangents: Array, K: Array, G: Array) -> Arra
 
 
 class Hex8i:
-    """See `warp_mca.kernels.elements.hex8i`; wedges and pyramids are hexahedra whose corners coincide.
+    """See `warp_mca.kernels.elements.hex8i`. Pyramids are hexahedra whose corners coincide; `wedge6` computes wedges.
 
     Attributes:
         points: 8, or 16 or 24 with two or three in each half of the third direction.
