@@ -147,6 +147,6 @@ def _check_elements(scene: Scene, meshes: Mapping[str, Mesh]) -> None:
         taken = any(len(meshes[body.name].cells[element.cell]) for body in asked if not body.rigid)
         if asked and not taken and element is not default_element(element.cell):
             names = ", ".join(body.name for body in asked)
-            cell = CELL_TYPES[element.cell].field
+            cell = CELL_TYPES[element.cell].field or element.cell
             remedy = f"it computes {cell}, of which {names} {'has' if len(asked) == 1 else 'have'} none that deform"
             raise bad_value("element", element.name, f"{remedy}; leave it out")
