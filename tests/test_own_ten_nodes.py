@@ -105,14 +105,14 @@ def test_forces_are_those_of_tet10(kinematics: str):
     np.testing.assert_allclose(own.forces(u), expected, atol=1e-13 * np.abs(expected).max())
 
 
-def striking() -> mca.Scene:
+def striking(element: str = "own_tet10") -> mca.Scene:
     """A bar of ten-node tetrahedra strikes a rigid block, and yields there."""
     metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=100e6, E_t=7e9, beta=0.3)
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(4, 1, 1)).build()
     x = box.points[:, 0] / 0.02
     box.points[:, 0] = 0.02 * (1.0 - (1.0 - x) ** 2)
     block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.02, -0.0025, -0.0025))
-    bar = {"geometry": box, "material": metal, "element": "own_tet10", "velocity": (10.0, 0.0, 0.0)}
+    bar = {"geometry": box, "material": metal, "element": element, "velocity": (10.0, 0.0, 0.0)}
     return mca.Scene(
         name="striking",
         bodies=(
