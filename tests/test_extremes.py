@@ -42,7 +42,7 @@ def fast(element: str = "hex8") -> mca.Scene:
     return replace(scene, bodies=(body,), contacts=(replace(scene.contacts[0], master=wall),), tip=tip)
 
 
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
 def test_rows_200_times_as_long_give_the_same_extremes(element, monkeypatch):
     """A single row showed a fraction of the greatest force, and no strain: the bar was free again."""
     short, long = (run(fast(element), monkeypatch, *division) for division in ((200, 6), (1, 1200)))

@@ -94,7 +94,7 @@ def test_a_block_dropped_on_a_soft_pad():
     assert figures["acceleration_cfc_max"] == pytest.approx(exact, rel=0.01)
 
 
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
 @pytest.mark.parametrize("yields", [True, False])
 def test_the_force_through_a_section_is_what_accelerates_the_other_side(element, yields):
     """Between rows of one step its trapezoidal sum is the change of momentum of the nodes on the upper side."""
