@@ -39,8 +39,9 @@ def above(impact: Impact, number: int = 0) -> np.ndarray:
     """Nodes above a section that do not lie in it."""
     ready = impact.ready[0]
     cut = ready.sensors.placed(ready.model.node_start).cuts[number]
-    _, shared = cut.interface([b.conn.T[np.isin(b.conn[0], own(cut))] for b in impact.solver.model.blocks])
-    return np.setdiff1d(own(cut)[cut.height > 0.0], shared)
+    cells = [b.conn.T[np.isin(b.conn[0], own(cut))] for b in impact.solver.model.blocks]
+    high = [c[cut.height[c - cut.first].mean(axis=1) > 0.0].ravel() for c in cells]
+    return np.setdiff1d(np.concatenate(high), cut.interface(cells)[1])
 
 
 def own(cut) -> np.ndarray:

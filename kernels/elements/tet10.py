@@ -29,8 +29,7 @@ def formulation(precision: str, law_name: str, finite: bool, name: str, pressure
 
     @wp.func
     def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
-        it, _J = load_tet10(X, u, conn, e)
-        return it
+        return load_tet10(X, u, conn, e)
 
     @wp.func
     def gradient(it: TenNodes, g: int):
@@ -151,7 +150,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
         force_out: wp.array(dtype=vec3),
     ):
         e = wp.tid()
-        it, J = load_tet10(X, u, conn, e)
+        it = load_tet10(X, u, conn, e)
         m = material[e]
         flag = int(0)
         if wp.static(plastic):
@@ -159,6 +158,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
         flows = int(flag)
         theta, pressure, volume = mean_pressure(it, law[m, 0])
         largest = R(0.0)
+        smallest = R(1.0)
         behind = R(0.0)
         f = mat103()
         sums = mat33()
@@ -166,6 +166,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
             H, cofactors, weight = point_gradient(it, g)
             strain, N, d = deviator(H)
             largest = wp.max(largest, wp.ddot(strain, strain))
+            smallest = wp.min(smallest, wp.determinant(wp.identity(n=3, dtype=R) + H))
             if wp.static(own):
                 theta = dilatation_of(H)
                 pressure = pressure_of(law[m, 0], theta)
@@ -186,7 +187,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
             if flows != flag:
                 yielded_out[e] = flows
         keep_strain(e, largest, extreme_out)
-        keep_volume(e, R(1.0) - J, extreme_out)
+        keep_volume(e, R(1.0) - smallest, extreme_out)
         f = add_common(f, sums)
         for a in range(10):
             for i in range(3):  # by components, as in `hexahedron.store_function`

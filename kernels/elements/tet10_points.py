@@ -92,8 +92,8 @@ def edge_gradient_function(precision: str) -> Any:
 
 @cache
 def tet10_functions(precision: str, finite: bool) -> tuple[Any, Any, Any]:
-    """The struct of an element; the function (X, u, conn, e) -> (struct, J in the centroid); the function (struct, g)
-    -> (displacement gradient in the rotated frame, cofactors as rows, volume) of point g."""
+    """The struct of an element; the function (X, u, conn, e) -> struct; the function (struct, g) -> (displacement
+    gradient in the rotated frame, cofactors as rows, volume) of point g."""
     t = scalars(precision)
     R, mat33, mat103 = t.real, t.mat33, t.mat103
     load_nodes, common_differences, point_differences = difference_functions(precision)
@@ -123,7 +123,7 @@ def tet10_functions(precision: str, finite: bool) -> tuple[Any, Any, Any]:
         H, _cofactors, _det = edge_gradient(x_centre, u_centre)
         W, _H = rotated(H)
         it.W = W
-        return it, wp.determinant(wp.identity(n=3, dtype=R) + H)
+        return it
 
     @wp.func
     def point_gradient(it: TenNodes, g: int):
