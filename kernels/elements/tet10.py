@@ -53,13 +53,14 @@ def formulation(precision: str, law_name: str, finite: bool, name: str, pressure
 
 @cache
 def spread_functions(precision: str) -> tuple[Any, Any]:
-    """The functions of forces on nodes f and of the sums of their causes over the points, those of corners 1 to 3.
+    """The functions of forces on nodes f and of sums over the points, for corners 1 to 3: the transpose of
+    `tet10_points`.
 
-    (f, sums, nominal stress P, cofactors, W, g) -> f and sums with those of point g; f with the forces that all points
-    cause alike: the transpose of `tet10_points`.
+    (f, sums, nominal stress P, cofactors, W, g) -> f and sums with those of point g; (f, sums, first entry, entries to
+    the next node, force_out) stores f with the forces that all points cause alike.
     """
     t = scalars(precision)
-    R, mat33, mat103 = t.real, t.mat33, t.mat103
+    R, vec3, mat33, mat103 = t.real, t.vec3, t.mat33, t.mat103
 
     @wp.func
     def add_point(f: mat103, sums: mat33, P: mat33, cofactors: mat33, W: mat33, g: int):
@@ -72,7 +73,7 @@ def spread_functions(precision: str) -> tuple[Any, Any]:
         return f, sums
 
     @wp.func
-    def add_common(f: mat103, sums: mat33):
+    def store_forces(f: mat103, sums: mat33, first: int, count: int, force_out: wp.array(dtype=vec3)):
         s0 = -(sums[0] + sums[1] + sums[2])
         f[0] = f[0] - R(CORNER) * s0
         f[1] = f[1] - R(CORNER) * sums[0]
@@ -84,9 +85,11 @@ def spread_functions(precision: str) -> tuple[Any, Any]:
         f[7] = f[7] - R(FAR) * (s0 + sums[2])
         f[8] = f[8] - R(FAR) * (sums[0] + sums[2])
         f[9] = f[9] - R(FAR) * (sums[1] + sums[2])
-        return f
+        for a in range(10):
+            for i in range(3):  # by components, as in `hexahedron.store_function`
+                force_out[first + a * count][i] = f[a, i]
 
-    return add_point, add_common
+    return add_point, store_forces
 
 
 @cache
@@ -124,7 +127,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
     t = scalars(precision)
     R, vec3, mat33, mat103 = t.real, t.vec3, t.mat33, t.mat103
     _TenNodes, load_tet10, point_gradient = tet10_functions(precision, finite)
-    add_point, add_common = spread_functions(precision)
+    add_point, store_forces = spread_functions(precision)
     plastic, mean, update = bool(law_name), form.pressure == MEAN, point.update
     own, later = not mean, point.general and mean  # pressures of points, known by themselves or behind them
     by_law = point.general
@@ -187,11 +190,9 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
             if flows != flag:
                 yielded_out[e] = flows
         keep_strain(e, largest, extreme_out)
+        smallest = smallest * wp.determinant(wp.identity(n=3, dtype=R) + it.W)  # -1 of elements turned inside out
         keep_volume(e, R(1.0) - smallest, extreme_out)
-        f = add_common(f, sums)
-        for a in range(10):
-            for i in range(3):  # by components, as in `hexahedron.store_function`
-                force_out[slot + a * count + e][i] = f[a, i]
+        store_forces(f, sums, slot + e, count, force_out)
 
     return tet10_force
 
