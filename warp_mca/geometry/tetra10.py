@@ -48,12 +48,22 @@ def edges_at(x: Array, at: Array) -> Array:
         Shape (element_count, point_count, 3, 3), float64; its determinant is six times the volume there.
     """
     found = derivatives(at)
-    return np.einsum("gaj,eai->egji", found[:, :, 1:] - found[:, :, :1], x, optimize=True)
+    differences = (found[:, :, 1:] - found[:, :, :1]).transpose(0, 2, 1)
+    return (differences.reshape(-1, len(SHARES)) @ x).reshape(len(x), len(at), 3, 3)
+
+
+def _cofactors(edges: Array) -> tuple[Array, Array]:
+    """Cross products of the edges 1 x 2, 2 x 0 and 0 x 1, shape (…, 3, 3), and determinants, shape (…)."""
+    x, y, z = np.moveaxis(edges, -1, 0)
+    after, last = [1, 2, 0], [2, 0, 1]
+    rows = [p[..., after] * q[..., last] - q[..., after] * p[..., last] for p, q in ((y, z), (z, x), (x, y))]
+    found = np.stack(rows, axis=-1)
+    return found, (edges[..., 0, :] * found[..., 0, :]).sum(axis=-1)
 
 
 def determinants(x: Array) -> Array:
     """Volumes [m^3] as weights of the four points, shape (element_count, 4); nodes x [m] as in `edges_at`."""
-    return (np.linalg.det(edges_at(x, POINTS)) / 24.0).astype(np.float64)
+    return _cofactors(edges_at(x, POINTS))[1] / 24.0
 
 
 def volumes(x: Array) -> Array:
@@ -63,10 +73,11 @@ def volumes(x: Array) -> Array:
 
 def slopes(x: Array) -> Array:
     """Gradients of L_0 to L_3 at the points [1/m], shape (element_count, 4, 4, 3); nodes x [m] as in `edges_at`."""
-    last = np.linalg.inv(edges_at(x, POINTS)).transpose(0, 1, 3, 2)
-    return np.concatenate([-last.sum(axis=2, keepdims=True), last], axis=2).astype(np.float64)
+    cofactors, determinant = _cofactors(edges_at(x, POINTS))
+    last = cofactors / determinant[..., None, None]
+    return np.concatenate([-last.sum(axis=2, keepdims=True), last], axis=2)
 
 
 def gradients(x: Array) -> Array:
     """Gradients of the shape functions at the points [1/m], shape (element_count, 4, 10, 3); x as in `edges_at`."""
-    return np.einsum("gai,egik->egak", derivatives(POINTS), slopes(x), optimize=True)
+    return derivatives(POINTS) @ slopes(x)
