@@ -14,7 +14,7 @@ import warp as wp
 
 from warp_mca.kernels.elements.formulation import MEAN, OWN, Formulation, Maker, parts_of
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
-from warp_mca.kernels.elements.tet10_points import BESIDE, CORNER, FAR, POINT, between, tet10_functions
+from warp_mca.kernels.elements.tet10_points import BESIDE, FAR, POINT, between, tet10_functions
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import keep_functions
@@ -75,16 +75,16 @@ def spread_functions(precision: str) -> tuple[Any, Any]:
     @wp.func
     def store_forces(f: mat103, sums: mat33, first: int, count: int, force_out: wp.array(dtype=vec3)):
         s0 = -(sums[0] + sums[1] + sums[2])
-        f[0] = f[0] - R(CORNER) * s0
-        f[1] = f[1] - R(CORNER) * sums[0]
-        f[2] = f[2] - R(CORNER) * sums[1]
-        f[3] = f[3] - R(CORNER) * sums[2]
         f[4] = f[4] - R(FAR) * (s0 + sums[0])
         f[5] = f[5] - R(FAR) * (sums[0] + sums[1])
         f[6] = f[6] - R(FAR) * (s0 + sums[1])
         f[7] = f[7] - R(FAR) * (s0 + sums[2])
         f[8] = f[8] - R(FAR) * (sums[0] + sums[2])
         f[9] = f[9] - R(FAR) * (sums[1] + sums[2])
+        f[0] = R(-0.5) * (f[4] + f[6] + f[7]) - s0
+        f[1] = R(-0.5) * (f[4] + f[5] + f[8]) - sums[0]
+        f[2] = R(-0.5) * (f[5] + f[6] + f[9]) - sums[1]
+        f[3] = R(-0.5) * (f[7] + f[8] + f[9]) - sums[2]
         for a in range(10):
             for i in range(3):  # by components, as in `hexahedron.store_function`
                 force_out[first + a * count][i] = f[a, i]
