@@ -126,6 +126,12 @@ def _(beyond: bool) -> list[str]:
     return told_of(elements.scattered_pressure, replace(scene, bodies=(body,)))
 
 
+@pair(elements.single_layer)
+def _(beyond: bool) -> list[str]:
+    plate = mca.Box(size=(0.06, 0.06, 0.01), divisions=(6, 6, 1 if beyond else 2))
+    return told_of(elements.single_layer, alone(plate, element="tet10_mean"))
+
+
 @pair(elements.large_strain)
 def _(beyond: bool) -> list[str]:
     return small_strain(elements.large_strain, max_strain=over(elements.large_strain, beyond))

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from warp_mca.geometry.cell_types import linear_type
+from warp_mca.geometry.quality import volumes
 from warp_mca.physics.elements.cells import body_cells, body_materials
 from warp_mca.watch.row import Context, Finished, Kind, Values, When, row
 
@@ -33,6 +35,29 @@ def scattered_pressure(c: Context, most: float) -> Iterator[Values]:
             nu = max((3.0 * K - 2.0 * G) / (6.0 * K + 2.0 * G) for K, G in moduli)
             if nu > most:
                 yield dict(body=body.name, nu=nu)
+
+
+@row(
+    "tet10_mean bends too far in walls of one layer of elements, as {share:.0%} of body {body} seems to be:",
+    "take tet10 there, or smaller cells",
+    0.5,
+    "of the volume at most, in cells whose corners all lie on the skin",
+    kind=Kind.ADVICE,
+    when=When.BEFORE,
+)
+def single_layer(c: Context, most: float) -> Iterator[Values]:
+    """Volume of such cells of bodies with these elements."""
+    for body in c.scene.bodies:
+        mesh = c.meshes[body.name]
+        if body.element == "tet10_mean" and not body.rigid:
+            inner = np.ones(len(mesh.points), dtype=bool)
+            inner[mesh.boundary[0]] = False
+            own = volumes(mesh)
+            corners = [cells[:, : linear_type(name).corners] for name, cells in mesh.cells.items()]
+            wall = np.concatenate([~inner[cells].any(axis=1) for cells in corners])
+            share = float(own[wall].sum() / own.sum())
+            if share > most:
+                yield dict(body=body.name, share=share)
 
 
 @row(
