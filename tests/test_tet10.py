@@ -255,6 +255,15 @@ def test_a_cell_that_lacks_a_node_or_shares_some_with_other_cells_is_linear(tmp_
         assert any("1 quadratic cells (tetra10) are taken as linear ones" in note for note in mesh.notes)
 
 
+def test_edges_of_a_file_that_spoil_their_cell_are_straightened(tmp_path: Path):
+    (tmp_path / "one.inp").write_text(one_cell("inp").replace("\n5, 0.5, 0.01, 0", "\n5, 0.5, 0.45, 0"))
+    mesh = mca.MeshFile(tmp_path / "one.inp").build()
+    check(mesh, "one")
+    assert any("6 edges bend so far that they spoil their cell" in note for note in mesh.notes)
+    (cell,) = mesh.others["tetra10"]
+    np.testing.assert_allclose(mesh.points[cell[4]], [0.5, 0.0, 0.0], atol=1e-12)
+
+
 # Parts of CAD files.
 
 

@@ -23,7 +23,7 @@ from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.meshio_file import read_by_meshio
 from warp_mca.geometry.nastran_file import NASTRAN_SUFFIXES, read_nastran
-from warp_mca.geometry.quadratic import with_middles_of_faces
+from warp_mca.geometry.quadratic import straightened, with_middles_of_faces
 from warp_mca.geometry.selection import Select, check_selections, with_selections
 from warp_mca.geometry.universal_file import UNIVERSAL_SUFFIXES, read_universal
 from warp_mca.geometry.vtk_file import VTK_SUFFIXES
@@ -54,7 +54,7 @@ class MeshFile:
     it knows, VTK those of its files that meshio does not. What would move, add or change nodes, cells or sets and is
     not read is refused; what else a file holds, as shells and loads, is left out with a warning (docs/parts.md).
     Tetrahedra of ten nodes keep them, unless cells of other types share some; all other quadratic cells are taken as
-    linear ones, which is a warning too.
+    linear ones, which is a warning too, as are edges that would spoil their cell, which become straight.
 
     Node sets come from the file's point sets and from its named groups of faces, edges or vertices; cell sets from
     its named groups of cells. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
@@ -101,12 +101,17 @@ class MeshFile:
             for kept in stored_types().values()
             if kept.field
         }
-        for note in notes:
-            logging.getLogger("warp_mca").warning("%s", note)
         quadratic = stored(points, cells[TETRA10.name], TETRA10.name)
         if len(quadratic):
             arrays["others"] = {TETRA10.name: quadratic}
             node_sets = with_middles_of_faces(quadratic, node_sets, len(points))
+            bent, points = points, straightened(points, quadratic)
+            if moved := int((bent != points).any(axis=1).sum()):
+                notes.append(
+                    f"{self.path}: {moved} edges bend so far that they spoil their cell, and are taken as straight"
+                )
+        for note in notes:
+            logging.getLogger("warp_mca").warning("%s", note)
         mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
         return with_selections(mesh, self.select)
 
