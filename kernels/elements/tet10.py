@@ -13,6 +13,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.formulation import MEAN, OWN, Formulation, Maker, parts_of
+from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.elements.tet10_points import BESIDE, FAR, POINT, between, tet10_functions
 from warp_mca.kernels.hardware.scalars import scalars
@@ -20,6 +21,8 @@ from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
+
+BLOCKS = 4  # of threads on a multiprocessor, at small strain in mixed precision: with 128 registers for each thread
 
 
 @cache
@@ -136,8 +139,16 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
     k = kinematics(precision, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
+    bounds = (PATCH, BLOCKS) if precision == "mixed" and not finite else None
+
     # fast math would lose the digits of ln(1 + x) of small x
-    @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
+    @wp.kernel(
+        enable_backward=False,
+        module="unique",
+        grid_stride=False,
+        launch_bounds=bounds,
+        module_options={"fast_math": not finite},
+    )
     def tet10_force(
         X: wp.array(dtype=wp.vec3d),
         conn: wp.array2d(dtype=wp.int32),
