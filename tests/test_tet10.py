@@ -313,6 +313,31 @@ def test_cad_parts_compute_with_tet10_and_with_tet4_by_choice(folder: Path, tmp_
     assert four.summary["n_nodes"] < 0.3 * result.summary["n_nodes"]
 
 
+def test_parts_and_cuts_keep_the_cells_of_sets():
+    """Of hexahedra, tetrahedra of four nodes and of ten, in each order."""
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 1, 1)).build()
+    kinds = [box, cut(box, "tet4"), cut(box, "tet10")]
+    for order in ((0, 1, 2), (2, 1, 0)):
+        items = []
+        for k in order:
+            low = kinds[k].points[kinds[k].cell(0)].mean(axis=0)[0] < 0.5
+            half = np.arange(kinds[k].cell_count // 2, dtype=np.int32) + (0 if low else kinds[k].cell_count // 2)
+            mesh = replace(kinds[k], cell_sets={"low": half.astype(np.int32)})
+            items.append(mca.Part(name=f"p{k}", geometry=mesh, at=(0.0, 0.0, 2.0 * k)))
+        whole = mca.Parts(parts=tuple(items)).build()
+        check(whole, "whole")
+        assert whole.cell_count == sum(kind.cell_count for kind in kinds)
+        for element in ("hex8", "tet4", "tet10"):
+            made = cut(whole, element) if element != "hex8" else whole
+            size = volumes(made)
+            middle = np.array([made.points[made.cell(k)[:4]].mean(axis=0) for k in range(made.cell_count)])
+            for k in range(3):
+                own = made.cell_sets[f"p{k}.low"]
+                assert size[own].sum() == pytest.approx(0.5, rel=1e-12)
+                assert np.abs(middle[own, 2] - 2.0 * k - 0.5).max() < 0.51
+            assert size[made.cell_sets["low"]].sum() == pytest.approx(1.5, rel=1e-12)
+
+
 # Contact and whole runs.
 
 

@@ -95,7 +95,7 @@ def with_middles(mesh: Mesh) -> Mesh:
     return _parted(replace(mesh, points=points, node_sets=sets), owner, tetrahedra=none, others=others)
 
 
-def _parted(mesh: Mesh, owner: Cells, **cells: Any) -> Mesh:
+def _parted(mesh: Mesh, owner: NDArray[np.integer], **cells: Any) -> Mesh:
     """The mesh with other cells in place of its own, in the order of these, of which they are parts."""
     cell_sets = {
         name: np.flatnonzero(np.isin(owner, np.arange(mesh.cell_count)[own])).astype(np.int32)
@@ -105,8 +105,8 @@ def _parted(mesh: Mesh, owner: Cells, **cells: Any) -> Mesh:
     return divided(replace(mesh, hexahedra=none, cell_sets=cell_sets, **cells), mesh, owner)
 
 
-def _cut(mesh: Mesh) -> tuple[Cells, Cells]:
-    """Corners of tetrahedra, and the cell of the mesh that each one is or is a part of, in rising order, int32.
+def _cut(mesh: Mesh) -> tuple[Cells, NDArray[np.integer]]:
+    """Corners of tetrahedra, and the cell of the mesh that each one is or is a part of, in rising order.
 
     Every quadrilateral is cut from its lowest-numbered corner, so that neighbours agree (Dompierre and others, Proc.
     8th International Meshing Roundtable, 1999).

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,7 +90,7 @@ class Parts:
                 moved = members + (first - own + counts)[kind, k]
                 for key in (f"{part.name}.{name}", name):
                     cell_sets.setdefault(key, []).append(moved)
-        cells = {
+        cells: dict[str, Any] = {
             name: np.concatenate([mesh.cells[name] + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32)
             for name in stored_types()
         }
