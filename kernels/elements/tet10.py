@@ -139,7 +139,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
     k = kinematics(precision, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
-    bounds = (PATCH, BLOCKS) if precision == "mixed" and not finite else None
+    bounds = (PATCH, BLOCKS) if precision == "mixed" and not (finite or by_law) else None
 
     # fast math would lose the digits of ln(1 + x) of small x
     @wp.kernel(
