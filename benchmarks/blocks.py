@@ -16,7 +16,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.geometry.cell_types import TETRAHEDRON
+from warp_mca.geometry.cell_types import TETRAHEDRON, linear_type
 from warp_mca.model.build import build_model
 from warp_mca.model.model import Model
 from warp_mca.model.stable_step import Elements, StableStep, stable_step
@@ -78,7 +78,7 @@ def _brick(n: int, y: float, shift: float) -> mca.Mesh:
 
 def assemble(element: str, count: int) -> Model:
     """The model with everything, of about `count` elements."""
-    n = max(2, round((count / (24 if ELEMENTS[element].cell == TETRAHEDRON.name else 4)) ** (1 / 3)))
+    n = max(2, round((count / (24 if linear_type(ELEMENTS[element].cell) is TETRAHEDRON else 4)) ** (1 / 3)))
     # the upper brick stands aside by a third of a cell, so that no node meets another
     geometry = {"lower": _brick(n, 0.0, 0.0), "upper": _brick(n, n * CELL, CELL / 3)}
     scene = mca.Scene(

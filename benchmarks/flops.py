@@ -52,7 +52,10 @@ def flops(element: str, precision: str, plastic: bool, patches: bool) -> dict[st
     import importlib
 
     patches = patches and ELEMENTS[element].patches
-    kernels = importlib.import_module(f"warp_mca.kernels.elements.{element}{'_patch' if patches else ''}")
+    module = element.removesuffix("_mean") + ("_patch" if patches else "")
+    kernels = importlib.import_module(f"warp_mca.kernels.elements.{module}")
+    if hasattr(kernels, "kernels"):  # of elements that share a module
+        kernels = kernels.kernels(element, ELEMENTS[element].mean)
     law = J2Bilinear.law if plastic else Elastic.law
     total: Counter[str] = Counter(count(kernels.force_kernel(precision, law)))
     if element == "tet4":

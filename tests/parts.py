@@ -38,7 +38,7 @@ def write_parts(folder: Path) -> None:
         for suffix in MESHES:
             gmsh.write(str(folder / f"part.{suffix}"))
         model.mesh.setOrder(2)
-        for suffix in ("msh", "unv", "bdf", "key"):
+        for suffix in ("msh", "unv", "bdf", "inp", "key"):
             gmsh.write(str(folder / f"quadratic.{suffix}"))
         gmsh.clear()
         gmsh.option.setNumber("Mesh.ElementOrder", 1)

@@ -97,7 +97,7 @@ def test_dashpots_of_faces_add_up_at_edges_and_overlapping_sets_count_once():
     assert len(every.node) == 36 - 2  # all but those inside
 
 
-@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "tet4", "tet10"])
 def test_dashpots_and_springs_around_a_ball_add_up_to_their_means(element: str):
     """Over a sphere, the mean of n n^T is I / 3: a few percent of the area is lost to flat faces."""
     ball = mca.Sphere(radius=0.01)

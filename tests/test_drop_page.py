@@ -16,7 +16,7 @@ from benchmarks.pages import page_blocks
 pytest.importorskip("pandas")
 PAGE = "tutorials/drop.md"
 DRAWING, DROP = [block for block in page_blocks(PAGE) if block.language == "python"][:2]
-READ = 'mca.Cad("bracket.step", size=7e-3)'
+READ = 'mca.Cad("bracket.step", size=10e-3)'
 CAD = {suffix: f'mca.Cad("part.{suffix}", size=12e-3, scale=1e-3)' for suffix in ("iges", "brep", "stl")}
 MESHES = {suffix: f'mca.MeshFile("part.{suffix}", scale=1e-3)' for suffix in ("msh", "unv", "bdf", "inp", "k")}
 

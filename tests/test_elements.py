@@ -12,8 +12,8 @@ from impacts import Displaced
 from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
-from warp_mca.geometry.cell_types import CELL_TYPES
-from warp_mca.geometry.degenerate import among, cell_names, stored, tetrahedral
+from warp_mca.geometry.cell_types import CELL_TYPES, TETRAHEDRON, linear_type
+from warp_mca.geometry.degenerate import among, cell_names, cut_to, stored, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.quality import check, scaled_jacobian, volumes
 from warp_mca.kernels.nodes.gather import gather_function
@@ -56,6 +56,18 @@ def settled(held: Displaced, u: np.ndarray) -> np.ndarray:
     return force
 
 
+def cut(mesh: Mesh, element: str) -> Mesh:
+    """The mesh with the cells of an element."""
+    cell = ELEMENTS[element].cell
+    return shaped(mesh, element) if cell == "wedge" else cut_to(mesh, cell)
+
+
+def cells_of(mesh: Mesh, element: str) -> np.ndarray:
+    """Nodes of its cells, shape (cell_count, corners)."""
+    kind = CELL_TYPES[ELEMENTS[element].cell]
+    return mesh.cells[kind.stored_as][:, kind.own_corners]
+
+
 def energy(held: Displaced, u: np.ndarray) -> float:
     """Elastic and hourglass energy [J]."""
     settled(held, u)
@@ -73,6 +85,7 @@ def cube() -> Mesh:
 def test_forces_are_the_slope_of_the_energy(element: str, kinematics: str, cube: Mesh):
     """At strains of 20 %, 5 % where internal vectors must not fade; small strain takes the rotation of least energy."""
     rng = np.random.default_rng(0)
+    cube = cut(cube, element)
     held = held_of(cube, element, kinematics)
     size = {"finite": 0.05 if element == "hex8i" else 0.2, "corotational": 1e-3}[kinematics]
     u = cube.points @ rng.uniform(-size, size, (3, 3)) + size * 0.3 * rng.uniform(-1, 1, cube.points.shape)
@@ -91,6 +104,7 @@ def test_forces_are_the_slope_of_the_energy(element: str, kinematics: str, cube:
 @pytest.mark.parametrize(("precision", "tolerance"), [("float64", 3e-14), ("mixed", 2e-6)])
 @pytest.mark.parametrize(("element", "kinematics"), KINDS)
 def test_rotation_leaves_no_force_and_turns_those_there_are(element, kinematics, precision, tolerance, cube: Mesh):
+    cube = cut(cube, element)
     held = held_of(cube, element, kinematics, precision)
     turn = Rotation.from_rotvec([0.9, -1.3, 0.6]).as_matrix()
     rigid = cube.points @ turn.T - cube.points + [3.0, -1.0, 2.0]
@@ -109,11 +123,12 @@ def test_patch_of_hexahedra_wedges_pyramids_and_tetrahedra(element: str, kinemat
     mesh = mixed_cube()
     check(mesh, "mixed")
     assert volumes(mesh).sum() == pytest.approx(1.0, rel=1e-12)
+    mesh = cut(mesh, element)
     gradient = 0.1 * np.array([[0.5, 0.3, -0.2], [0.1, -0.4, 0.6], [0.7, 0.2, 0.3]])
     held = held_of(mesh, element, kinematics)
     force = held.forces(mesh.points @ gradient.T)
     inner = ((mesh.points > 1e-9) & (mesh.points < 1.0 - 1e-9)).all(axis=1)
-    assert inner.sum() == 2
+    assert inner.sum() >= 2
     for block in held.solver.model.blocks:
         inner[block.conn if block.element == "wedge6" else []] = False
     assert np.abs(force[inner]).max() < 1e-13 * np.abs(force).max() * len(force)
@@ -122,12 +137,12 @@ def test_patch_of_hexahedra_wedges_pyramids_and_tetrahedra(element: str, kinemat
 @pytest.mark.parametrize("element", list(ELEMENTS))
 def test_uniform_stretch_at_finite_strain(element: str, cube: Mesh):
     """Twice as long without change of width: Cauchy stress (K + 4 G / 3) ln 2 / 2 along, from logarithmic strain."""
+    cube = cut(cube, element)
     held = held_of(cube, element, "finite")
     force = held.forces(cube.points * [1.0, 0.0, 0.0])
     K, G = STEEL.bulk_modulus, STEEL.shear_modulus
     virial = (cube.points * [2.0, 1.0, 1.0]).T @ force  # minus the Kirchhoff stress times the volume
-    cut = tetrahedral(cube) if element == "tet4" else shaped(cube, element)
-    stress = -np.diag(virial) / volumes(cut).sum()
+    stress = -np.diag(virial) / volumes(cube).sum()
     expected = np.log(2.0) * np.array([K + 4.0 * G / 3.0, K - 2.0 * G / 3.0, K - 2.0 * G / 3.0])
     np.testing.assert_allclose(stress, expected, rtol=1e-10)
 
@@ -137,6 +152,7 @@ def test_uniform_stretch_at_finite_strain(element: str, cube: Mesh):
 def test_plastic_work_of_a_stretched_block(element: str, kinematics: str, cube: Mesh):
     """Isochoric stretch in one step: dp = (2 G e - sigma_y) / (3 G + H) of the equivalent strain, by hand."""
     metal = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=200e6, E_t=10e9, beta=1.0)
+    cube = cut(cube, element)
     held = held_of(cube, element, kinematics, material=metal)
     stretch = 1.02
     if kinematics == "finite":
@@ -158,10 +174,8 @@ def test_bounds_hold_the_largest_eigenvalue(element: str):
     rng = np.random.default_rng(5)
     box = mca.Box(size=(1.0, 0.7, 1.6), divisions=(4, 4, 4)).build()
     points = box.points + rng.uniform(-0.05, 0.05, box.points.shape)
-    box = dataclasses.replace(box, points=points)
-    mesh = tetrahedral(box) if kind.cell == "tetrahedron" else shaped(box, element)
-    cells = mesh.tetrahedra if kind.cell == "tetrahedron" else mesh.hexahedra
-    x = points[cells[:, CELL_TYPES[kind.cell].own_corners]]
+    mesh = cut(dataclasses.replace(box, points=points), element)
+    x = mesh.points[cells_of(mesh, element)]
     n = len(x)
     K, G, rho = np.full(n, 175e9), np.full(n, 80e9), np.full(n, 7850.0)
     mass = kind.lumped_masses(x, rho)
@@ -170,7 +184,7 @@ def test_bounds_hold_the_largest_eigenvalue(element: str):
     assert (bound >= exact * (1.0 - 1e-12)).all()
     assert (bound <= 1.7 * exact).all()
     assert (coarse >= bound * (1.0 - 1e-12)).all()
-    assert (coarse <= 1.5 * bound).all()
+    assert (coarse <= (2.3 if kind.cell == "tetra10" else 1.5) * bound).all()
 
 
 @pytest.mark.parametrize(("element", "kinematics"), KINDS)
@@ -179,8 +193,9 @@ def test_element_eigenvalue_is_that_of_its_forces(element: str, kinematics: str)
     kind = ELEMENTS[element]
     x = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
     x = x * [1.0, 0.6, 1.3] + np.random.default_rng(2).uniform(-0.08, 0.08, x.shape)
-    if kind.cell == "tetrahedron":
+    if linear_type(kind.cell) is TETRAHEDRON:
         mesh = Mesh(x[[0, 1, 3, 4]], np.zeros((0, 8), np.int32), {}, {}, np.arange(4, dtype=np.int32)[None])
+        mesh = cut(mesh, element)
     elif kind.cell == "wedge":
         mesh = Mesh(x[[0, 1, 2, 4, 5, 6]], np.array([[0, 1, 2, 2, 3, 4, 5, 5]], np.int32))
     else:
@@ -197,8 +212,9 @@ def test_element_eigenvalue_is_that_of_its_forces(element: str, kinematics: str)
     root = np.repeat(held.solver.model.mass, 3) ** -0.5
     largest = np.linalg.eigvalsh(root[:, None] * stiffness * root)[-1]
     args = np.full(1, STEEL.bulk_modulus), np.full(1, STEEL.shear_modulus)
-    mass = kind.lumped_masses(mesh.points[None], np.full(1, STEEL.rho))
-    assert kind.largest_eigenvalues(mesh.points[None], *args, mass)[0] == pytest.approx(largest, rel=1e-5)
+    nodes = mesh.points[cells_of(mesh, element)]
+    mass = kind.lumped_masses(nodes, np.full(1, STEEL.rho))
+    assert kind.largest_eigenvalues(nodes, *args, mass)[0] == pytest.approx(largest, rel=1e-5)
 
 
 @pytest.mark.parametrize(("element", "kinematics"), [kind for kind in KINDS if kind[0] in of_hexahedra()])
@@ -239,7 +255,7 @@ def test_cells_keep_their_kind():
     padded[len(mesh.hexahedra) :, :4] = mesh.tetrahedra
     names = cell_names(padded)
     assert {name: int((names == name).sum()) for name in CELL_TYPES} == {
-        "hexahedron": 5, "wedge": 4, "pyramid": 4, "tetrahedron": 4,
+        "hexahedron": 5, "wedge": 4, "pyramid": 4, "tetrahedron": 4, "tetra10": 0,
     }  # fmt: skip
     assert scaled_jacobian(mesh).min() > 0.2
 
@@ -247,15 +263,17 @@ def test_cells_keep_their_kind():
 def test_cutting_keeps_volume_boundary_and_sets():
     mesh = mixed_cube()
     mesh = dataclasses.replace(mesh, cell_sets={"some": np.array([0, 5, mesh.cell_count - 1], np.int32)})
-    cut = tetrahedral(mesh)
-    assert not len(cut.hexahedra)
-    assert volumes(cut).sum() == pytest.approx(1.0, rel=1e-12)
-    assert volumes(cut)[cut.cell_sets["some"]].sum() == pytest.approx(
+    parted = tetrahedral(mesh)
+    assert not len(parted.hexahedra)
+    assert volumes(parted).sum() == pytest.approx(1.0, rel=1e-12)
+    assert volumes(parted)[parted.cell_sets["some"]].sum() == pytest.approx(
         volumes(mesh)[mesh.cell_sets["some"]].sum(), rel=0.01
     )
-    faces, _ = cut.boundary
+    faces, _ = parted.boundary
     assert (faces[:, 2] == faces[:, 3]).all()
-    area = 0.5 * np.linalg.norm(np.cross(*(cut.points[faces[:, k]] - cut.points[faces[:, 0]] for k in (1, 2))), axis=1)
+    area = 0.5 * np.linalg.norm(
+        np.cross(*(parted.points[faces[:, k]] - parted.points[faces[:, 0]] for k in (1, 2))), axis=1
+    )
     assert area.sum() == pytest.approx(6.0, rel=1e-12)
 
 

@@ -64,7 +64,7 @@ SHAPES = [
 
 
 @pytest.mark.parametrize(("recipe", "volume"), SHAPES)
-@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "tet4", "tet10"])
 def test_recipes_have_the_mass_of_their_shape(recipe: Any, volume: float, element: str):
     assert recipe.volume == pytest.approx(volume, rel=1e-12)
     own = weighed(recipe, element=element)

@@ -53,7 +53,7 @@ def energy_won(impact: Impact, steps: int) -> float:
 
 
 @pytest.mark.parametrize("device", DEVICES)
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
 def test_a_turned_bar_keeps_its_energy(element, device):
     """Within 1e-5 in 0.26 s, which take 130 times as many steps; heat grows with these, at an angle that stays.
 

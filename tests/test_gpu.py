@@ -140,7 +140,7 @@ def test_launches_of_many_steps_follow_each_other_without_a_record(scene):
     assert u == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
 def test_extremes_are_those_of_the_cpu_and_repeat_bit_for_bit(element):
     scene = oblique()
     scene = replace(scene, bodies=tuple(replace(body, element=element) for body in scene.bodies))
@@ -307,7 +307,7 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
             np.testing.assert_allclose(a.history.numpy(), b.history.numpy(), rtol=0, atol=10.0 * tolerance * scale)
 
 
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
 @pytest.mark.parametrize("name", ["elastic", "flows", "everything"])
 @pytest.mark.parametrize("precision", ["mixed", "float64"])
 def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkeypatch):

@@ -46,7 +46,7 @@ BALL = mca.Sphere(radius=0.01, section=4, ring=2, pole_layers=4)
 ROD = mca.Rod(radius=0.005, length=0.05, tip="flat", section=4, ring=2)
 
 
-@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "tet4", "tet10"])
 @pytest.mark.parametrize("exact", [True, False])
 @pytest.mark.parametrize(
     ("recipe", "expected", "within"),

@@ -91,6 +91,9 @@ KINDS = [
     ("hex8", "finite", 1e-6),
     ("hex8r", "corotational", 5e-3),
     ("linear_tet", "finite", 1e-6),
+    ("tet10", "corotational", 1e-2),
+    ("tet10", "finite", 1e-6),
+    ("tet10_mean", "finite", 1e-6),
 ]
 
 

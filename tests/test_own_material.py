@@ -146,7 +146,7 @@ def test_kernels_of_a_gpu_compile_for_it(kernels: ModuleType, tmp_path: Path):
 
 
 @pytest.mark.gpu
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4"])
+@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
 def test_device_gives_the_figures_of_the_cpu(element: str):
     scene = bars(metal=METAL, own=VOCE)
     scene = replace(scene, bodies=tuple(replace(body, element=element) for body in scene.bodies))

@@ -15,6 +15,7 @@ from recipes import area
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.geometry.cad import extent
+from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.quality import check, volumes
 from warp_mca.scene.model_file import load, save
 
@@ -43,7 +44,7 @@ def test_each_format_gives_the_same_part(folder: Path, suffix: str, capfd: pytes
     end = mca.Select("end", low=(LENGTH, -1.0, -1.0), high=(LENGTH, 1.0, 1.0))
     mesh = part(folder / f"part.{suffix}", select=(below, end)).build()
     check(mesh, suffix)
-    assert len(mesh.tetrahedra) == mesh.cell_count
+    assert len(mesh.cells["tetra10" if suffix in CAD else "tetrahedron"]) == mesh.cell_count
     assert volumes(mesh).sum() == pytest.approx(VOLUME, rel=1e-5)
     assert area(mesh, "below") == pytest.approx(FOOT_AREA, rel=1e-5)
     assert area(mesh, "end") == pytest.approx(4e-4, rel=1e-5)
@@ -58,13 +59,21 @@ def test_each_format_gives_the_same_part(folder: Path, suffix: str, capfd: pytes
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("suffix", ["msh", "unv", "bdf", "key"])
-def test_quadratic_tetrahedra_are_taken_as_linear_ones(folder: Path, suffix: str, caplog: pytest.LogCaptureFixture):
-    mesh = part(folder / f"quadratic.{suffix}").build()
+@pytest.mark.parametrize("suffix", ["msh", "unv", "bdf", "inp", "key"])
+def test_quadratic_tetrahedra_keep_their_nodes_or_are_taken_as_linear_ones(folder: Path, suffix: str):
+    """The foot of either has all nodes there."""
+    below = mca.Select("below", point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, -2.0))
+    mesh = part(folder / f"quadratic.{suffix}", select=(below,)).build()
     linear = part(folder / f"part.{suffix}").build()
-    assert (mesh.cell_count, len(mesh.points)) == (linear.cell_count, len(linear.points))
-    assert volumes(mesh).sum() == pytest.approx(VOLUME, rel=1e-5)
-    assert f"{mesh.cell_count} quadratic cells (tetra10) are taken as linear ones" in caplog.text
+    assert len(mesh.others["tetra10"]) == mesh.cell_count and not mesh.notes
+    cut = tetrahedral(mesh)
+    assert (cut.cell_count, len(cut.points)) == (linear.cell_count, len(linear.points))
+    for made in (mesh, cut):
+        check(made, suffix)
+        assert volumes(made).sum() == pytest.approx(VOLUME, rel=1e-5)
+        assert area(made, "below") == pytest.approx(FOOT_AREA, rel=1e-5)
+        if suffix != "bdf":
+            assert np.array_equal(made.nodes("set_1" if suffix == "key" else "foot"), made.nodes("below"))
 
 
 def test_refined_divides_the_size_and_a_changed_file_is_meshed_again(folder: Path, tmp_path: Path):
@@ -201,7 +210,9 @@ def test_run_of_a_part_prints_a_scene_that_runs(
     assert scene.bodies[0].velocity == pytest.approx((0.0, 0.0, -math.sqrt(2.0 * 9.81)))
     assert np.ptp(mca.mesh(scene)["part"].points, axis=0) == pytest.approx((0.04, 0.02, 0.04), rel=1e-5)
     short = dataclasses.replace(scene, impact=mca.ImpactPhase(duration=4e-6, output_interval=1e-6))
-    assert mca.run(short, device="cpu").F_n.max() > 0.0
+    result = mca.run(short, device="cpu")
+    assert result.F_n.max() > 0.0
+    assert result.summary["element"] == ("tet10" if Path(name).suffix[1:] in CAD else "tet4")
 
 
 def test_run_of_a_mesh_says_once_what_is_left_out(

@@ -47,7 +47,9 @@ def scene(element: str = "hex8", **impact: float) -> mca.Scene:
     )
 
 
-@pytest.mark.parametrize(("element", "interval"), [("hex8", 1e-6), ("hex8r", 1e-6), ("tet4", 1e-6), ("hex8", 1e-5)])
+@pytest.mark.parametrize(
+    ("element", "interval"), [("hex8", 1e-6), ("hex8r", 1e-6), ("tet4", 1e-6), ("tet10", 1e-6), ("hex8", 1e-5)]
+)
 def test_histories_are_the_same_bit_for_bit(element, interval):
     """Also where checks lie between two rows."""
     one, *others = [mca.run(scene(element, output_interval=interval), threads=count) for count in (1, 2, 3)]

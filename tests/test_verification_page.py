@@ -9,8 +9,8 @@ import pytest
 from benchmarks.deliberate import CATCHES, MUTATIONS, notes
 from benchmarks.measurements import FOLDER
 from benchmarks.verification import key, measure, tasks, write_page
-from warp_mca.physics.elements import of_hexahedra
 from warp_mca.verify import cases
+from warp_mca.verify.case import USUAL
 
 PAGE = (FOLDER / "verification.md").read_text(encoding="utf-8")
 CASES = cases()
@@ -22,7 +22,7 @@ def test_page_has_each_case(case):
     assert f"{case.title}. {case.reference}" in section
     assert notes()[case.name] in section
     assert case.uses_elements or "| none | mixed | " in section
-    for element in of_hexahedra() if case.uses_elements else []:
+    for element in USUAL if case.uses_elements else []:
         for precision in ("mixed", "float64"):
             assert f"| {element} | {precision} | " in section, (element, precision)
     assert "Tolerances: " in section

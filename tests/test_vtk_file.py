@@ -20,7 +20,7 @@ KINDS = {  # name of VTK's type; volume; quadratic
     "VTK_HEXAHEDRON": (1.0, False),
     "VTK_WEDGE": (1 / 2, False),
     "VTK_PYRAMID": (1 / 3, False),
-    "VTK_QUADRATIC_TETRA": (1 / 6, True),
+    "VTK_QUADRATIC_TETRA": (1 / 6, False),
     "VTK_QUADRATIC_HEXAHEDRON": (1.0, True),
     "VTK_QUADRATIC_WEDGE": (1 / 2, True),
     "VTK_QUADRATIC_PYRAMID": (1 / 3, True),

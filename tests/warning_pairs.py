@@ -118,6 +118,20 @@ def small_strain(row: Row, **kept: float) -> list[str]:
     return told(row, scene=stacked(2, 2), ledger=ledger(kept))
 
 
+@pair(elements.scattered_pressure)
+def _(beyond: bool) -> list[str]:
+    scene = alone(cube(2))
+    rubber = mca.Elastic(E=1e6, nu=0.451 if beyond else 0.4499, rho=1000.0)
+    body = replace(scene.bodies[0], element="tet10", material=rubber)
+    return told_of(elements.scattered_pressure, replace(scene, bodies=(body,)))
+
+
+@pair(elements.single_layer)
+def _(beyond: bool) -> list[str]:
+    plate = mca.Box(size=(0.06, 0.06, 0.01), divisions=(6, 6, 1 if beyond else 2))
+    return told_of(elements.single_layer, alone(plate, element="tet10_mean"))
+
+
 @pair(elements.large_strain)
 def _(beyond: bool) -> list[str]:
     return small_strain(elements.large_strain, max_strain=over(elements.large_strain, beyond))

@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.measurements import FOLDER, measured
 from benchmarks.stability.axis import Axis, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, wrong
-from warp_mca.physics.elements import ELEMENTS
+from warp_mca.verify.case import USUAL
 
 TEMPLATE = FOLDER / "stability.template.md"
 
@@ -101,7 +101,7 @@ def line(found: Cell) -> str:
 def table(item: Axis, cells: Sequence[Cell]) -> list[str]:
     """The table of an axis, of the cells that there are."""
     found = {(cell["value"], cell["element"], cell["precision"]): cell for cell in cells}
-    elements = list(item.elements or ELEMENTS)
+    elements = list(item.elements or USUAL)
     lines = ["| | " + " | ".join(elements) + " |", "|---|" + "---|" * len(elements)]
     for value in item.values:
         texts = []

@@ -18,7 +18,7 @@ from benchmarks.stability import (  # noqa: F401  (they register axes)
 )
 from benchmarks.stability.axis import AXES, Level, ordered_axes
 from benchmarks.stability.measure import PRECISIONS, Cell, cell
-from warp_mca.physics.elements import ELEMENTS
+from warp_mca.verify.case import USUAL
 
 __all__ = ["AXES", "keys", "merged", "tasks"]
 
@@ -38,7 +38,7 @@ def keys(names: Iterable[str] = (), level: Level | None = None) -> Iterator[Key]
         if level in ("quick", "full") and item.level == "long":
             continue
         for value in item.quick if level == "quick" else item.values:
-            for element in item.elements or ELEMENTS:
+            for element in item.elements or USUAL:
                 for precision in PRECISIONS:
                     yield item.name, value, element, precision
 

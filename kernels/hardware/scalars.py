@@ -18,6 +18,7 @@ class Scalars:
         vec3, mat33: three-vector and 3 x 3 matrix of it.
         mat43, mat83: one row for each edge of a direction, and one for each node of a hexahedron.
         mat63, mat73: one row for each monomial of a hexahedron that changes its volume, and for each but the constant.
+        mat103: one row for each node of a quadratic tetrahedron.
     """
 
     real: Any
@@ -27,6 +28,7 @@ class Scalars:
     mat83: Any
     mat63: Any
     mat73: Any
+    mat103: Any
 
 
 @cache
@@ -36,5 +38,5 @@ def scalars(precision: str) -> Scalars:
         real, vec3, mat33 = wp.float32, wp.vec3f, wp.mat33f
     else:
         real, vec3, mat33 = wp.float64, wp.vec3d, wp.mat33d
-    rows = (wp.types.matrix((count, 3), real) for count in (4, 8, 6, 7))
+    rows = (wp.types.matrix((count, 3), real) for count in (4, 8, 6, 7, 10))
     return Scalars(real, vec3, mat33, *rows)

@@ -12,7 +12,7 @@ import numpy as np
 from warp_mca.base.errors import RequestError, bad_value
 
 MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".fem", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
-CELLS = 12  # tetrahedra along the diagonal of a CAD part
+CELLS = 8  # ten-node tetrahedra along the diagonal of a CAD part
 SPEED = 5000.0  # of waves in metals [m/s]
 PASSES = 20  # of a wave along the part in the simulated time
 ROWS = 400  # of the history

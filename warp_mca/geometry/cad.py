@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cad_volume import solid_volumes
-from warp_mca.geometry.cell_types import TETRAHEDRON
+from warp_mca.geometry.cell_types import GMSH_ORDER, TETRA10
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.gmsh_session import allow, gmsh_session
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.quadratic import straightened
 from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.recipe import LIMIT
 from warp_mca.geometry.selection import Select, check_selections, with_selections
@@ -40,7 +41,10 @@ _KEPT = 4  # meshes that stay in memory, so that a body that is placed on a plan
 
 @dataclass(frozen=True)
 class Cad:
-    """Tetrahedra in the solids of a STEP, IGES, BREP or STL file.
+    """Ten-node tetrahedra in the solids of a STEP, IGES, BREP or STL file, of which `Body.element` "tet4" takes four.
+
+    Edges follow the curves and faces of the file, but for those of an STL file and those that would spoil their cell
+    (`quadratic.straightened`), which are straight.
 
     Node sets are the faces, by the name that gmsh reads in the file, or "face_1", "face_2", ..., and the selections;
     cell sets are the solids, by name or "solid_1", .... Faces of an STL file are parted by edges sharper than 40
@@ -128,6 +132,8 @@ def _meshed(path: str, stamp: tuple[int, int], size: float, scale: float) -> Mes
             raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
         allow(gmsh, _MESH + _reading(path) + _ELEMENT * count)
         gmsh.model.mesh.generate(3)
+        gmsh.option.setNumber("Mesh.SecondOrderLinear", float(Path(path).suffix.lower() == ".stl"))
+        gmsh.model.mesh.setOrder(2)
         return _read(gmsh.model, scale, scale**3 * solid_volumes(gmsh, path))
 
 
@@ -225,7 +231,7 @@ def _diagonal(gmsh: Any) -> float:
 def _read(model: Any, scale: float, exact: NDArray) -> Mesh:
     """Collects tetrahedra and sets of solids of these volumes [m^3]; nodes that no tetrahedron uses are left out."""
     solids = [tag for _, tag in model.getEntities(3)]
-    blocks = [model.mesh.getElementsByType(TETRAHEDRON.gmsh, tag)[1].reshape(-1, 4) for tag in solids]
+    blocks = [model.mesh.getElementsByType(TETRA10.gmsh, tag)[1].reshape(-1, TETRA10.corners) for tag in solids]
     if not all(map(len, blocks)):
         raise RequestError(
             "gmsh left a solid without tetrahedra: repair the part in the CAD program or take another size"
@@ -245,9 +251,10 @@ def _read(model: Any, scale: float, exact: NDArray) -> Mesh:
         more = np.arange(first, first + len(block))
         cell_sets[name] = np.append(cell_sets.get(name, np.zeros(0)), more).astype(np.int32)
         first += len(block)
-    cells = np.searchsorted(tags, np.concatenate(blocks)).astype(np.int32)
-    tetrahedra = stored(points, cells, TETRAHEDRON.name)
-    mesh = compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, tetrahedra))
+    cells = np.searchsorted(tags, np.concatenate(blocks)[:, list(GMSH_ORDER)]).astype(np.int32)
+    cells = stored(points, cells, TETRA10.name)
+    points = straightened(points, cells)
+    mesh = compact(Mesh(points, np.zeros((0, 8), np.int32), node_sets, cell_sets, others={TETRA10.name: cells}))
     if not len(exact):
         return mesh
     counts = list(map(len, blocks))

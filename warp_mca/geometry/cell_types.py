@@ -1,8 +1,9 @@
 """Owns the table of cell types: corners, faces, edges and the codes of file formats, for all that reads meshes.
 
-Corners are numbered as in VTK, meshio and gmsh, which agree for linear cells. A mesh stores two types, hexahedra and
-tetrahedra, and those from outside the package. Wedges and pyramids are stored as hexahedra whose corners coincide; an
-element may compute them with their own corners (`physics.elements.cells.body_cells`).
+Corners are numbered as in VTK, meshio and gmsh, which agree for linear cells; ten-node tetrahedra as in VTK and meshio.
+A mesh stores three types, hexahedra and tetrahedra of four and ten nodes, and those from outside the package. Wedges
+and pyramids are stored as hexahedra whose corners coincide; an element may compute them with their own corners
+(`physics.elements.cells.body_cells`).
 """
 
 from __future__ import annotations
@@ -72,6 +73,12 @@ class CellType:
         """Corners of each face, shape (face_count, 4), int32; triangles have their last one twice."""
         return np.array([(*face, face[-1])[:4] for face in self.faces], dtype=np.int32)
 
+    @property
+    def face_depth(self) -> float:
+        """Share of a cell's volume that lies behind a face, as in a cell whose faces have no parts [-]."""
+        own, whole = CELL_TYPES[self.stored_as], CELL_TYPES[self.linear or self.stored_as]
+        return (len(whole.faces) / len(own.faces)) ** 1.5
+
     @cached_property
     def own_corners(self) -> list[int]:
         """First corner of the stored cell at which each corner of this one stands."""
@@ -123,12 +130,32 @@ TETRAHEDRON = CellType(
     faces=((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
     edges=((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)),
     neighbours=((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
-    cut_from=("hexahedron",),
+    cut_from=("hexahedron", "tetra10"),
+)
+_MIDDLES = ((6, 5, 4), (4, 8, 7), (5, 9, 8), (6, 7, 9))  # of the edges of each face of `TETRAHEDRON`
+TETRA10 = CellType(
+    name="tetra10",
+    mirrored=(0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+    stored_as="tetra10",
+    stored_corners=tuple(range(10)),
+    vtk=24,
+    meshio="tetra10",
+    gmsh=11,
+    faces=tuple(
+        part
+        for (a, b, c), (ab, bc, ca) in zip(TETRAHEDRON.faces, _MIDDLES, strict=True)
+        for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    ),
+    edges=((0, 4), (4, 1), (1, 5), (5, 2), (2, 6), (6, 0), (0, 7), (7, 3), (1, 8), (8, 3), (2, 9), (9, 3)),
+    cut_from=("hexahedron", "tetrahedron"),
+    linear="tetrahedron",
 )
 
+GMSH_ORDER = (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)  # nodes of gmsh's ten-node tetrahedron in the order of `TETRA10`
+
 # In the order in which a mesh counts its cells.
-CELL_TYPES = {cell.name: cell for cell in (HEXAHEDRON, WEDGE, PYRAMID, TETRAHEDRON)}
-MAX_CORNERS = max(cell.corners for cell in CELL_TYPES.values())  # of linear cells
+CELL_TYPES = {cell.name: cell for cell in (HEXAHEDRON, WEDGE, PYRAMID, TETRAHEDRON, TETRA10)}
+MAX_CORNERS = max(cell.corners for cell in CELL_TYPES.values() if not cell.linear)  # of linear cells
 
 
 def stored_types() -> dict[str, CellType]:
@@ -142,9 +169,9 @@ def linear_type(name: str) -> CellType:
 
 
 # Cells with nodes within their edges, whose first nodes are the corners: meshio's name and gmsh's code of each, with
-# meshio's name of the linear cell and its number of corners.
+# meshio's name of the linear cell and its number of corners. Of these only ten-node tetrahedra are kept.
 QUADRATIC = {
-    "tetra10": (11, "tetra", 4),
+    TETRA10.meshio: (TETRA10.gmsh, "tetra", 4),
     "hexahedron20": (17, "hexahedron", 8),
     "hexahedron27": (12, "hexahedron", 8),
     "wedge15": (18, "wedge", 6),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC
+from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC, TETRA10, TETRAHEDRON
 from warp_mca.geometry.deck_rules import ELEMENTS, OTHER
 from warp_mca.geometry.markings import lie_on
 
@@ -56,9 +56,9 @@ class Deck:
             raise ValueError(f"node {number} is given twice, at {self.nodes[number]} and {place}")
 
     def add_cell(self, number: int, kind: str, nodes: list[int]) -> None:
-        """Takes a solid; of quadratic ones the corners are kept."""
+        """Takes a solid; of quadratic ones the corners are kept, of ten-node tetrahedra with all nodes these."""
         self._check_new(number)
-        if kind in QUADRATIC:
+        if kind in QUADRATIC and (kind not in _CORNERS or len(nodes) < _CORNERS[kind]):
             self.quadratic[kind] += 1
             _, kind, _ = QUADRATIC[kind]
         self.cells[number] = kind, nodes[: _CORNERS[kind]]
@@ -111,7 +111,7 @@ class Deck:
                 cell_sets[name] = [np.array([k for kind, k in found if kind == own], dtype=np.int64) for own in cells]
         points = np.array(list(self.nodes.values()), dtype=np.float64).reshape(-1, 3)
         read = meshio.Mesh(points, list(cells.items()), point_sets=point_sets, cell_sets=cell_sets)
-        return read, quadratic_notes(self.path, self.quadratic) + left_out_notes(self.path, self.left)
+        return read, quadratic_notes(self.path, self.quadratic + linear(read)) + left_out_notes(self.path, self.left)
 
     def _count_missing(self, missing: Iterable[bool]) -> None:
         if count := sum(missing):
@@ -125,6 +125,24 @@ class Deck:
             kind, place = places.get(number, ("", 0))
             if not kind or not on[kind][place]:
                 self.left[ELEMENTS, name] += 1
+
+
+def linear(read: meshio.Mesh) -> Counter[str]:
+    """Makes quadratic cells linear ones, whose corners come first in all formats. How many there were, by type.
+
+    Ten-node tetrahedra stay unless they share nodes with other solids, whose edges would not have the nodes of theirs.
+    """
+    solids = [(block.type == TETRA10.meshio, block.data) for block in read.cells if block.dim == 3]
+    ten = [np.asarray(data)[:, : TETRAHEDRON.corners].ravel() for mine, data in solids if mine]
+    rest = [np.asarray(data).ravel() for mine, data in solids if not mine]
+    mixed = bool(ten and rest) and np.isin(np.concatenate(ten), np.concatenate(rest)).any()
+    found: Counter[str] = Counter()
+    for block in read.cells:
+        if block.type in QUADRATIC and len(block.data) and (mixed or block.type != TETRA10.meshio):
+            found[block.type] += len(block.data)
+            _, block.type, corners = QUADRATIC[block.type]
+            block.data = block.data[:, :corners]
+    return found
 
 
 def left_out_notes(path: str | Path, left: Mapping[tuple[str, str], int]) -> list[str]:

@@ -84,4 +84,5 @@ def compact(mesh: Mesh) -> Mesh:
         hexahedra=index[mesh.hexahedra],
         node_sets=node_sets,
         tetrahedra=index[mesh.tetrahedra],
+        others={name: index[cells] for name, cells in mesh.others.items()},
     )

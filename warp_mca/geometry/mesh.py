@@ -15,7 +15,7 @@ from warp_mca.geometry.cell_types import stored_types
 
 @dataclass(frozen=True)
 class Mesh:
-    """A volume mesh in the frame of its body; cells are counted over the hexahedra, then the tetrahedra.
+    """A volume mesh in the frame of its body; cells are counted over hexahedra, tetrahedra, then others.
 
     Attributes:
         points: node positions [m], shape (node_count, 3), float64.
@@ -27,8 +27,8 @@ class Mesh:
         notes: what the reader of its file left out, a sentence each; a run has them among its warnings.
         volume_ratio: volume of the shape that the mesh stands for over that of its cells [-], shape (cell_count,), or
             (1,) where it is one for all cells, float64; empty where nothing is known of a shape but its cells.
-        others: node indices of cells of types from outside the package, by the type's name, each shape (cell_count,
-            corners), int32.
+        others: node indices of cells of further types by the type's name, each shape (cell_count, corners), int32:
+            "tetra10", and types from outside the package.
     """
 
     points: NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.abaqus_file import ABAQUS_SUFFIXES, read_abaqus
-from warp_mca.geometry.cell_types import CELL_TYPES, stored_types
+from warp_mca.geometry.cell_types import CELL_TYPES, TETRA10, stored_types
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.edit import compact
 from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
@@ -23,6 +23,7 @@ from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.meshio_file import read_by_meshio
 from warp_mca.geometry.nastran_file import NASTRAN_SUFFIXES, read_nastran
+from warp_mca.geometry.quadratic import straightened, with_middles_of_faces
 from warp_mca.geometry.selection import Select, check_selections, with_selections
 from warp_mca.geometry.universal_file import UNIVERSAL_SUFFIXES, read_universal
 from warp_mca.geometry.vtk_file import VTK_SUFFIXES
@@ -52,7 +53,8 @@ class MeshFile:
     Readers of our own take input files of Abaqus, Nastran and LS-DYNA, gmsh .unv, meshio .msh, .vtu and all others that
     it knows, VTK those of its files that meshio does not. What would move, add or change nodes, cells or sets and is
     not read is refused; what else a file holds, as shells and loads, is left out with a warning (docs/parts.md).
-    Quadratic cells are taken as linear ones, which is a warning too.
+    Tetrahedra of ten nodes keep them, unless cells of other types share some; all other quadratic cells are taken as
+    linear ones, which is a warning too, as are edges that would spoil their cell, which become straight.
 
     Node sets come from the file's point sets and from its named groups of faces, edges or vertices; cell sets from
     its named groups of cells. Groups are meshio's cell sets and gmsh's physical groups; a physical group without
@@ -99,13 +101,22 @@ class MeshFile:
             for kept in stored_types().values()
             if kept.field
         }
+        quadratic = stored(points, cells[TETRA10.name], TETRA10.name)
+        if len(quadratic):
+            arrays["others"] = {TETRA10.name: quadratic}
+            node_sets = with_middles_of_faces(quadratic, node_sets, len(points))
+            bent, points = points, straightened(points, quadratic)
+            if moved := int((bent != points).any(axis=1).sum()):
+                notes.append(
+                    f"{self.path}: {moved} edges bend so far that they spoil their cell, and are taken as straight"
+                )
         for note in notes:
             logging.getLogger("warp_mca").warning("%s", note)
         mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
         return with_selections(mesh, self.select)
 
     def _read(self) -> tuple[meshio.Mesh, list[str]]:
-        """The file's mesh with linear cells, and sentences about what is left out."""
+        """The file's mesh with cells of known types, and sentences about what is left out."""
         path = Path(self.path)
         try:
             found = path.is_file()

@@ -12,7 +12,7 @@ import numpy as np
 
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC
-from warp_mca.geometry.deck import ELEMENTS, left_out_notes, quadratic_notes
+from warp_mca.geometry.deck import ELEMENTS, left_out_notes, linear, quadratic_notes
 from warp_mca.geometry.markings import lie_on
 from warp_mca.geometry.vtk_file import VTK_SUFFIXES, VtkError, cell_count, read_by_vtk
 
@@ -24,11 +24,12 @@ _MARKS = {  # corners of cells that may mark faces and edges of solids
     **{"quad": 4, "quad8": 4, "quad9": 4, "quad16": 4},
 }
 
-_KNOWN = {cell.meshio for cell in CELL_TYPES.values()} | set(QUADRATIC)
+_SOLIDS = {cell.meshio for cell in CELL_TYPES.values()}
+_KNOWN = _SOLIDS | set(QUADRATIC)
 
 
 def read_by_meshio(path: Path) -> tuple[meshio.Mesh, list[str]]:
-    """The mesh of a file with linear cells, and sentences about what is left out.
+    """The mesh of a file with cells of known types, and sentences about what is left out.
 
     Raises:
         RequestError: VTK, which may read it, is not installed.
@@ -79,24 +80,12 @@ def _with_groups(read: meshio.Mesh) -> meshio.Mesh:
     return read
 
 
-def linear(read: meshio.Mesh) -> dict[str, int]:
-    """Makes quadratic cells linear ones: their corners come first in all formats. How many there were, by type."""
-    found: Counter[str] = Counter()
-    for block in read.cells:
-        if block.type in QUADRATIC:
-            found[block.type] += len(block.data)
-            _, block.type, corners = QUADRATIC[block.type]
-            block.data = block.data[:, :corners]
-    return {kind: count for kind, count in found.items() if count}
-
-
 def stray_notes(path: Path, read: meshio.Mesh) -> list[str]:
     """A sentence about surfaces and curves that do not lie on solid cells, so that they mark nothing; none without."""
-    solids = _KNOWN - set(QUADRATIC)
-    blocks = [block.data for block in read.cells if block.type in solids]
+    blocks = [block.data for block in read.cells if block.type in _SOLIDS]
     left: Counter[tuple[str, str]] = Counter()
     for block in read.cells:
-        if block.type in solids or block.type == "vertex" or not len(block.data) or block.dim == 3:
+        if block.type in _SOLIDS or block.type == "vertex" or not len(block.data) or block.dim == 3:
             continue
         corners = _MARKS.get(block.type)
         stray = len(block.data) if corners is None else int((~lie_on(block.data[:, :corners], blocks)).sum())

@@ -132,7 +132,8 @@ def _take_solid(deck: Deck, card: _Card) -> None:
         nodes.pop()
     if not corners <= len(nodes) <= most:
         raise ValueError(f"{card.name} {number} has {len(nodes)} nodes in place of {corners} or {most}")
-    deck.add_cell(number, linear if len(nodes) == corners else quadratic, [integer(n) for n in nodes[:corners]])
+    kept = nodes if all(nodes) else nodes[:corners]
+    deck.add_cell(number, linear if len(nodes) == corners else quadratic, [integer(n) for n in kept])
     deck.cell_sets.setdefault(f"part_{integer(card[1] or card[0])}", []).append(number)
 
 

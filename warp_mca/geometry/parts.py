@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.geometry.cell_types import stored_types
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.refinement import refined
 from warp_mca.geometry.shape_volume import built, of_cells, with_ratios
@@ -68,34 +69,40 @@ class Parts:
         return replace(self, parts=tuple(parts))
 
     def build(self) -> Mesh:
-        """The mesh: nodes of the parts one after the other; of the cells first all hexahedra, then all tetrahedra."""
+        """The mesh: nodes of the parts one after the other; of the cells first all hexahedra, then all tetrahedra of
+        four nodes, then others."""
         meshes = [
             part.geometry if isinstance(part.geometry, Mesh) else built(f"Part {part.name}.geometry", part.geometry)
             for part in self.parts
         ]
         nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
-        hexahedra = np.cumsum([0, *(len(mesh.hexahedra) for mesh in meshes)])
-        tetrahedra = hexahedra[-1] + np.cumsum([0, *(len(mesh.tetrahedra) for mesh in meshes)])
+        counts = np.array([[len(mesh.cells[name]) for mesh in meshes] for name in stored_types()])  # by type and part
+        first = np.cumsum(counts).reshape(counts.shape) - counts
+        own = np.cumsum(counts, axis=0)  # where the cells of each type end in their part
         node_sets: dict[str, list] = {}
         cell_sets: dict[str, list] = {}
         for k, (part, mesh) in enumerate(zip(self.parts, meshes, strict=True)):
             for name, members in mesh.node_sets.items():
                 for key in (f"{part.name}.{name}", name):
                     node_sets.setdefault(key, []).append(members + nodes[k])
-            count = len(mesh.hexahedra)
             for name, members in mesh.cell_sets.items():
-                moved = np.where(members < count, members + hexahedra[k], members - count + tetrahedra[k])
+                kind = np.searchsorted(own[:, k], members, side="right")
+                moved = members + (first - own + counts)[kind, k]
                 for key in (f"{part.name}.{name}", name):
                     cell_sets.setdefault(key, []).append(moved)
+        cells: dict[str, Any] = {
+            name: np.concatenate([mesh.cells[name] + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32)
+            for name in stored_types()
+        }
         whole = Mesh(
             np.concatenate([mesh.points + np.asarray(p.at) for p, mesh in zip(self.parts, meshes, strict=True)]),
-            np.concatenate([mesh.hexahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
-            {name: np.concatenate(items).astype(np.int32) for name, items in node_sets.items()},
-            {name: np.concatenate(items).astype(np.int32) for name, items in cell_sets.items()},
-            np.concatenate([mesh.tetrahedra + nodes[k] for k, mesh in enumerate(meshes)]).astype(np.int32),
+            node_sets={name: np.concatenate(items).astype(np.int32) for name, items in node_sets.items()},
+            cell_sets={name: np.concatenate(items).astype(np.int32) for name, items in cell_sets.items()},
+            **{kind.field: cells.pop(name) for name, kind in stored_types().items() if kind.field},
+            others={name: found for name, found in cells.items() if len(found)},
             notes=tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes)),
         )
         if not any(len(mesh.volume_ratio) for mesh in meshes):
             return whole
-        split = [np.split(of_cells(mesh), [len(mesh.hexahedra)]) for mesh in meshes]
-        return with_ratios(whole, np.concatenate([part[kind] for kind in (0, 1) for part in split]))
+        split = [np.split(of_cells(mesh), own[:-1, k]) for k, mesh in enumerate(meshes)]
+        return with_ratios(whole, np.concatenate([part[kind] for kind in range(len(own)) for part in split]))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, linear_type
-from warp_mca.geometry.integrals import INTEGRALS
+from warp_mca.geometry.integrals import integrals_of
 from warp_mca.geometry.mesh import Mesh
 
 _KEEP_ONE = "keep one of them (gmsh's format 2.2 writes a cell once for each of its physical groups, 4.1 does not)"
@@ -46,13 +46,13 @@ def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
 def gauss_jacobians(mesh: Mesh) -> list[NDArray[np.float64]]:
     """Jacobian determinants times weights [m^3] of the cells of each stored type, shape (cell_count, point_count).
 
-    Hexahedra have 2 x 2 x 2 Gauss points, tetrahedra one point.
+    Hexahedra have 2 x 2 x 2 Gauss points, tetrahedra one point, those of ten nodes four.
     """
     found = []
     for name, nodes in mesh.cells.items():
-        linear = linear_type(name)
-        cells = nodes[:, : linear.corners]
-        parts = [INTEGRALS[linear.name].determinants(mesh.points[cells[part]]) for part in chunks(len(cells), CHUNK)]
+        integrals, corners = integrals_of(name)
+        cells = nodes[:, :corners]
+        parts = [integrals.determinants(mesh.points[cells[part]]) for part in chunks(len(cells), CHUNK)]
         found.append(np.concatenate(parts) if parts else np.zeros((0, 1)))
     return found
 

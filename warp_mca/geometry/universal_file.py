@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warp_mca.geometry.cell_types import CELL_TYPES, QUADRATIC
-from warp_mca.geometry.deck import ELEMENTS, integer, left_out_notes, quadratic_notes, real
+from warp_mca.geometry.cell_types import CELL_TYPES, GMSH_ORDER, QUADRATIC, TETRA10
+from warp_mca.geometry.deck import ELEMENTS, integer, left_out_notes, linear, quadratic_notes, real
 from warp_mca.geometry.gmsh_session import gmsh_session
-from warp_mca.geometry.meshio_file import linear, stray_notes
+from warp_mca.geometry.meshio_file import stray_notes
 
 if TYPE_CHECKING:
     import meshio
@@ -132,5 +132,7 @@ def _cells(model: ModuleType, entity: tuple[int, int]) -> list[tuple[str, np.nda
             raise ValueError(f"it holds cells of the type {name}; save it with linear cells")
         name, corners = _TYPES[int(code)]
         table = np.asarray(nodes, dtype=np.int64).reshape(len(elements), -1)
+        if name == TETRA10.meshio:
+            table = table[:, list(GMSH_ORDER)]
         found.append((name, table[:, :corners] if corners else table))
     return found

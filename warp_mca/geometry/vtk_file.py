@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warp_mca.base.errors import RequestError
+from warp_mca.geometry.deck import linear
 
 if TYPE_CHECKING:
     import meshio
@@ -23,11 +24,11 @@ _CELLS: dict[int, tuple[str, tuple[int, ...]]] = {
     **{1: ("vertex", (0,)), 3: ("line", (0, 1)), 5: ("triangle", (0, 1, 2)), 9: ("quad", (0, 1, 2, 3))},
     **{8: ("quad", (0, 1, 3, 2)), 11: ("hexahedron", (0, 1, 3, 2, 4, 5, 7, 6))},  # pixel and voxel
     **{10: ("tetra", (0, 1, 2, 3)), 12: ("hexahedron", tuple(range(8))), 13: ("wedge", tuple(range(6)))},
-    14: ("pyramid", tuple(range(5))),
+    **{14: ("pyramid", tuple(range(5))), 24: ("tetra10", tuple(range(10)))},
 }
 _QUADRATIC = {
     **{21: 3, 35: 3, 68: 3, 22: 5, 34: 5, 69: 5, 23: 9, 28: 9, 30: 9, 70: 9},
-    **{24: 10, 71: 10, 25: 12, 29: 12, 33: 12, 72: 12, 26: 13, 31: 13, 32: 13, 73: 13, 27: 14, 37: 14, 74: 14},
+    **{71: 10, 25: 12, 29: 12, 33: 12, 72: 12, 26: 13, 31: 13, 32: 13, 73: 13, 27: 14, 37: 14, 74: 14},
 }
 _TIME, _TIME_PER_BYTE = 20.0, 5e-5  # that VTK may take to start and to read [s], many times what it takes
 _SCRIPT = Path(__file__).with_name("vtk_process.py")
@@ -50,7 +51,8 @@ def cell_count(path: Path) -> int | None:
 
 
 def read_by_vtk(path: Path) -> tuple[meshio.Mesh, dict[str, int]]:
-    """The cells of a file by their corners, and the number of quadratic ones and of higher order by meshio's name.
+    """The cells of a file by their corners, ten-node tetrahedra by all nodes, and the number of quadratic ones and of
+    higher order that lost theirs, by meshio's name.
 
     Raises:
         RequestError: VTK is not installed.
@@ -79,7 +81,8 @@ def read_by_vtk(path: Path) -> tuple[meshio.Mesh, dict[str, int]]:
         cells.append((kind, nodes[starts[own][:, None] + np.array(corners)]))
         groups.append(grid["physical"][own] if "physical" in grid else own)
     data: dict[str, Any] = {"gmsh:physical": groups} if "physical" in grid else {}
-    return meshio.Mesh(grid["points"].astype(np.float64), cells, cell_data=data), quadratic
+    read = meshio.Mesh(grid["points"].astype(np.float64), cells, cell_data=data)
+    return read, quadratic | linear(read)
 
 
 def _grid(path: Path) -> dict[str, np.ndarray]:

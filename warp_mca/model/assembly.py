@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
+from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
@@ -77,6 +78,7 @@ class Assembly:
         cells: the elements by formulation and strain measure.
         materials: those of the scene; `material` is each element's index among them.
         K, G: moduli [Pa] of each element; rho: its density [kg/m^3], see `densities`; volume: of its mesh [m^3].
+        face_depth: of the type of each element, as `CellType.face_depth` [-], shape (element_count,).
         rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
         mass: lumped masses [kg], shape (node_count,).
         relief: divisor of each node's mass in eigenvalues [-], shape (node_count,), see `TiedNodes.relief`; None
@@ -107,12 +109,13 @@ class Assembly:
         self.K = np.array([m.bulk_modulus for m in self.materials])[self.material]
         self.G = np.array([m.shear_modulus for m in self.materials])[self.material]
         self.rho = np.concatenate([densities(body, meshes[body.name]) for body in scene.bodies])
-        self.volume = np.empty(elements)
+        self.volume, self.face_depth = np.empty(elements), np.ones(elements)
         self.mass = np.zeros(nodes)
         self.element_mass = []
         for part in self.cells:
             mass = element_masses(part, self.X, self.rho)
             self.volume[part.index] = mass.sum(axis=1) / self.rho[part.index]
+            self.face_depth[part.index] = CELL_TYPES[part.element.cell].face_depth
             self.element_mass.append(mass)
             self.mass += sum_to_nodes(part.conn, mass, nodes)
 
@@ -208,7 +211,7 @@ class Assembly:
         node, element = self.meshes[surface.body].surface(surface.nodes)
         node = (node + self.node_start[surface.body]).astype(np.int32)
         element = (element + self.element_start[surface.body]).astype(np.int32)
-        return make_faces(self.X, node, element, self.K, self.G, self.volume)
+        return make_faces(self.X, node, element, self.K, self.G, self.volume * self.face_depth)
 
     def nearest(self, point: Point | None) -> int:
         """Node nearest to a point, or GROUND.

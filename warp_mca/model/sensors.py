@@ -13,6 +13,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
 from warp_mca.geometry.boxes import cell_boxes
+from warp_mca.geometry.cell_types import linear_type
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
 from warp_mca.physics.elements.cells import nodal_masses
@@ -109,11 +110,12 @@ def locate_sensors(scene: Scene, meshes: Mapping[str, Mesh]) -> Sensors:
 def _around(probe: Probe, mesh: Mesh) -> Spot:
     """The corners of the cell around a point, with its shape functions there as weights."""
     at = np.array([probe.at], dtype=np.float64)
-    found = [
-        LOCATE[name](at, mesh.points, cells, cell_boxes(mesh.points, cells))
-        for name, cells in mesh.cells.items()
-        if len(cells)
-    ]
+    found = []
+    for name, cells in mesh.cells.items():
+        if len(cells):
+            linear = linear_type(name)
+            corners = cells[:, : linear.corners]
+            found.append(LOCATE[linear.name](at, mesh.points, corners, cell_boxes(mesh.points, corners)))
     corner, weight, apart, allowed = min(found, key=lambda cell: float(cell[2][0] - cell[3][0]))
     if apart[0] > allowed[0]:
         remedy = f"this point lies {apart[0]:.3g} m outside the body {probe.body}; give one of it, in its own frame"

@@ -149,6 +149,6 @@ def _check_elements(scene: Scene, meshes: Mapping[str, Mesh]) -> None:
         usual = element is default_element(kind.name) and kind.stored_as == kind.name
         if asked and not usual and not any(among(cells, kind.name).any() for cells in stored):
             names = ", ".join(body.name for body in asked)
-            cell = kind.field or f"{kind.name}s"
+            cell = kind.field or (kind.name if kind.stored_as == kind.name else f"{kind.name}s")
             remedy = f"it computes {cell}, of which {names} {'has' if len(asked) == 1 else 'have'} none that deform"
             raise bad_value("element", element.name, f"{remedy}; leave it out")

@@ -32,8 +32,9 @@ class Body:
         geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
         material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
         element: formulation of its hexahedra, wedges and pyramids: "hex8" fully integrated, "hex8r" one point with
-            hourglass stiffness; "tet4" cuts them to tetrahedra. "wedge6" computes wedges alone. In bodies of other
-            elements, tetrahedra are tet4, and wedges are wedge6 unless hex8 or hex8r is named.
+            hourglass stiffness. "tet4", "tet10" and "tet10_mean" cut all cells to tetrahedra of four or ten nodes, and
+            "tet4" takes the corners of ten-node ones. "wedge6" computes wedges alone. In bodies of other elements
+            tetrahedra are tet4 and tet10, and wedges are wedge6 unless hex8 or hex8r is named.
         kinematics: "corotational" takes strains as small, in the rotated frame; "finite" as logarithmic, for large
             plastic deformation.
         position: of the body frame's origin [m].

@@ -16,6 +16,7 @@ import warp_mca as mca
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
 
+USUAL = ("hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
 Level = Literal["quick", "full"]
 T = TypeVar("T")
 

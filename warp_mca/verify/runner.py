@@ -9,10 +9,9 @@ from pathlib import Path
 
 from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.files import check_folder
-from warp_mca.physics.elements import of_hexahedra
 from warp_mca.step.device import check_device
 from warp_mca.verify import cases
-from warp_mca.verify.case import Case, Level, Setup
+from warp_mca.verify.case import USUAL, Case, Level, Setup
 from warp_mca.verify.report import Outcome, lines, write
 
 
@@ -49,7 +48,7 @@ def verify(
     Args:
         names: of cases or groups; all by default.
         device, precision: as in `warp_mca.run`.
-        element: formulation of every body; each in turn if None.
+        element: formulation of every body; those of `case.USUAL` in turn if None.
         level: of the meshes.
         out: folder for verification.md and its figure.
 
@@ -61,7 +60,7 @@ def verify(
     check_device(device)
     if out is not None:
         check_folder("out", out)
-    elements = [element] if element else of_hexahedra()
+    elements = [element] if element else list(USUAL)
     outcomes = []
     for case in chosen:
         for item in elements if case.uses_elements else elements[:1]:

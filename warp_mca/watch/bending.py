@@ -193,6 +193,8 @@ class Kinds(NamedTuple):
         """What makes a body of such cells bend right: hex8r only where nothing yields."""
         layers = "four or more cells over the thickness, no longer than deep"
         if self.jump:
+            if self.elements == {"tet4"}:
+                return "choose tet10, or smaller cells"
             turned = "let axes of wedges go through the wall, " if "wedge6" in self.elements else ""
             return f"{turned}choose smaller cells, or hexahedra, {layers if self.yields else 'with hex8r'}"
         return f"take {layers}" if self.yields else f"choose hex8r, or {layers}"

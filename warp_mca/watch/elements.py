@@ -1,4 +1,5 @@
-"""Owns the rows about elements of a run: large strains taken as small, and pressure that rounding shakes up."""
+"""Owns the rows about elements: nearly incompressible material, large strains taken as small, pressure that rounding
+shakes up."""
 
 from __future__ import annotations
 
@@ -7,11 +8,56 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from warp_mca.watch.row import Finished, Values, row
+from warp_mca.geometry.cell_types import linear_type
+from warp_mca.geometry.quality import volumes
+from warp_mca.physics.elements.cells import body_cells, body_materials
+from warp_mca.watch.row import Context, Finished, Kind, Values, When, row
 
 ROUNDING = 1.4 * 2.0**-24  # of dilatation in float32 in each step, over the strain; measured, see docs/decisions.md
 STRAIN = 0.1  # taken as small, from which on stresses are off by a tenth of themselves
 _SMALL = "the co-rotational element takes strains as small, expect stresses off by as much"
+
+
+@row(
+    "pressures of tet10 in body {body} scatter by a third where Poisson's ratio is {nu:.4g}:",
+    "take element='tet10_mean' for walls of two layers of elements or more, which bends too far in one layer",
+    0.45,
+    "at most",
+    kind=Kind.ADVICE,
+    when=When.BEFORE,
+)
+def scattered_pressure(c: Context, most: float) -> Iterator[Values]:
+    """Poisson's ratio of bodies with such elements."""
+    for body in c.scene.bodies:
+        mesh = c.meshes[body.name]
+        if not body.rigid and any(part.element.name == "tet10" for part in body_cells(body, mesh)):
+            moduli = [(item.bulk_modulus, item.shear_modulus) for item, _ in body_materials(body, mesh)]
+            nu = max((3.0 * K - 2.0 * G) / (6.0 * K + 2.0 * G) for K, G in moduli)
+            if nu > most:
+                yield dict(body=body.name, nu=nu)
+
+
+@row(
+    "tet10_mean bends too far in walls of one layer of elements, as {share:.0%} of body {body} seems to be:",
+    "take tet10 there, or smaller cells",
+    0.5,
+    "of the volume at most, in cells whose corners all lie on the skin",
+    kind=Kind.ADVICE,
+    when=When.BEFORE,
+)
+def single_layer(c: Context, most: float) -> Iterator[Values]:
+    """Volume of such cells of bodies with these elements."""
+    for body in c.scene.bodies:
+        mesh = c.meshes[body.name]
+        if body.element == "tet10_mean" and not body.rigid:
+            inner = np.ones(len(mesh.points), dtype=bool)
+            inner[mesh.boundary[0]] = False
+            own = volumes(mesh)
+            corners = [cells[:, : linear_type(name).corners] for name, cells in mesh.cells.items()]
+            wall = np.concatenate([~inner[cells].any(axis=1) for cells in corners])
+            share = float(own[wall].sum() / own.sum())
+            if share > most:
+                yield dict(body=body.name, share=share)
 
 
 @row(

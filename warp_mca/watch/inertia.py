@@ -14,13 +14,13 @@ import numpy as np
 
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.rotation import mean_pose
-from warp_mca.geometry.cell_types import HEXAHEDRON, linear_type
-from warp_mca.geometry.hexahedron import CORNERS, determinants, shape_functions
+from warp_mca.geometry import hexahedron, tetra10, tetrahedron
+from warp_mca.geometry.cell_types import HEXAHEDRON, TETRA10, TETRAHEDRON, linear_type
+from warp_mca.geometry.hexahedron import CORNERS, shape_functions
 from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.shape_volume import of_cells
-from warp_mca.geometry.tetrahedron import volumes as tetrahedron_volumes
 from warp_mca.model.assembly import GROUND
-from warp_mca.physics.elements.cells import densities
+from warp_mca.physics.elements.cells import body_cells, densities
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.watch.row import Array, Finished, Values, row
 
@@ -95,20 +95,17 @@ def inertias(body: Body, mesh: Mesh) -> tuple[Array, Array]:
     shape's volume over that of the cells.
     """
     rho = densities(body, mesh)
-    mass, first, exact, lumped, start = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 0
+    mass, first, exact, lumped = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     middle = mesh.points.mean(axis=0)
-    for name, conn in mesh.cells.items():
-        linear = linear_type(name)
-        for part in chunks(len(conn), CHUNK):
-            x, density = mesh.points[conn[part, : linear.corners]] - middle, rho[start : start + len(conn)][part]
-            place, weight = _points(x, linear is HEXAHEDRON)
+    for cells in body_cells(body, mesh):
+        for part in chunks(len(cells.conn), CHUNK):
+            x, density = mesh.points[cells.conn[part]] - middle, rho[cells.index[part]]
+            place, weight = _points(x, cells.element.cell)
             weight = weight * density[:, None]
-            nodal = weight @ (_AT_GAUSS if linear is HEXAHEDRON else np.full((4, 4), 0.25))
             mass += weight.sum()
             first += np.einsum("ep,epi->i", weight, place)
             exact += np.einsum("ep,epi,epj->ij", weight, place, place)
-            lumped += np.einsum("en,eni,enj->ij", nodal, x, x)
-        start += len(conn)
+            lumped += np.einsum("en,eni,enj->ij", cells.element.lumped_masses(x, density), x, x)
     centred = np.outer(first, first) / mass
     plain = rho / of_cells(mesh) if body.exact_mass else rho
     own = plain * volumes(mesh)
@@ -205,10 +202,11 @@ def _inertia(square: Array) -> Array:
     return np.trace(square) * np.eye(3) - square
 
 
-def _points(x: Array, hexahedra: bool) -> tuple[Array, Array]:
-    """Integration points [m] and weights [m^3] of cells with corners x, exact for squares in bricks and tetrahedra."""
-    if hexahedra:
-        return _AT_GAUSS @ x, determinants(x)
-    near, far = (5.0 + 3.0 * np.sqrt(5.0)) / 20.0, (5.0 - np.sqrt(5.0)) / 20.0  # Hammer, Marlowe and Stroud 1956
-    share = np.full((4, 4), far) + (near - far) * np.eye(4)
-    return share @ x, np.repeat(tetrahedron_volumes(x)[:, None] / 4.0, 4, axis=1)
+def _points(x: Array, cell: str) -> tuple[Array, Array]:
+    """Integration points [m] and weights [m^3] of cells with nodes x, exact for squares in bricks and tetrahedra."""
+    if linear_type(cell) is HEXAHEDRON:
+        return _AT_GAUSS @ x, hexahedron.determinants(x)
+    if cell == TETRA10.name:
+        return tetra10.shape_functions(tetra10.POINTS) @ x, tetra10.determinants(x)
+    corners = x[:, : TETRAHEDRON.corners]
+    return tetra10.POINTS @ corners, np.repeat(tetrahedron.volumes(corners)[:, None] / 4.0, 4, axis=1)

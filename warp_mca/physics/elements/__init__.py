@@ -8,10 +8,12 @@ from warp_mca.physics.elements.hex8 import Hex8
 from warp_mca.physics.elements.hex8i import Hex8i
 from warp_mca.physics.elements.hex8r import Hex8r
 from warp_mca.physics.elements.tet4 import Tet4
+from warp_mca.physics.elements.tet10 import Tet10
 from warp_mca.physics.elements.wedge6 import Wedge6
 from warp_mca.scene.elements import ELEMENTS
 
-ELEMENTS |= {element.name: element for element in (Hex8(), Hex8i(), Hex8r(), Tet4(), Wedge6())}
+_ALL = (Hex8(), Hex8i(), Hex8r(), Tet4(), Tet10(), Tet10(mean=True), Wedge6())
+ELEMENTS |= {element.name: element for element in _ALL}
 
 __all__ = ["ELEMENTS", "Element", "default_element", "of_hexahedra"]
 

@@ -88,7 +88,7 @@ def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
     for name, conn in mesh.cells.items():
         if len(conn):
             if name in CELL_TYPES[own.cell].cut_from:
-                remedy = f"its mesh holds {CELL_TYPES[name].field}; pass meshes through warp_mca.mesh"
+                remedy = f"its mesh holds {CELL_TYPES[name].field or name}; pass meshes through warp_mca.mesh"
                 raise bad_value(f"Body {body.name}.element", body.element, remedy)
             index = np.arange(first, first + len(conn), dtype=np.int32)
             first += len(conn)
