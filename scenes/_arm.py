@@ -69,7 +69,7 @@ def _bodies(
 ) -> tuple[mca.Body, ...]:
     """The rods, the last one with its tip, and the plate."""
     *inner, last = (
-        mca.Body(name=link, geometry=rod, material=materials["body"], exact_mass=False)
+        mca.Body(name=link, geometry=rod, element="hex8", material=materials["body"], exact_mass=False)
         for link, rod in zip(links, rods, strict=True)  # published figures of these scenes are of the mass of its cells
     )
     tip = replace(last, material={"body": materials["body"], "tip": materials["tip"]})
@@ -177,6 +177,7 @@ def arm(
     ground = mca.Body(
         name="plate",
         geometry=plate,
+        element="hex8",
         material=materials["plate"],
         position=(0.0, -H, 0.0),
         velocity=(v_plate, 0.0, 0.0),

@@ -48,6 +48,7 @@ def build(
             mca.Body(
                 name="bar",
                 geometry=rod,
+                element="hex8",
                 material=metal,
                 kinematics=measure,
                 velocity=(v, 0.0, 0.0),

@@ -31,10 +31,11 @@ class Body:
         name: unique in the scene.
         geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
         material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
-        element: formulation of its hexahedra, wedges and pyramids: "hex8" fully integrated, "hex8r" one point with
-            hourglass stiffness. "tet4", "tet10" and "tet10_mean" cut all cells to tetrahedra of four or ten nodes, and
-            "tet4" takes the corners of ten-node ones. "wedge6" computes wedges alone. In bodies of other elements
-            tetrahedra are tet4 and tet10, and wedges are wedge6 unless hex8 or hex8r is named.
+        element: formulation of its hexahedra, wedges and pyramids: "hex8i" bends right with one cell over a wall; "hex8",
+            the paper's, does not; "hex8r", the cheapest, has one point and hourglass stiffness. "tet4", "tet10" and
+            "tet10_mean" cut all cells to tetrahedra of four or ten nodes, and "tet4" takes the corners of ten-node
+            ones. "wedge6" computes wedges alone. In bodies of other elements tetrahedra are tet4 and tet10, and wedges
+            are wedge6 unless hex8 or hex8r is named.
         kinematics: "corotational" takes strains as small, in the rotated frame; "finite" as logarithmic, for large
             plastic deformation.
         position: of the body frame's origin [m].
@@ -53,7 +54,7 @@ class Body:
     name: str
     geometry: Recipe | Mesh
     material: Material | Mapping[str, Material]
-    element: str = "hex8"
+    element: str = "hex8i"
     kinematics: Literal["corotational", "finite"] = "corotational"
     position: Vec3 = (0.0, 0.0, 0.0)
     rotation: Vec3 = (0.0, 0.0, 0.0)

@@ -28,6 +28,7 @@ from warp_mca.base.files import check_folder, write_atomically
 from warp_mca.base.validate import DAMAGE
 from warp_mca.geometry import Mesh
 from warp_mca.scene import Scene
+from warp_mca.scene.bodies import Body
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.contact_laws import CONTACT_LAWS
 from warp_mca.scene.joints import JOINTS
@@ -258,7 +259,10 @@ def _decoded(value: object, arrays: Mapping[str, NDArray]) -> Any:
     if "$array" in value:
         return arrays[f"array{value['$array']}"]
     members = {key: _decoded(item, arrays) for key, item in value.items() if key not in ("$type", "$module")}
-    return _named(value["$type"], value.get("$module"))(**members) if "$type" in value else members
+    if "$type" not in value:
+        return members
+    made = _named(value["$type"], value.get("$module"))
+    return made(**({"element": "hex8"} | members if made is Body else members))  # what it was when files left it out
 
 
 def _same(one: object, other: object) -> bool:

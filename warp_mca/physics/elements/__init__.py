@@ -12,7 +12,7 @@ from warp_mca.physics.elements.tet10 import Tet10
 from warp_mca.physics.elements.wedge6 import Wedge6
 from warp_mca.scene.elements import ELEMENTS
 
-_ALL = (Hex8(), Hex8i(), Hex8r(), Tet4(), Tet10(), Tet10(mean=True), Wedge6())
+_ALL = (Hex8i(), Hex8(), Hex8r(), Tet4(), Tet10(), Tet10(mean=True), Wedge6())
 ELEMENTS |= {element.name: element for element in _ALL}
 
 __all__ = ["ELEMENTS", "Element", "default_element", "of_hexahedra"]
