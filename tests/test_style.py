@@ -21,6 +21,7 @@ STRUCTS = {  # classes of arrays that kernels take whole
     for path in KERNEL_FILES
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
     if isinstance(node, ast.ClassDef) and any(ast.unparse(mark) == "wp.struct" for mark in node.decorator_list)
+    if any(isinstance(field, ast.AnnAssign) and "wp.array" in ast.unparse(field.annotation) for field in node.body)
 }
 
 
@@ -80,6 +81,8 @@ def written(function: ast.FunctionDef) -> set[str]:
             for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
                 parts = target.elts if isinstance(target, ast.Tuple) else [target]
                 found |= {root(part) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)}
+                if isinstance(target, ast.Attribute) and root(target).endswith("_out"):  # a struct of outputs
+                    found.add(root(node.value))
         if isinstance(node, ast.Call):
             name = ast.unparse(node.func)
             places = [0] if name.startswith("wp.atomic") else outputs_of_functions().get(name, [])
