@@ -33,7 +33,10 @@ class Body:
         material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
         element: formulation of its hexahedra, wedges and pyramids: "hex8" fully integrated, "hex8r" one point with
             hourglass stiffness; "tet4" cuts them to tetrahedra. In bodies of other elements,
-            tetrahedra are tet4.
+            tetrahedra are tet4. "hex8i" bends right with one layer of cells; for walls of one layer that yield, "hex8w"
+            has two points in each half of the thickness, "hex8w3" three.
+        across: direction through the wall in the body's frame [-], for "hex8w" and "hex8w3"; None: found from the mesh,
+            as the cells lie on the surface.
         kinematics: "corotational" takes strains as small, in the rotated frame; "finite" as logarithmic, for large
             plastic deformation.
         position: of the body frame's origin [m].
@@ -60,6 +63,7 @@ class Body:
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
     rigid: bool = False
     exact_mass: bool = True
+    across: Vec3 | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -76,6 +80,8 @@ class Body:
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         validate.choice(f"Body {self.name}", ("corotational", "finite"), kinematics=self.kinematics)
+        if self.across is not None:
+            self._check_across(self.across)
         validate.flags(f"Body {self.name}", rigid=self.rigid, exact_mass=self.exact_mass)
         validate.vectors(
             f"Body {self.name}",
@@ -84,6 +90,16 @@ class Body:
             velocity=self.velocity,
             angular_velocity=self.angular_velocity,
         )
+
+    def _check_across(self, across: Vec3) -> None:
+        turned = [name for name, element in ELEMENTS.items() if hasattr(element, "oriented")]
+        if self.element not in turned:
+            raise bad_value(
+                f"Body {self.name}.across",
+                across,
+                f"{self.element} has no direction through a wall; leave it out or choose {' or '.join(turned)}",
+            )
+        validate.directions(f"Body {self.name}", across=across)
 
     def place_on(self, plane: RigidPlane, gap: float = 0.0) -> Body:
         """The body moved along the normal of a plane until its lowest node lies `gap` [m] above; it is meshed for it.

@@ -6,10 +6,13 @@ from warp_mca.physics.elements.element import Element
 from warp_mca.physics.elements.hex8 import Hex8
 from warp_mca.physics.elements.hex8i import Hex8i
 from warp_mca.physics.elements.hex8r import Hex8r
+from warp_mca.physics.elements.hex8w import Hex8w
 from warp_mca.physics.elements.tet4 import Tet4
 from warp_mca.scene.elements import ELEMENTS
 
-ELEMENTS |= {element.name: element for element in (Hex8(), Hex8i(), Hex8r(), Tet4())}
+ELEMENTS |= {
+    element.name: element for element in (Hex8(), Hex8i(), Hex8r(), Hex8w("hex8w", 16), Hex8w("hex8w3", 24), Tet4())
+}
 
 __all__ = ["ELEMENTS", "Element", "default_element"]
 

@@ -90,7 +90,10 @@ def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
                 remedy = f"its mesh holds {CELL_TYPES[name].field}; pass meshes through warp_mca.mesh"
                 raise bad_value(f"Body {body.name}.element", body.element, remedy)
             index = np.arange(first, first + len(conn), dtype=np.int32)
-            found.append(Cells(own if name == own.cell else default_element(name), finite, conn, index))
+            element = own if name == own.cell else default_element(name)
+            if hasattr(element, "oriented"):
+                conn = element.oriented(body, mesh, conn, index)
+            found.append(Cells(element, finite, conn, index))
             first += len(conn)
     return found
 

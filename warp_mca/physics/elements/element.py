@@ -26,6 +26,7 @@ class Element(Protocol):
         patches: whether its stage may compute compact patches of elements, so that the model orders them that way.
         one_rate: may be left out; True where forces depend on neighbouring elements too, so that all of a block take
             the same step.
+        oriented: may be left out; as `Hex8w.oriented`, where the order of the corners of cells matters.
     """
 
     name: str
