@@ -166,7 +166,9 @@ def test_a_module_that_cannot_be_imported_is_refused(name: str, words: str, caps
 
 def test_an_unknown_element_is_refused(capsys: pytest.CaptureFixture[str]):
     assert main(["run", "block.py", "--element", "hex20"]) == 2
-    assert capsys.readouterr().err.startswith("warp-mca: error: --element = 'hex20': choose among hex8, ")
+    assert capsys.readouterr().err.startswith(
+        f"warp-mca: error: --element = 'hex20': choose among {', '.join(ELEMENTS)}"
+    )
 
 
 def test_resume_imports_what_the_user_names_again(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

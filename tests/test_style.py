@@ -81,6 +81,8 @@ def written(function: ast.FunctionDef) -> set[str]:
             for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
                 parts = target.elts if isinstance(target, ast.Tuple) else [target]
                 found |= {root(part) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)}
+                if isinstance(target, ast.Attribute) and root(target).endswith("_out"):  # a struct of outputs
+                    found.add(root(node.value))
         if isinstance(node, ast.Call):
             name = ast.unparse(node.func)
             places = [0] if name.startswith("wp.atomic") else outputs_of_functions().get(name, [])

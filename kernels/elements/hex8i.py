@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.elements import hex8i_points
 from warp_mca.kernels.elements.formulation import OWN, Formulation
-from warp_mca.kernels.elements.hex8i_small import plastic_tractions_function, stress_function
+from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
 from warp_mca.kernels.elements.patterns import corner_force_function, pattern_functions, pattern_strain_function
@@ -39,8 +39,9 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
     frame = mode_functions(precision).frame
     keep_strain, keep_volume, strain_square = keep_functions(R)
     by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
-    of_points = hex8i_points.stress_function(precision, law_name, finite, points)
-    small_stress = stress_function(precision, law_name, points)
+    points_stress = hex8i_points.stress_function(precision, law_name, finite, points)
+    elastic_stress = elastic_function(precision, points)
+    flow_stress = stress_function(precision, law_name, points) if plastic else None
 
     # fast math would lose the digits of ln(1 + x) of small x
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -65,18 +66,18 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
         y = frame(x)
         m = material[e]
         if wp.static(by_points):
-            P, Q, largest = of_points(x, volume, H, q, y, e, m, law, dt, yielded_out, history_out)
+            P, Q, largest = points_stress(x, volume, H, q, y, e, m, law, dt, yielded_out, history_out)
             keep_strain(e, largest, extreme_out)
         else:
             if wp.static(plastic):
                 flag = yielded_out[e]
-                P, Q, largest, flows = small_stress(
+                P, Q, largest, flows = flow_stress(
                     x, volume, H, q, y, law[m, 0], law[m, 1], e, m, flag, law, history_out
                 )
                 if flows and flag == 0:
                     yielded_out[e] = 1
             else:
-                P, Q, largest = small_stress(x, volume, H, q, y, law[m, 0], law[m, 1])
+                P, Q, largest = elastic_stress(x, volume, H, q, y, law[m, 0], law[m, 1])
             keep_strain(e, strain_square(largest, law[m, 1]), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)
         f = corner_forces(x, b, volume, W, P, Q)
@@ -102,7 +103,15 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
 
     @wp.struct
     class Hex8i:
-        """Patterns x, amplitudes q, volume [m^3], W = Q - I, mean gradient H, and parts L, N that vary."""
+        """A loaded element.
+
+        Attributes:
+            x, q: patterns of the positions [m], amplitudes of the displacements, see `patterns`.
+            volume: [m^3].
+            W, H: rotation less I, mean displacement gradient [-].
+            L0, L1, L2: parts of the gradient that are linear in a natural coordinate [-].
+            N0, N1, N2: parts with the product of the two others [-].
+        """
 
         x: mat73
         q: mat43

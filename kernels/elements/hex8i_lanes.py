@@ -1,7 +1,4 @@
-"""Owns how four lanes of a GPU compute an element of `hex8i` that yields, each a column of its points.
-
-Bits 0 and 1 of a lane are xi and eta of its corners and points.
-"""
+"""Owns how four lanes of a GPU compute an element of `hex8i` that yields, each a column of its points."""
 
 from functools import cache
 from typing import Any
@@ -10,17 +7,14 @@ import warp as wp
 
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hex8_lanes import HISTORY_SIZE
-from warp_mca.kernels.elements.hex8i_small import (
-    conjugate_function,
-    settled_function,
-    stress_modes_function,
-)
-from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
+from warp_mca.kernels.elements.hex8i_exchange import lane_functions
+from warp_mca.kernels.elements.hex8i_small import conjugate_function, settled_function, stress_modes_function
+from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, place_functions
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, shared_functions, warp_barrier
+from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, warp_barrier
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.extremes import keep_functions
 
@@ -28,30 +22,8 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def keep_function(precision: str) -> Any:
-    """The function (H, q, W, lane, force_out) that keeps what lanes need of an element in the place of its forces.
-
-    Twelve rows of amplitudes, six of H + H^T, and two rows of W = Q - I, of which the third follows.
-    """
-    t = scalars(precision)
-    R, mat33, mat43 = t.real, t.mat33, t.mat43
-    doubled_gradient = mode_functions(precision).doubled_gradient
-
-    @wp.func
-    def keep(H: mat33, q: mat43, W: mat33, lane: int, force_out: wp.array(dtype=R)):
-        D = doubled_gradient(H)
-        for i in range(12):
-            force_out[i * wp.static(ROW) + lane] = q[i // 3, i % 3]
-        for i in range(6):
-            force_out[(12 + i) * wp.static(ROW) + lane] = D[i]
-            force_out[(18 + i) * wp.static(ROW) + lane] = W[i // 3, i % 3]
-
-    return keep
-
-
-@cache
 def kept_function(precision: str) -> Any:
-    """The function (lane, pool) -> (H, q, W) that `keep_function` kept; of H the symmetric part."""
+    """The function (lane, pool) -> (H, q, W) that `hex8i_patch.keep_function` kept; of H the symmetric part."""
     t = scalars(precision)
     R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
 
@@ -78,82 +50,6 @@ def kept_function(precision: str) -> Any:
         return H, q, W
 
     return kept
-
-
-@cache
-def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
-    """Functions over the four lanes of an element, each of which knows its signs xi and eta.
-
-    They take its lower and upper corners to the patterns of all; a tensor to its sums over the lanes, by itself and
-    times xi, eta and xi eta; and a vector and a scalar to their sum and maximum.
-    """
-    t = scalars(precision)
-    R, vec3, mat73 = t.real, t.vec3, t.mat73
-    tensor = wp.types.vector(6, R)
-    _, exchange = shared_functions(precision)
-
-    @wp.func
-    def other(x: vec3, mask: int):
-        return vec3(exchange(x[0], mask), exchange(x[1], mask), exchange(x[2], mask))
-
-    @wp.func
-    def patterns(lower: vec3, upper: vec3, xi: R, eta: R):
-        s = upper + lower
-        d = upper - lower
-        s1 = other(s, 1)
-        d1 = other(d, 1)
-        ss = s + s1
-        sx = xi * (s - s1)
-        ds = d + d1
-        dx = xi * (d - d1)
-        ss1 = other(ss, 2)
-        sx1 = other(sx, 2)
-        ds1 = other(ds, 2)
-        dx1 = other(dx, 2)
-        p = mat73()
-        p[0] = sx + sx1
-        p[1] = eta * (ss - ss1)
-        p[2] = ds + ds1
-        p[3] = eta * (ds - ds1)
-        p[4] = dx + dx1
-        p[5] = eta * (sx - sx1)
-        p[6] = eta * (dx - dx1)
-        return p
-
-    @wp.func
-    def sums(S: tensor, xi: R, eta: R):
-        total = tensor()
-        along = tensor()
-        across = tensor()
-        both = tensor()
-        for i in range(6):
-            if i != 2:  # zz of a traceless tensor follows
-                s = exchange(S[i], 1)
-                a = S[i] + s
-                b = xi * (S[i] - s)
-                a1 = exchange(a, 2)
-                b1 = exchange(b, 2)
-                total[i] = a + a1
-                across[i] = eta * (a - a1)
-                along[i] = b + b1
-                both[i] = eta * (b - b1)
-        total[2] = -total[0] - total[1]
-        across[2] = -across[0] - across[1]
-        along[2] = -along[0] - along[1]
-        both[2] = -both[0] - both[1]
-        return total, along, across, both
-
-    @wp.func
-    def vector_sum(x: vec3):
-        x = x + other(x, 1)
-        return x + other(x, 2)
-
-    @wp.func
-    def lane_max(value: R):
-        value = wp.max(value, exchange(value, 1))
-        return wp.max(value, exchange(value, 2))
-
-    return patterns, sums, vector_sum, lane_max
 
 
 @cache
@@ -221,21 +117,76 @@ def column_functions(points: int, precision: str, law_name: str) -> tuple[Any, A
 
 
 @cache
+def sums_function(precision: str) -> Any:
+    """The function that sums the stress over the lanes.
+
+    (Lane's sum and moment of the stress, pressures that are linear in the coordinates, y, xi and eta of the lane's
+    corners, K, G) -> (mean; parts of the stress that are linear in a coordinate, what `settled_function` leaves of
+    them; their pressures; w of `conjugate_function`).
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    tensor = wp.types.vector(6, R)
+    _, sums, _, _ = lane_functions(precision)
+    settled, product = settled_function(precision), mode_functions(precision).product
+
+    @wp.func
+    def lane_sums(total: tensor, moment: tensor, p: vec3, y: mat33, right: R, far: R, K: R, G: R):
+        plane = R(PLANE)
+        mean, R0, R1, M2 = sums(total, right, far)
+        R2, M1, M0, _both = sums(moment, right, far)
+        third = R(THIRD)
+        R0, p0 = settled(plane * R0, third * p[0], y[0], K, G)
+        R1, p1 = settled(plane * R1, third * p[1], y[1], K, G)
+        R2, p2 = settled(R2, third * p[2], y[2], K, G)
+        w = vec3(
+            plane * wp.dot(y[0], product(M0, y[0])),
+            plane * wp.dot(y[1], product(M1, y[1])),
+            third * wp.dot(y[2], product(M2, y[2])),
+        )
+        return mean, R0, R1, R2, vec3(p0, p1, p2), w
+
+    return lane_sums
+
+
+@cache
+def corners_function(precision: str) -> Any:
+    """The function that gives the sums over the corners of a lane, and over them with the sign of zeta, of the forces.
+
+    (Patterns x, gradients b, volume, W = Q - I, mean stress P, hourglass forces Q, xi and eta of the corners) ->
+    (base, top), of which the upper corner has -base - top, the lower one top - base.
+    """
+    t = scalars(precision)
+    R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
+    add_product = fused(precision).add_product
+
+    @wp.func
+    def lane_corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43, right: R, far: R):
+        for n in range(4):  # amplitudes depend on the mean gradient, too
+            P = P - wp.outer((R(1.0) / volume) * Q[n], x[3 + n])
+        P = R(VOLUME_SCALE) * P
+        # patterns of the forces, as the signs of the lane's corners add them
+        both = right * far
+        base = add_product(both * Q[2], P, right * b[0] + far * b[1] + both * b[5])
+        top = add_product(far * Q[0] + right * Q[1] + both * Q[3], P, b[2] + far * b[3] + right * b[4])
+        return add_product(base, W, base), add_product(top, W, top)
+
+    return lane_corner_forces
+
+
+@cache
 def flow_function(points: int, precision: str, law_name: str) -> Any:
     """The function by which four lanes compute an element of a patch."""
-    t = scalars(precision)
-    R, vec3 = t.real, t.vec3
-    point = POINT[precision]
+    R, point = scalars(precision).real, POINT[precision]
     _, _, load_corners = load_functions(precision)
-    patterns, sums, vector_sum, lane_max = lane_functions(precision)
+    patterns, _, vector_sum, lane_max = lane_functions(precision)
     column_place, _ = place_functions(precision, points)
     plastic_parts, flow_column = column_functions(points, precision, law_name)
     modes = mode_functions(precision)
-    frame, product, whole = modes.frame, modes.product, modes.whole
+    frame, whole = modes.frame, modes.whole
     stress_modes, conjugate = stress_modes_function(precision), conjugate_function(precision)
-    settled, kept = settled_function(precision), kept_function(precision)
+    lane_sums, corner_forces, kept = sums_function(precision), corners_function(precision), kept_function(precision)
     mean_gradients, _ = mean_functions(precision)
-    add_product = fused(precision).add_product
     size = points // 4 * HISTORY_SIZE
     read_row, write_row = row_functions(precision, size)
     keep_strain, _, strain_square = keep_functions(R)
@@ -283,31 +234,11 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         flows = flows and valid
         if flows:
             write_row(history, wp.static(size) * lane, e, history_out)
-        plane = R(wp.static(3.0**-0.5))
-        mean, R0, R1, M2 = sums(total, right, far)
-        R2, M1, M0, _both = sums(moment, right, far)
-        third = R(THIRD)
-        R0, p0 = settled(plane * R0, third * p[0], y[0], K, G)
-        R1, p1 = settled(plane * R1, third * p[1], y[1], K, G)
-        R2, p2 = settled(R2, third * p[2], y[2], K, G)
-        w = vec3(
-            plane * wp.dot(y[0], product(M0, y[0])),
-            plane * wp.dot(y[1], product(M1, y[1])),
-            third * wp.dot(y[2], product(M2, y[2])),
-        )
+        mean, R0, R1, R2, p, w = lane_sums(total, moment, p, y, right, far, K, G)
         b, scaled_volume = mean_gradients(x)
         volume = R(VOLUME_SCALE) * scaled_volume
-        Q = conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w)
-        P = whole(mean, pressure)
-        for n in range(4):  # amplitudes depend on the mean gradient, too
-            P = P - wp.outer((R(1.0) / volume) * Q[n], x[3 + n])
-        P = R(VOLUME_SCALE) * P
-        # patterns of the forces, as the signs of the lane's corners add them
-        both = right * far
-        base = add_product(both * Q[2], P, right * b[0] + far * b[1] + both * b[5])
-        top = add_product(far * Q[0] + right * Q[1] + both * Q[3], P, b[2] + far * b[3] + right * b[4])
-        base = add_product(base, W, base)
-        top = add_product(top, W, top)
+        Q = conjugate(x, volume, y, R0, R1, R2, p, w)
+        base, top = corner_forces(x, b, volume, W, whole(mean, pressure), Q, right, far)
         if valid:
             for i in range(3):
                 force_out[(3 * a + i) * wp.static(ROW) + thread] = top[i] - base[i]

@@ -2,19 +2,43 @@
 
 from functools import cache, partial
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.hex8i_lanes import flow_function, keep_function
+from warp_mca.kernels.elements.hex8i_lanes import flow_function
 from warp_mca.kernels.elements.hex8i_small import elastic_function
 from warp_mca.kernels.elements.internal_modes import mode_functions
 from warp_mca.kernels.elements.patch_element import pattern_load_functions, sum_functions
 from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
 from warp_mca.kernels.elements.patterns import corner_force_function, pattern_strain_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.shared_memory import ROW
 from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def keep_function(precision: str) -> Any:
+    """The function (H, q, W, lane, force_out) that keeps what lanes need of an element in the place of its forces.
+
+    Twelve rows of amplitudes, six of H + H^T, and two rows of W = Q - I, of which the third follows.
+    """
+    t = scalars(precision)
+    R, mat33, mat43 = t.real, t.mat33, t.mat43
+    doubled_gradient = mode_functions(precision).doubled_gradient
+
+    @wp.func
+    def keep(H: mat33, q: mat43, W: mat33, lane: int, force_out: wp.array(dtype=R)):
+        D = doubled_gradient(H)
+        for i in range(12):
+            force_out[i * wp.static(ROW) + lane] = q[i // 3, i % 3]
+        for i in range(6):
+            force_out[(12 + i) * wp.static(ROW) + lane] = D[i]
+            force_out[(18 + i) * wp.static(ROW) + lane] = W[i // 3, i % 3]
+
+    return keep
 
 
 @cache
@@ -45,7 +69,7 @@ def element(points: int, precision: str, law_name: str) -> PatchElement:
         lane: int,
         law: wp.array2d(dtype=R),
         yielded_out: wp.array(dtype=wp.int32),
-        history_out: wp.array2d(dtype=R),
+        _history: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
         listed_out: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=R),

@@ -104,47 +104,37 @@ def varying_function(precision: str, finite: bool) -> Any:
 
 
 @cache
-def stress_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
-    """The function that gives mean nominal stress P, hourglass forces Q and greatest e : e of an element."""
-    t = scalars(precision)
-    R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
-    modes, varying = mode_functions(precision), varying_function(precision, finite)
-    solve, twice, whole, normal = modes.solve, modes.twice, modes.whole, modes.normal
+def sums_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
+    """The function that goes through the points of an element: stress sums, greatest e : e and S : S, new flag.
+
+    Sums of w_g P: by themselves; times each natural coordinate; times the product of the two others.
+    """
+    R, mat33 = scalars(precision).real, scalars(precision).mat33
     column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
-    read_vectors, write_vectors = vector_functions(precision, law_name, points)
     point = material_point(precision, law_name, finite, points)
-    plastic, general, update = bool(law_name), point.general, point.update
+    general, update = point.general, point.update
     k = kinematics(precision, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
     @wp.func
-    def relaxing(s: vec3, y: vec3, inverse: mat33, K: R, G: R):
-        """The part of a stress moment, elastic in s y, whose traction is what the moment has left; conjugate to L."""
-        D = twice(s, y)
-        return whole(G * D, (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2])) * wp.transpose(inverse)
-
-    @wp.func
-    def points_stress(
-        x: mat73,
-        volume: R,
+    def point_sums(
         H: mat33,
-        q: mat43,
-        y: mat33,
+        L0: mat33,
+        L1: mat33,
+        L2: mat33,
+        N0: mat33,
+        N1: mat33,
+        N2: mat33,
         e: int,
         m: int,
+        flag: int,
         law: wp.array2d(dtype=R),
         dt: R,
-        yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
     ):
         K = law[m, 0]
         G = law[m, 1]
-        flag = int(0)
-        if wp.static(plastic):
-            flag = yielded_out[e]
         flag_new = flag
-        c, share = read_vectors(history_out, e)
-        F, inverse, Y, a, L0, L1, L2, N0, N1, N2, last, z = varying(x, H, q, y, c, share, K, G)
         mean = mat33()
         R0 = mat33()
         R1 = mat33()
@@ -183,20 +173,71 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
             M0 = M0 + eta * moment
             M1 = M1 + xi * moment
             M2 = M2 + (xi * eta) * total
+        return mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new
+
+    return point_sums
+
+
+@cache
+def stress_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
+    """The function that gives mean nominal stress P, hourglass forces Q and greatest e : e of an element."""
+    t = scalars(precision)
+    R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
+    modes, varying = mode_functions(precision), varying_function(precision, finite)
+    solve, twice, whole, normal = modes.solve, modes.twice, modes.whole, modes.normal
+    read_vectors, write_vectors = vector_functions(precision, law_name, points)
+    point_sums, plastic = sums_function(precision, law_name, finite, points), bool(law_name)
+    fades = finite and not law_functions(law_name, precision).general
+
+    @wp.func
+    def relaxing(s: vec3, y: vec3, inverse: mat33, K: R, G: R):
+        """The part of a stress moment, elastic in s y, whose traction is what the moment has left; conjugate to L."""
+        D = twice(s, y)
+        return whole(G * D, (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2])) * wp.transpose(inverse)
+
+    @wp.func
+    def kept_share(stress2: R, G: R):
+        kept = R(1.0)
+        if wp.static(fades):
+            kept = (R(FADED) - R(0.5) * wp.sqrt(stress2) / G) * R(wp.static(1.0 / (FADED - FADING)))
+            kept = wp.clamp(kept, R(0.0), R(1.0))
+        return kept
+
+    @wp.func
+    def points_stress(
+        x: mat73,
+        volume: R,
+        H: mat33,
+        q: mat43,
+        y: mat33,
+        e: int,
+        m: int,
+        law: wp.array2d(dtype=R),
+        dt: R,
+        yielded_out: wp.array(dtype=wp.int32),
+        history_out: wp.array2d(dtype=R),
+    ):
+        K = law[m, 0]
+        G = law[m, 1]
+        flag = int(0)
+        if wp.static(plastic):
+            flag = yielded_out[e]
+        c, share = read_vectors(history_out, e)
+        F, inverse, Y, a, L0, L1, L2, N0, N1, N2, last, z = varying(x, H, q, y, c, share, K, G)
+        mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new = point_sums(
+            H, L0, L1, L2, N0, N1, N2, e, m, flag, law, dt, history_out
+        )
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
         s0 = solve(F * (wp.transpose(R0) * Y[0]), Y[0], K, G)
         s1 = solve(F * (wp.transpose(R1) * Y[1]), Y[1], K, G)
         s2 = solve(F * (wp.transpose(R2) * Y[2]), Y[2], K, G)
-        kept = R(1.0)
-        if wp.static(finite and not general):
-            kept = (R(FADED) - R(0.5) * wp.sqrt(stress2) / G) * R(wp.static(1.0 / (FADED - FADING)))
-            kept = wp.clamp(kept, R(0.0), R(1.0))
         three = R(3.0) * wp.transpose(F)
         c[0] = c[0] - three * s0
         c[1] = c[1] - three * s1
         c[2] = c[2] - three * s2
+        kept = kept_share(stress2, G)
         write_vectors(history_out, e, kept * c, kept)
         D0 = normal(y[0])
         D1 = normal(y[1])

@@ -168,13 +168,11 @@ def elastic_function(precision: str, points: int) -> Any:
 
 @cache
 def stress_function(precision: str, law_name: str, points: int) -> Any:
-    """The function that gives mean stress P, hourglass forces Q and the greatest elastic S : S / 2 of an element.
+    """The function that gives mean stress P, hourglass forces Q, greatest elastic S : S / 2 and whether points flow.
 
-    Where there is a law, all points take its return map. The internal vectors come before, with the plastic strain of
+    All points take the return map of the law. The internal vectors come before, with the plastic strain of
     the step before: in closed form, and the forces lag by one step's flow.
     """
-    if not law_name:
-        return elastic_function(precision, points)
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
     tensor = wp.types.vector(6, R)

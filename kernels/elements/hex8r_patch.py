@@ -36,7 +36,7 @@ def element(precision: str, law_name: str) -> PatchElement:
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
-        listed_out: wp.array(dtype=wp.int32),
+        _listed: wp.array(dtype=wp.int32),
         force_out: wp.array(dtype=R),
     ):
         b, volume, W, H, J, q = shape_and_strain(x, du)

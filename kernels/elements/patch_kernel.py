@@ -51,7 +51,8 @@ class PatchElement:
         compute: (points, displacements, e, m, lane, law, yielded_out, history_out, extreme_out, listed_out, force_out);
             stores the element's forces, or lists it.
         prepare: (points, displacements, e, lane, extreme_out, force_out); stores what lanes need of a thread's element.
-        flow: computes an element that may yield by `lanes` threads, see `hex8_lanes`; None where `compute` does it all.
+        flow: computes an element that may yield by several threads, see `hex8_lanes`; None where `compute` does it all.
+        lanes: how many threads `flow` takes [-].
     """
 
     name: str

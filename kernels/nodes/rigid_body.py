@@ -28,7 +28,7 @@ def load_function(own: Kind) -> Any:
     vec3, total_force = scalars(own.precision).vec3, total_force_function(own)
 
     @wp.func
-    def load(
+    def load_body(
         b: int,
         lane: int,
         kick: wp.float64,
@@ -57,7 +57,7 @@ def load_function(own: Kind) -> Any:
             poses_out.momentum[b] = poses_out.momentum[b] + kick * (sum_F + weight)
             poses_out.spin[b] = poses_out.spin[b] + kick * sum_T
 
-    return load
+    return load_body
 
 
 @wp.func
@@ -98,7 +98,7 @@ def advance_kernel(own: Kind) -> Any:
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. impulse_out
     takes the impulses of joints, see `constraint.bound_kernel`.
     """
-    vec3, load = scalars(own.precision).vec3, load_function(own)
+    vec3, load_body = scalars(own.precision).vec3, load_function(own)
 
     @wp.kernel(enable_backward=False, module="unique")
     def advance_rigid(
@@ -121,7 +121,7 @@ def advance_kernel(own: Kind) -> Any:
         size = rows.begin[k + 1] - begin
         for place in range(rows.body[k], rows.body[k + 1]):
             b = rows.member[place]
-            load(b, lane, kick, bodies, nodes, force, state_out.nodal_force, poses_out, step_out)
+            load_body(b, lane, kick, bodies, nodes, force, state_out.nodal_force, poses_out, step_out)
             if lane == 0:
                 find_motion(b, bodies, span, poses_out, step_out)
         for p in range(rows.pins[k], rows.pins[k + 1]):

@@ -11,7 +11,7 @@ import warp as wp
 from warp_mca.kernels.nodes.cluster import Clusters
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import move_pin, pin_lightness
-from warp_mca.kernels.nodes.symmetric import solve
+from warp_mca.kernels.nodes.symmetric import solve_factorised
 
 SOLVES = 50  # steps of Newton's method at most
 
@@ -198,7 +198,7 @@ def satisfy(
         if worst == wp.float64(0.0) or (step > 0 and worst >= best):
             break
         best = worst
-        solve(rows.entry[k], end - begin, begin, step_out.matrix, step_out.value)
+        solve_factorised(rows.entry[k], end - begin, begin, step_out.matrix, step_out.value)
         give_impulses(begin, end, counts, rows, poses_out, impulse_out, step_out)
         for place in range(rows.body[k], rows.body[k + 1]):
             find_motion(rows.member[place], bodies, span, poses_out, step_out)

@@ -30,7 +30,9 @@ def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
 
 
 @wp.func
-def solve(first: int, size: int, begin: int, matrix: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64)):
+def solve_factorised(
+    first: int, size: int, begin: int, matrix: wp.array(dtype=wp.float64), value_out: wp.array(dtype=wp.float64)
+):
     """Solve for the right-hand side in value_out[begin:]; dependent rows get 0."""
     for i in range(size):
         x = value_out[begin + i]

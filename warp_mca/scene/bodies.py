@@ -31,11 +31,14 @@ class Body:
         name: unique in the scene.
         geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
         material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
-        element: formulation of its hexahedra, wedges and pyramids: "hex8i" bends right with one cell over a wall; "hex8",
-            the paper's, does not; "hex8r", the cheapest, has one point and hourglass stiffness. "tet4", "tet10" and
-            "tet10_mean" cut all cells to tetrahedra of four or ten nodes, and "tet4" takes the corners of ten-node
+        element: formulation of its hexahedra, wedges and pyramids: "hex8i" bends right with one cell over a wall;
+            "hex8", the paper's, does not; "hex8r", the cheapest, has one point and hourglass stiffness. For walls of
+            one cell that yield, "hex8w" has two points in each half of the thickness, "hex8w3" three. "tet4", "tet10"
+            and "tet10_mean" cut all cells to tetrahedra of four or ten nodes, and "tet4" takes the corners of ten-node
             ones. "wedge6" computes wedges alone. In bodies of other elements tetrahedra are tet4 and tet10, and wedges
             are wedge6 unless hex8 or hex8r is named.
+        across: direction through the wall in the body's frame [-], for "hex8w" and "hex8w3"; None: found from the mesh,
+            as the cells lie on the surface.
         kinematics: "corotational" takes strains as small, in the rotated frame; "finite" as logarithmic, for large
             plastic deformation.
         position: of the body frame's origin [m].
@@ -62,6 +65,7 @@ class Body:
     angular_velocity: Vec3 = (0.0, 0.0, 0.0)
     rigid: bool = False
     exact_mass: bool = True
+    across: Vec3 | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -78,6 +82,8 @@ class Body:
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         validate.choice(f"Body {self.name}", ("corotational", "finite"), kinematics=self.kinematics)
+        if self.across is not None:
+            self._check_across(self.across)
         validate.flags(f"Body {self.name}", rigid=self.rigid, exact_mass=self.exact_mass)
         validate.vectors(
             f"Body {self.name}",
@@ -86,6 +92,16 @@ class Body:
             velocity=self.velocity,
             angular_velocity=self.angular_velocity,
         )
+
+    def _check_across(self, across: Vec3) -> None:
+        turned = [name for name, element in ELEMENTS.items() if hasattr(element, "oriented")]
+        if self.element not in turned:
+            raise bad_value(
+                f"Body {self.name}.across",
+                across,
+                f"{self.element} has no direction through a wall; leave it out or choose {' or '.join(turned)}",
+            )
+        validate.directions(f"Body {self.name}", across=across)
 
     def place_on(self, plane: RigidPlane, gap: float = 0.0) -> Body:
         """The body moved along the normal of a plane until its lowest node lies `gap` [m] above; it is meshed for it.

@@ -169,7 +169,7 @@ def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
     digest = hashlib.sha256()
     for body in scene.bodies:
         key = body.name, body.geometry, _elastic(body), body.element, body.kinematics, body.rigid, body.exact_mass
-        _feed(digest, key)
+        _feed(digest, (*key, body.across))
     for contact in scene.contacts:
         _feed(digest, _contact_key(contact))
     _feed(digest, (scene.refine, impact.time_step_scale, impact.mass_scaling))

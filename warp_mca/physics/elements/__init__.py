@@ -7,12 +7,14 @@ from warp_mca.physics.elements.element import Element
 from warp_mca.physics.elements.hex8 import Hex8
 from warp_mca.physics.elements.hex8i import Hex8i
 from warp_mca.physics.elements.hex8r import Hex8r
+from warp_mca.physics.elements.hex8w import Hex8w
 from warp_mca.physics.elements.tet4 import Tet4
 from warp_mca.physics.elements.tet10 import Tet10
 from warp_mca.physics.elements.wedge6 import Wedge6
 from warp_mca.scene.elements import ELEMENTS
 
-_ALL = (Hex8i(), Hex8(), Hex8r(), Tet4(), Tet10(), Tet10(mean=True), Wedge6())
+_HEXAHEDRA = (Hex8i(), Hex8(), Hex8r(), Hex8w("hex8w", 16), Hex8w("hex8w3", 24))
+_ALL = (*_HEXAHEDRA, Tet4(), Tet10(), Tet10(mean=True), Wedge6())
 ELEMENTS |= {element.name: element for element in _ALL}
 
 __all__ = ["ELEMENTS", "Element", "default_element", "of_hexahedra"]
