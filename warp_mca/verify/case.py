@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 USUAL = ("hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
 Level = Literal["quick", "full"]
 T = TypeVar("T")
+EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}  # round-off by precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +144,11 @@ class Case:
 
 
 CASES: dict[str, Case] = {}
+
+
+def share_row(quantity: str, error: float, tolerance: float, why: str) -> Row:
+    """A row of a quantity over its known value, from its relative error [-]."""
+    return Row(quantity=quantity, exact=1.0, measured=(1.0 + error,), unit="-", tolerance=tolerance, why=why)
 
 
 def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: float) -> NDArray[np.float64]:
