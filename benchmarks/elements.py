@@ -96,7 +96,13 @@ def tables(stored: dict[str, dict[str, float | None]]) -> str:
     names = [name for name in ELEMENTS if name in stored]
     for title, rows, _ in problems():
         if title != heading:
-            text += ["", f"## {title}", "", "| error in % | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
+            text += [
+                "",
+                f"## {title}",
+                "",
+                "| error in % | " + " | ".join(names) + " |",
+                "|---" * (len(names) + 1) + "|",
+            ]
             heading = title
         for row in rows.split("|"):
             text.append(f"| {row} | " + " | ".join(shown(stored[name].get(row)) for name in names) + " |")

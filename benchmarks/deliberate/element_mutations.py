@@ -17,6 +17,20 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
         "xy = T[0, 1] * log_over((d[0] - d[1]) / (one + d[1])) / (one + d[1])",
         "xy = T[0, 1] / (one + d[0])",
     ),
+    "vectors_without_pressure": Mutation(
+        "internal vectors of hex8i do not release the traction of the pressure",
+        "kernels/elements/hex8i_small.py",
+        "return -share * y - solve(",
+        "return -solve(",
+        element="hex8i",
+    ),
+    "vectors_without_flow": Mutation(
+        "internal vectors of hex8i do not release what plastic strain relieves",
+        "kernels/elements/hex8i_small.py",
+        "six = R(6.0)",
+        "six = R(0.0)",
+        element="hex8i",
+    ),
     "hourglass_feels_strain": Mutation(
         "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
         "kernels/elements/hourglass.py",

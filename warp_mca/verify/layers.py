@@ -74,7 +74,7 @@ def yielding_bar(setup: Setup) -> list[Row]:
     for layers, (tip, work) in zip(
         (1, 2),
         setup.by_element(
-            ((0.1, 1.1), (0.04, 0.15)),
+            ((0.08, 0.7), (0.04, 0.15)),
             hex8=((0.23, 0.73), (0.31, 0.88)),
             hex8r=((0.08, 1.01), (0.08, 1.01)),
             tet4=((0.73, 1.01), (0.63, 1.01)),
