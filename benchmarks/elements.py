@@ -53,8 +53,8 @@ def problems() -> Iterator[Problem]:
         for nu in solids.COOK:
             row = f"Cook's panel, ν = {nu:.4g}, {count} × {count} cells"
             yield "Solids", row, partial(solids.cook, count=count, nu=nu)
-    row = "energy|rubber, 6 cells an edge: pressure in the middle|rubber, 6 cells an edge: scatter of pressure"
-    yield "Solids", "rubber, 6 cells an edge: " + row, partial(solids.rubber, count=6)
+    row = "rubber, ν = 0.4999: energy|rubber: pressure in the middle|rubber: scatter of pressure"
+    yield "Solids", row, lambda setup: solids.rubber(setup, solids.edge_cells(setup))
     for count in (1, 2, 4):
         row = f"plastic moment, {count} {'layer' if count == 1 else 'layers'}"
         yield "Plastic limits", row, partial(limits.moment, layers=count)
@@ -87,7 +87,7 @@ def shown(error: float | None) -> str:
     """An error as the page shows it."""
     if error is None:
         return "–"
-    return f"{100.0 * error:+.2g}" if abs(error) < 0.095 else f"{100.0 * error:+.0f}"
+    return (f"{100.0 * error:+.2g}" if abs(error) < 0.095 else f"{100.0 * error:+.0f}").replace("-", "−")
 
 
 def tables(stored: dict[str, dict[str, float | None]]) -> str:
