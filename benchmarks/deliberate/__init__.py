@@ -209,7 +209,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_reversed": Mutation(
         "hourglass forces of hex8r have the wrong sign",
-        "kernels/elements/hex8r.py",
+        "kernels/elements/patterns.py",
         "= -add_product(Q[n], W, Q[n])",
         "= add_product(Q[n], W, Q[n])",
         element="hex8r",

@@ -33,7 +33,7 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_feels_strain": Mutation(
         "hourglass amplitudes of hex8r keep the part that uniform strain has in distorted elements",
-        "kernels/elements/hourglass.py",
+        "kernels/elements/patterns.py",
         "left = add_product(u[3 + m], H, -x[3 + m])",
         "left = u[3 + m]",
         element="hex8r",
