@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.physics.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 USUAL = ("hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
 Level = Literal["quick", "full"]
 T = TypeVar("T")
+USUAL = ("hex8", "hex8i", "hex8r", "tet4")  # elements that cases are run with where none is named
 EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}  # round-off by precision
 
 
@@ -131,7 +133,8 @@ class Case:
         reference: where the known answer comes from.
         measure: runs it.
         needs: a module that it compares with and that may be missing; the case is skipped then.
-        uses_elements: whether finite elements take part; the case is run once, not for each of them, if not.
+        elements: that it is run with where none is named; none where no finite elements take part, so that it is run
+            once.
     """
 
     name: str
@@ -140,10 +143,19 @@ class Case:
     reference: str
     measure: Measure
     needs: str | None = None
-    uses_elements: bool = True
+    elements: tuple[str, ...] = USUAL
+
+    def taken(self, element: str | None = None) -> tuple[str, ...]:
+        """Elements to run it with, one where none takes part: that which is named, or all of its own."""
+        return ((element,) if element else self.elements or USUAL)[: None if self.elements else 1]
 
 
 CASES: dict[str, Case] = {}
+
+
+def every(*left_out: str) -> tuple[str, ...]:
+    """Names of all elements but some, for `case`."""
+    return tuple(name for name in ELEMENTS if name not in left_out)
 
 
 def share_row(quantity: str, error: float, tolerance: float, why: str) -> Row:

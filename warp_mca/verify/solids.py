@@ -7,13 +7,26 @@ import numpy as np
 import warp_mca as mca
 from warp_mca.geometry.cell_types import HEXAHEDRON
 from warp_mca.physics.elements import ELEMENTS
-from warp_mca.verify.case import EPSILON, Row, Setup, case, share_row
+from warp_mca.verify.case import EPSILON, Row, Setup, case, every, share_row
 from warp_mca.verify.small_meshes import Array, brick
 from warp_mca.verify.statics import Imposed, Statics, area_shares
 
 COOK = {1.0 / 3.0: 23.96, 0.4999: 18.49}  # deflection of Cook's panel by Poisson's ratio [m]
 RUBBER, SQUEEZED = 0.02, 2e-4  # edge of the rubber cube, and by how much it is shortened [m]
 ENERGY, PRESSURE = 4.95e-4, 5.6e3  # of the rubber [J], within 1 %; in its middle [Pa], within 1.5 %
+# What errors of elements other than the default may be: of deflections; of energy, pressure and its scatter.
+COOK_ALLOWED = {
+    "hex8": (0.055, 0.051),
+    "hex8r": (0.014, 0.035),
+    "tet4": (0.22, 0.42),
+    "tet10": (0.02, 0.075),
+}
+RUBBER_ALLOWED = {
+    "hex8r": (0.03, 0.04, 0.063),
+    "tet4": (0.08, 0.09, 0.92),
+    "tet10": (0.04, 0.05, 0.39),
+    "tet10_mean": (0.02, 0.03, 0.15),
+}
 
 
 def distorted(setup: Setup, seed: int = 1) -> float:
@@ -70,7 +83,7 @@ def rubber(setup: Setup, count: int) -> tuple[float, float, float]:
 
     Returns:
         Error of the energy [-]; error of the pressure in the middle [-]; standard deviation of pressure in the middle
-        about a smooth course, as a share of the pressure [-]: at points of hexahedra, of the means of other elements.
+        as a share of it [-]: of points about a smooth course, or of means of elements that do not have eight of them.
     """
     mesh = brick(setup.element, (count,) * 3, (RUBBER,) * 3)
     statics = Statics(setup, mesh, mca.Elastic(E=1e6, nu=0.4999, rho=1e3))
@@ -79,35 +92,38 @@ def rubber(setup: Setup, count: int) -> tuple[float, float, float]:
     given = np.outer(top, [0.0, -SQUEEZED, 0.0])
     u = statics.solve(np.zeros_like(X), np.repeat((top | bottom)[:, None], 3, axis=1), given)
     energy = 0.5 * float(u.ravel() @ (statics.K @ u.ravel()))
-    place, pressure = pressures(statics.body, 1e-3 * u)
+    place, pressure, points = pressures(statics.body, 1e-3 * u)
     near = (np.abs(place - 0.5 * RUBBER) < 0.205 * RUBBER).all(axis=1)
-    square, p = (place[near] / RUBBER - 0.5) ** 2, 1e3 * pressure[near]
-    even = np.column_stack([np.ones(len(p)), square, square * square[:, [1, 2, 0]], square**2])
-    course = even @ np.linalg.lstsq(even, p, rcond=None)[0] if len(p) > 3 * even.shape[1] else p.mean()
+    p, course = 1e3 * pressure[near], np.zeros(1)
+    if points:
+        square = (place[near] / RUBBER - 0.5) ** 2
+        even = np.column_stack([np.ones(len(p)), square, square * square[:, [1, 2, 0]], square**2])
+        course = even @ np.linalg.lstsq(even, p, rcond=None)[0]
     return energy / ENERGY - 1.0, float(p.mean()) / PRESSURE - 1.0, float((p - course).std() / p.mean())
 
 
-def pressures(body: Imposed, u: Array) -> tuple[Array, Array]:
-    """Pressure [Pa] at displacements u [m], shape (count,), and where it is shown [m], shape (count, 3)."""
+def pressures(body: Imposed, u: Array) -> tuple[Array, Array, bool]:
+    """Where pressure is shown [m], shape (count, 3), how much at displacements u [Pa], and whether those are points."""
     body.settled(u)
     body.nodal_stress.find_corners(body.state, body.state.u)
     corner = -body.nodal_stress.points.numpy()[:3].sum(axis=0, dtype=np.float64) / 3.0
     natural = np.array(HEXAHEDRON.natural)
     shape = np.prod(1.0 + natural[:, None] * natural / np.sqrt(3.0), axis=2) / 8.0
-    places, found = [], []
+    places, found, points = [], [], False
     for stage, element, first in body.nodal_stress.parts:
         shown = corner[first : first + stage.corners * len(element)].reshape(-1, stage.corners)
         x = body.X[stage.block.conn].transpose(1, 0, 2)
         points = stage.corners == stage.points == 8
         places.append((shape @ x).reshape(-1, 3) if points else x.mean(axis=1))
         found.append(shown.ravel() if points else shown.mean(axis=1))
-    return np.concatenate(places), np.concatenate(found)
+    return np.concatenate(places), np.concatenate(found), points
 
 
 @case(
     group="elements",
     title="Distorted cells find constant strain",
     reference="Patch test in three dimensions: the skin of a cube is displaced linearly, and so is its inside.",
+    elements=every("wedge6"),
 )
 def distorted_patch(setup: Setup) -> list[Row]:
     """27 cells, the inner nodes moved by up to a fifth of an edge."""
@@ -118,8 +134,8 @@ def distorted_patch(setup: Setup) -> list[Row]:
             measured=(distorted(setup),),
             unit="-",
             scale=1.0,
-            tolerance=setup.by_element(20.0, tet4=200.0) * EPSILON[setup.precision],
-            why="twenty units of round-off; two hundred of tetrahedra, whose pressure depends on many neighbours",
+            tolerance=setup.by_element(20.0, tet4=200.0, tet10=200.0, tet10_mean=200.0) * EPSILON[setup.precision],
+            why="twenty units of round-off; two hundred of tetrahedra, of which many meet at a node",
         )
     ]
 
@@ -129,10 +145,11 @@ def distorted_patch(setup: Setup) -> list[Row]:
     title="Cook's panel deflects as it must",
     reference="Cook, J. Struct. Div. ASCE 100 (1974) 1851: 48 x 44 x 16, E = F = t = 1; 23.96 with nu = 1/3, 18.49 +- "
     "0.03 with nu = 0.4999 in plane strain, extrapolated.",
+    elements=every("wedge6"),
 )
 def cook_panel(setup: Setup) -> list[Row]:
     """Eight cells along both edges, one layer."""
-    allowed = setup.by_element((0.02, 0.04), hex8=(0.055, 0.051), hex8r=(0.014, 0.035), tet4=(0.22, 0.42))
+    allowed = setup.by_element((0.02, 0.04), **COOK_ALLOWED)
     return [
         share_row(
             f"deflection over exact, nu = {nu:.4g}", cook(setup, 8, nu), most, "error of 8 x 8 cells, and a tenth"
@@ -151,23 +168,24 @@ def edge_cells(setup: Setup) -> int:
     title="Pressure in squeezed rubber is smooth",
     reference="Meshes of 6 to 16 cells an edge with hex8, with exact bending and with quadratic tetrahedra: 0.495 mJ "
     "within 1 %, 5.6 kPa in the middle within 1.5 %.",
+    elements=every("wedge6"),
 )
 def rubber_cube(setup: Setup) -> list[Row]:
     """20 mm, E = 1 MPa, nu = 0.4999, shortened by 0.2 mm between rough plates."""
     count = edge_cells(setup)
     energy, pressure, scatter = rubber(setup, count)
-    allowed = setup.by_element((0.035, 0.05, 0.03), tet4=(0.17, 0.22, 0.85))
+    allowed = setup.by_element((0.035, 0.05, 0.03), **RUBBER_ALLOWED)
     why = f"error of {count} cells an edge, and of the reference"
     return [
         share_row("energy over the reference", energy, allowed[0], why),
         share_row("pressure in the middle over the reference", pressure, allowed[1], why),
         Row(
-            quantity="standard deviation of pressure in the middle about a smooth course, as a share of it",
+            quantity="standard deviation of pressure in the middle, as a share of it",
             exact=0.0,
             measured=(scatter,),
             unit="-",
             scale=1.0,
             tolerance=allowed[2],
-            why="modes of pressure without resistance would be of its own size",
+            why="as measured, and a tenth; modes of pressure without resistance would be of its own size",
         ),
     ]
