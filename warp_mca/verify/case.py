@@ -146,8 +146,8 @@ class Case:
     elements: tuple[str, ...] = USUAL
 
     def taken(self, element: str | None = None) -> tuple[str, ...]:
-        """Elements to run it with, one where none takes part: that which is named, or all of its own."""
-        return ((element,) if element else self.elements or USUAL)[: None if self.elements else 1]
+        """Elements to run it with: that which is named, or all of its own; any one where none takes part."""
+        return (element,) if element and self.elements else self.elements or USUAL[:1]
 
 
 CASES: dict[str, Case] = {}
