@@ -78,7 +78,7 @@ def upsetting(setup: Setup, count: int) -> float:
         setup: with the element.
         count: cells along half an edge; an eighth of the cube is meshed.
     """
-    statics = Statics(setup, brick(setup.element, (count,) * 3, (0.5, 0.5, 0.5)), METAL)
+    statics = Statics(setup, brick(setup.element, (count, count, count), (0.5, 0.5, 0.5)), METAL)
     top = statics.body.X[:, 2] > 0.5 - 1e-9
     held = (statics.body.X < 1e-9) | top[:, None]
     force = statics.drive(held, np.outer(top, [0.0, 0.0, -5.0 * SIGMA_Y]))

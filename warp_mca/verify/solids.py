@@ -45,7 +45,7 @@ def distorted(setup: Setup, seed: int = 1) -> float:
     statics = Statics(setup, mesh, mca.Elastic(E=1.0, nu=0.3, rho=1.0))
     X = statics.body.X
     exact = X @ rng.uniform(-1.0, 1.0, (3, 3))
-    skin = ((X < 1e-9) | (X > 1.0 - 1e-9)).any(axis=1)
+    skin = np.any((X < 1e-9) | (X > 1.0 - 1e-9), axis=1)
     u = statics.solve(np.zeros_like(X), np.repeat(skin[:, None], 3, axis=1), exact)
     return float(np.abs(u - exact).max() / np.abs(exact).max())
 
@@ -85,7 +85,7 @@ def rubber(setup: Setup, count: int) -> tuple[float, float, float]:
         Error of the energy [-]; error of the pressure in the middle [-]; standard deviation of pressure in the middle
         as a share of it [-]: of points about a smooth course, or of means of elements that do not have eight of them.
     """
-    mesh = brick(setup.element, (count,) * 3, (RUBBER,) * 3)
+    mesh = brick(setup.element, (count, count, count), (RUBBER, RUBBER, RUBBER))
     statics = Statics(setup, mesh, mca.Elastic(E=1e6, nu=0.4999, rho=1e3))
     X = statics.body.X
     top, bottom = X[:, 1] > RUBBER - 1e-9, X[:, 1] < 1e-9

@@ -157,11 +157,12 @@ def stiffness(body: Imposed) -> csc_matrix:
 
     depends, owner = dependence(body)
     by_element, colour = depends.tocsr(), colours(depends)
-    element, node = np.repeat(np.arange(depends.shape[0]), np.diff(by_element.indptr)), by_element.indices
+    count = sum(stage.count for stage in body.solver.elements)
+    element, node = np.repeat(np.arange(count), np.diff(by_element.indptr)), by_element.indices
     h, size = 0.1 * SMALL * body.shortest, 3 * body.model.node_count
     rows, columns, values = [], [], []
     for chosen in (colour == c for c in range(colour.max() + 1)):
-        cause = np.full(depends.shape[0], -1, dtype=np.int64)  # the displaced node that each element depends on
+        cause = np.full(count, -1, dtype=np.int64)  # the displaced node that each element depends on
         cause[element[chosen[node]]] = node[chosen[node]]
         slot = np.flatnonzero(cause[owner] >= 0)
         for axis in range(3):
@@ -254,7 +255,7 @@ class Statics:
         Raises:
             GuardError: an increment finds no balance.
         """
-        u = before = np.zeros(held.shape)
+        u = before = f = np.zeros(held.shape)
         for k in range(1, increments + 1):
             # go on as in the increment before
             u, before = 2.0 * u - before, u
