@@ -160,7 +160,7 @@ def every(*left_out: str) -> tuple[str, ...]:
 
 def share_row(quantity: str, error: float, tolerance: float, why: str) -> Row:
     """A row of a quantity over its known value, from its relative error [-]."""
-    return Row(quantity=quantity, exact=1.0, measured=(1.0 + error,), unit="-", tolerance=tolerance, why=why)
+    return Row(quantity, 1.0, (1.0 + error,), "-", tolerance, why)
 
 
 def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: float) -> NDArray[np.float64]:
