@@ -49,6 +49,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "hertz_sphere": ("contact_soft", "pressure_halved"),
     "hertz_block": ("reaction_halved", "contact_soft"),
     "taylor_bar": ("logarithmic_strain_doubled", "hourglass_stays_elastic"),
+    "struck_strip": ("hourglass_modulus_low", "vectors_without_pressure"),
     "graded_bars": ("slow_impulse_lost",),
     "sliding_block": ("friction_limit_doubled", "friction_limit_ignored", "slip_work_halved"),
     "block_on_belt": ("belt_stands_still", "belt_work_halved"),

@@ -7,7 +7,7 @@ import numpy as np
 import warp_mca as mca
 from warp_mca.verify.case import Row, Setup, case, every, share_row
 from warp_mca.verify.small_meshes import Array, brick
-from warp_mca.verify.statics import Statics, area_shares
+from warp_mca.verify.statics import Kinematics, Statics, area_shares
 
 LENGTH = 20.0  # of the beam [m], which is 1 m thick and 1 m wide
 PLATE, THICK, PRESSURE = 0.1, 0.002, 1e4  # side and thickness of the plate [m], its load [Pa]
@@ -50,7 +50,15 @@ PLATE_MOVED = {
 }
 
 
-def beam(setup: Setup, layers: int, aspect: float, nu: float, moved: float = 0.0, seed: int = 0) -> float:
+def beam(
+    setup: Setup,
+    layers: int,
+    aspect: float,
+    nu: float,
+    moved: float = 0.0,
+    seed: int = 0,
+    kinematics: Kinematics = "corotational",
+) -> float:
     """Error of the deflection of a cantilever under a load at its end [-], against Timoshenko's beam, kappa = 5/6.
 
     Args:
@@ -60,6 +68,7 @@ def beam(setup: Setup, layers: int, aspect: float, nu: float, moved: float = 0.0
         nu: Poisson's ratio [-].
         moved: nodes are moved along the beam by up to so many cell lengths [-].
         seed: of these.
+        kinematics: of the body.
     """
     rng = np.random.default_rng(seed)
 
@@ -69,7 +78,7 @@ def beam(setup: Setup, layers: int, aspect: float, nu: float, moved: float = 0.0
         return x
 
     mesh = brick(setup.element, (round(LENGTH / aspect), 1, layers), (LENGTH, 1.0, 1.0), move)
-    statics = Statics(setup, mesh, mca.Elastic(E=1.0, nu=nu, rho=1.0))
+    statics = Statics(setup, mesh, mca.Elastic(E=1.0, nu=nu, rho=1.0), kinematics=kinematics)
     x, y, z = statics.body.X.T
     share, root = area_shares(statics.body.mesh, x > LENGTH - 1e-9), x < 1e-9
     held = np.stack([root, root & (y < 1e-9), root & (z < 1e-9)], axis=1)
@@ -117,17 +126,19 @@ def plate(setup: Setup, count: int, moved: float = 0.0, seed: int = 0) -> float:
 )
 def bent_beam(setup: Setup) -> list[Row]:
     """Layers of cells whose length is 1, 2 and 4 times the thickness of the beam; trapezoids, mean of three meshes."""
-    every = setup.by_element((0.025, 0.025, 0.032), **BEAM)
+    every_aspect = setup.by_element((0.025, 0.025, 0.032), **BEAM)
     trapezoids = setup.by_element((0.01, 0.09, 0.35), **TRAPEZOIDS)
     rows = []
     for layers in setup.choose((1,), (1, 2, 4)):
         for nu in setup.choose((0.3, 0.499), (0.0, 0.3, 0.499)):
-            for aspect, allowed in zip(ASPECTS, every, strict=True):
+            for aspect, allowed in zip(ASPECTS, every_aspect, strict=True):
                 what = f"deflection over exact, {layers} of cells {aspect}:1, nu = {nu}"
                 rows.append(share_row(what, beam(setup, layers, aspect, nu), allowed, BENDS))
+    what = "deflection over exact, 1 of cells 2:1, nu = 0.499, finite strain"
+    rows.append(share_row(what, beam(setup, 1, 2, 0.499, kinematics="finite"), every_aspect[1], BENDS))
     for aspect, allowed in list(zip(ASPECTS, trapezoids, strict=True))[: setup.choose((1,), (3,))[0]]:
         errors = [beam(setup, 1, aspect, 0.3, 0.1, seed) for seed in SEEDS[:3]]
-        what = f"the same, 1 of cells {aspect}:1, nodes moved by 10 %"
+        what = f"deflection over exact, 1 of cells {aspect}:1, nu = 0.3, nodes moved by 10 %"
         why = "elements that carry constant strain in any shape cannot bend right as trapezoids (MacNeal)"
         rows.append(share_row(what, float(np.mean(errors)), allowed, why))
     return rows

@@ -190,17 +190,22 @@ class Statics:
     """
 
     def __init__(
-        self, setup: Setup, geometry: Mesh, material: mca.Elastic, axes: Callable[[Array], Array] | None = None
+        self,
+        setup: Setup,
+        geometry: Mesh,
+        material: mca.Elastic,
+        axes: Callable[[Array], Array] | None = None,
+        kinematics: Kinematics = "corotational",
     ):
         """Measure the stiffness; `axes` gives `frames` of the nodes' positions."""
         from scipy.sparse import block_diag
 
-        self.body = Imposed(setup, geometry, material)
+        self.body = Imposed(setup, geometry, material, kinematics)
         self.frames = axes(self.body.X) if axes else None
         self._factored: tuple[Index, Callable[[Array], Array]] | None = None
         self.exact = (setup.device, setup.precision) == ("cpu", "float64")
         double = replace(setup, device="cpu", precision="float64")
-        self.K = stiffness(self.body if self.exact else Imposed(double, geometry, material))
+        self.K = stiffness(self.body if self.exact else Imposed(double, geometry, material, kinematics))
         if self.frames is not None:
             turn = block_diag(self.frames)
             self.K = (turn.T @ self.K @ turn).tocsc()
