@@ -125,6 +125,7 @@ def main() -> None:
     if not args.render:
         stored = json.loads(STORE.read_text(encoding="utf-8")) if STORE.exists() else {}
         stored |= {element: measure(element) for element in args.elements or ELEMENTS}
+        stored = {element: stored[element] for element in ELEMENTS if element in stored}
         STORE.write_text(json.dumps(stored, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         note(STORE, "cpu")
     (FOLDER / "elements.md").write_text(render(), encoding="utf-8")

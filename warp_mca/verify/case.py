@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 USUAL = ("hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
 Level = Literal["quick", "full"]
 T = TypeVar("T")
-USUAL = ("hex8", "hex8i", "hex8r", "tet4")  # elements that cases are run with where none is named
 EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}  # round-off by precision
 
 
