@@ -46,12 +46,11 @@ def measure(task: Task) -> dict[str, Any] | None:
 def tasks(names: Iterable[str], device: str, level: str) -> list[Task]:
     """Every case with each element and precision that it takes, in the order of the page."""
     from warp_mca.verify import cases
-    from warp_mca.verify.case import USUAL
 
     return [
         (case.name, element, precision, device, level)
         for case in cases(list(names))
-        for element in (USUAL if case.uses_elements else USUAL[:1])
+        for element in case.taken()
         for precision in (PRECISIONS[:1] if case.needs else PRECISIONS)
     ]
 

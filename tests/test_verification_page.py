@@ -10,7 +10,6 @@ from benchmarks.deliberate import CATCHES, MUTATIONS, notes
 from benchmarks.measurements import FOLDER
 from benchmarks.verification import key, measure, tasks, write_page
 from warp_mca.verify import cases
-from warp_mca.verify.case import USUAL
 
 PAGE = (FOLDER / "verification.md").read_text(encoding="utf-8")
 CASES = cases()
@@ -21,8 +20,8 @@ def test_page_has_each_case(case):
     section = PAGE.split(f"### {case.name}\n", 1)[1].split("\n## ", 1)[0].split("\n### ", 1)[0]
     assert f"{case.title}. {case.reference}" in section
     assert notes()[case.name] in section
-    assert case.uses_elements or "| none | mixed | " in section
-    for element in USUAL if case.uses_elements else []:
+    assert case.elements or "| none | mixed | " in section
+    for element in case.elements:
         for precision in ("mixed", "float64"):
             assert f"| {element} | {precision} | " in section, (element, precision)
     assert "Tolerances: " in section

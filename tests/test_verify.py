@@ -11,7 +11,7 @@ import pytest
 from benchmarks.deliberate import MUTATIONS
 from warp_mca.base.errors import GuardError
 from warp_mca.verify import Setup, bending, cases
-from warp_mca.verify.case import USUAL, Row
+from warp_mca.verify.case import Row
 from warp_mca.verify.report import lines
 from warp_mca.verify.runner import outcome, verify
 
@@ -22,8 +22,8 @@ ROOT = Path(__file__).parent.parent
 SHORT = [
     (case, element)
     for case in cases()
-    for element in USUAL
-    if element == "hex8" or (case.uses_elements and case.group in ("elements", "material", "friction"))
+    for element in case.taken()
+    if element == "hex8" or case.group in ("elements", "material", "friction")
     if element != "tet4" or case.name not in ("cantilever_vibration", "near_incompressible_bending", "rolling_sphere")
 ]
 

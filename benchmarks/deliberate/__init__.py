@@ -135,6 +135,12 @@ MUTATIONS: dict[str, Mutation] = {
         "(R(3.0) * G + H)",
         "(R(3.0) * G + R(2.0) * H)",
     ),
+    "yield_stress_high": Mutation(
+        "the yield stress is five percent too high",
+        "kernels/materials/j2.py",
+        "radius = sigma_y + beta",
+        "radius = R(1.05) * sigma_y + beta",
+    ),
     "gauss_points_moved": Mutation(
         "the Gauss points lie at 0.5 in place of 0.577",
         "kernels/elements/hexahedron.py",
@@ -203,7 +209,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "hourglass_reversed": Mutation(
         "hourglass forces of hex8r have the wrong sign",
-        "kernels/elements/hex8r.py",
+        "kernels/elements/patterns.py",
         "= -add_product(Q[n], W, Q[n])",
         "= add_product(Q[n], W, Q[n])",
         element="hex8r",

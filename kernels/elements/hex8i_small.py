@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.internal_modes import PLANE, layers, mode_functions, place_functions
+from warp_mca.kernels.elements.internal_modes import FOUR_THIRDS, PLANE, layers, mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.point import flow_function, history_functions
 
@@ -27,8 +27,10 @@ def internal_function(precision: str) -> Any:
 
     @wp.func
     def internal_vector(D: tensor, y: vec3, plastic: vec3, K: R, G: R):
+        # The traction of the pressure, along y, apart: in `solve` it would leave a small difference of large numbers.
         lame = R(0.5) * K - R(THIRD) * G  # of twice the strain
-        return -solve(G * (product(D, y) - plastic) + (lame * (D[0] + D[1] + D[2])) * y, y, K, G)
+        share = lame / (K + R(FOUR_THIRDS) * G) * (D[0] + D[1] + D[2]) / wp.dot(y, y)
+        return -share * y - solve(G * (product(D, y) - plastic), y, K, G)
 
     return internal_vector
 

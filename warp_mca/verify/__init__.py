@@ -15,6 +15,10 @@ from warp_mca.verify.case import CASES, Case, Level, Row, Setup, case
 GROUPS = ("elements", "material", "waves", "impact", "friction", "rigid")
 FILES = (
     "elements",
+    "bent",
+    "solids",
+    "limits",
+    "layers",
     "vibration",
     "material",
     "large_strain",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
+from warp_mca.physics.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 USUAL = ("hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
 Level = Literal["quick", "full"]
 T = TypeVar("T")
+EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}  # round-off by precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +132,8 @@ class Case:
         reference: where the known answer comes from.
         measure: runs it.
         needs: a module that it compares with and that may be missing; the case is skipped then.
-        uses_elements: whether finite elements take part; the case is run once, not for each of them, if not.
+        elements: that it is run with where none is named; none where no finite elements take part, so that it is run
+            once.
     """
 
     name: str
@@ -139,10 +142,24 @@ class Case:
     reference: str
     measure: Measure
     needs: str | None = None
-    uses_elements: bool = True
+    elements: tuple[str, ...] = USUAL
+
+    def taken(self, element: str | None = None) -> tuple[str, ...]:
+        """Elements to run it with: that which is named, or all of its own; any one where none takes part."""
+        return (element,) if element and self.elements else self.elements or USUAL[:1]
 
 
 CASES: dict[str, Case] = {}
+
+
+def every(*left_out: str) -> tuple[str, ...]:
+    """Names of all elements but some, for `case`."""
+    return tuple(name for name in ELEMENTS if name not in left_out)
+
+
+def share_row(quantity: str, error: float, tolerance: float, why: str) -> Row:
+    """A row of a quantity over its known value, from its relative error [-]."""
+    return Row(quantity, 1.0, (1.0 + error,), "-", tolerance, why)
 
 
 def crossings(time: NDArray[np.float64], value: NDArray[np.float64], level: float) -> NDArray[np.float64]:

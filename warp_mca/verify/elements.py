@@ -2,69 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.case import EPSILON, Row, Setup, case
 from warp_mca.verify.small_meshes import CUBE, mixed_cube, patch
+from warp_mca.verify.statics import Imposed, Kinematics
 
 Array = NDArray[np.float64]
 
 MATERIAL = mca.Elastic(E=1e6, nu=0.25, rho=1000.0)  # of the patch test in its source, with a density besides
-Kinematics = Literal["corotational", "finite"]
-EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}
-
-
-class Imposed:
-    """A body at rest whose nodes are displaced at will.
-
-    Attributes:
-        X: positions of the nodes before [m], shape (node_count, 3), float64.
-    """
-
-    def __init__(self, setup: Setup, geometry: Mesh, kinematics: Kinematics = "corotational"):
-        from warp_mca.model.build import build_model
-        from warp_mca.physics.elements.cells import nodal_masses
-        from warp_mca.rigid.handoff import hand_off
-        from warp_mca.step.output import NodalStress
-        from warp_mca.step.solver import Solver
-
-        body = mca.Body(name="block", geometry=geometry, material=MATERIAL, kinematics=kinematics)
-        scene = mca.Scene(name="imposed", bodies=(body,), impact=mca.ImpactPhase(duration=1.0))
-        scene = setup.with_element(scene)
-        meshes = mca.mesh(scene)
-        start = hand_off(scene, meshes, nodal_masses(scene, meshes))
-        self.model = build_model(scene, meshes, start.positions, start.velocities)
-        self.solver = Solver(self.model, device=setup.device, precision=setup.precision, dt=self.model.stable.dt)
-        self.solver.compile()
-        self.state = self.solver.new_state()
-        self.nodal_stress = NodalStress(self.solver, np.arange(self.model.node_count, dtype=np.int32))
-        self.X = self.model.X
-
-    def force(self, u: Array) -> Array:
-        """Forces of the elements on the nodes [N], shape (node_count, 3), float64, read off the momentum of one step.
-
-        Args:
-            u: displacements [m], shape (node_count, 3), float64.
-        """
-        self.state.u.assign(u)
-        self.state.v.zero_()
-        self.solver.step(self.state, 1)
-        return self.model.mass[:, None] * self.state.v.numpy() / self.solver.dt
-
-    def largest_element_force(self) -> float:
-        """Greatest force of one element on one node [N] in the step that `force` made."""
-        return float(np.linalg.norm(self.solver.work.force.numpy(), axis=1).max())
-
-    def stress(self, u: Array) -> Array:
-        """xx, yy, zz, xy, yz, xz at the nodes [Pa], shape (node_count, 6), float64."""
-        self.state.u.assign(u)
-        self.nodal_stress.launch(self.state)
-        return self.nodal_stress.tensor.numpy().astype(np.float64)
 
 
 def turned(axis: Array, angle: float) -> Array:
@@ -81,7 +30,7 @@ def turned(axis: Array, angle: float) -> Array:
 )
 def patch_test(setup: Setup) -> list[Row]:
     """Unit cube of 7 cells; u = 5e-4 m (2 x + y + z, x + 2 y + z, x + y + 2 z); E = 1 MPa, nu = 0.25."""
-    body = Imposed(setup, patch())
+    body = Imposed(setup, patch(), MATERIAL)
     gradient = 0.5e-3 * (np.eye(3) + np.ones((3, 3)))  # symmetric: no rotation, so that the stress is exact
     u = body.X @ gradient
     inside = (body.X > 1e-9).all(axis=1) & (body.X < 1.0 - 1e-9).all(axis=1)
@@ -134,7 +83,7 @@ def mixed_patch(setup: Setup) -> list[Row]:
         ("finite", F - identity, large),
     )
     for kinematics, H, exact in measures:
-        body = Imposed(setup, mixed_cube(), kinematics)
+        body = Imposed(setup, mixed_cube(), MATERIAL, kinematics)
         u = body.X @ H.T
         inside = ((body.X > 1e-9) & (body.X < 1.0 - 1e-9)).all(axis=1)
         # the transverse shear of wedge6 is in balance between wedges alone
@@ -176,7 +125,7 @@ def mixed_patch(setup: Setup) -> list[Row]:
 )
 def rigid_rotation(setup: Setup) -> list[Row]:
     """Unit cube of 7 cells turned about (0.6, 0, 0.8) by up to 1,000 revolutions; u = (Q - I) X."""
-    body = Imposed(setup, patch())
+    body = Imposed(setup, patch(), MATERIAL)
     axis = np.array([0.6, 0.0, 0.8])
     strained = body.X + 0.02 * np.sin(3.0 * body.X[:, [1, 2, 0]])
     still = body.force(strained - body.X)
@@ -228,7 +177,7 @@ def simple_shear(setup: Setup) -> list[Row]:
     """Unit cube, u_x = gamma y; E = 1 MPa, nu = 0.25. The sheared face y = 1 m is pulled by P e_y."""
     from scipy.linalg import polar
 
-    body = Imposed(setup, Mesh(CUBE, np.arange(8, dtype=np.int32)[None]))
+    body = Imposed(setup, Mesh(CUBE, np.arange(8, dtype=np.int32)[None]), MATERIAL)
     top = body.X[:, 1] > 0.5
     rows = []
     for gamma in (0.1, 0.5, 1.0):

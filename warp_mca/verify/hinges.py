@@ -83,11 +83,12 @@ def spinning_rod(setup: Setup) -> list[Row]:
     )
     ripples = "ripples where waves meet, shorter than a few elements"
     hinge = "what the window leaves of the oscillation, and the hinge's disturbance of the stress at 25 widths"
+    unknown = setup.by_element(None, hex8i="0.2 % with the second mesh, 0.006 % with the third")
     higher = "higher modes, of which four periods of the lowest are not whole ones"
     return [
         Row("free: mean stress at the centre", load / 8.0, centre, "Pa", setup.by_element(1e-4, tet4=5e-4), window),
         Row("free: greatest stress at the centre", load / 4.0, greatest, "Pa", 0.003, ripples),
-        Row("hinged: mean stress at L / 4", load * 15.0 / 32.0, quarter, "Pa", 0.0005, hinge),
+        Row("hinged: mean stress at L / 4", load * 15.0 / 32.0, quarter, "Pa", 0.0005, hinge, open=unknown),
         Row("hinged: mean reaction", 0.5 * load * SIDE**2, reaction, "N", 0.0002, higher),
     ]
 

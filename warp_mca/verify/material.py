@@ -208,7 +208,7 @@ def tension_torsion(setup: Setup) -> list[Row]:
     group="material",
     title="After plastic loading the stress lies on the yield surface, to rounding",
     reference="sqrt(3 / 2) |S - back stress| = sigma_y + beta H p, the definition of the surface.",
-    uses_elements=False,
+    elements=(),
 )
 def yield_surface(setup: Setup) -> list[Row]:
     """20000 random states, driven beyond yield by a random strain of some percent, in both precisions."""

@@ -32,7 +32,7 @@ class Outcome:
     @property
     def element(self) -> str:
         """Formulation that was run, or "none" where none takes part."""
-        return self.setup.element if self.case.uses_elements else "none"
+        return self.setup.element if self.case.elements else "none"
 
     @property
     def met(self) -> bool:

@@ -89,7 +89,7 @@ def mujoco_swing(chain: Chain, theta: Array, theta_dot: Array, samples: int, sub
     title="Chains of 2 and 5 links swing for 1 s as an independent multibody code has it",
     reference="MuJoCo (Todorov, Erez and Tassa, IROS 2012), Runge-Kutta method of order 4.",
     needs="mujoco",
-    uses_elements=False,
+    elements=(),
 )
 def chain_mujoco(setup: Setup) -> list[Row]:
     """Two equal slender rods from rest, level; five crooked links that move already; g = 9.8 m/s^2."""
@@ -114,7 +114,7 @@ def chain_mujoco(setup: Setup) -> list[Row]:
     group="rigid",
     title="A swinging chain keeps its energy, and without gravity its angular momentum",
     reference="Conservation laws.",
-    uses_elements=False,
+    elements=(),
 )
 def chain_energy(setup: Setup) -> list[Row]:
     """Five crooked links for 1 s, with g = 9.8 m/s^2 and with none."""

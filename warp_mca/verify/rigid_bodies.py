@@ -35,7 +35,7 @@ def _tops(setup: Setup, heavy: bool) -> tuple[list[mca.Result], tuple[float, ...
     group="rigid",
     title="A rigid body turns freely: its axis precesses about the angular momentum, which it keeps",
     reference="Goldstein, Classical Mechanics, chapter 5: the axis of a symmetric top turns at L / I_1.",
-    uses_elements=False,
+    elements=(),
 )
 def free_top(setup: Setup) -> list[Row]:
     """A box of 0.2 m x 0.2 m x 0.1 m, 2700 kg/m^3, tilted by 0.4 rad; its axis turns at 20 rad/s, twice round."""
@@ -58,7 +58,7 @@ def free_top(setup: Setup) -> list[Row]:
     group="rigid",
     title="A heavy top on a ball joint precesses steadily",
     reference="Goldstein, Classical Mechanics, chapter 5: I_3 w_3 W - I_1 W^2 cos(tilt) = m g l.",
-    uses_elements=False,
+    elements=(),
 )
 def heavy_top(setup: Setup) -> list[Row]:
     """The box of `free_top` stands on the middle of its lower face; g = 9.8 m/s^2."""
@@ -75,7 +75,7 @@ def heavy_top(setup: Setup) -> list[Row]:
     group="rigid",
     title="A rigid bar swings on a hinge as far as 2 rad",
     reference="Period 4 K(sin(a / 2)) / w_0 with the complete elliptic integral K and w_0^2 = m g l / I of the nodes.",
-    uses_elements=False,
+    elements=(),
 )
 def rigid_pendulum_period(setup: Setup) -> list[Row]:
     """1 m x 0.1 m x 0.1 m, let go at rest at 2 rad; two whole periods between passages of the lowest point."""
@@ -105,7 +105,7 @@ def rigid_pendulum_period(setup: Setup) -> list[Row]:
     group="rigid",
     title="Two rigid bodies on hinges swing as the chain of rigid links does",
     reference="The rigid chain, verified by itself above.",
-    uses_elements=False,
+    elements=(),
 )
 def rigid_double_pendulum(setup: Setup) -> list[Row]:
     """The links of `fe_double_pendulum`, rigid: one of them has two hinges, which are solved together; 0.4 s."""

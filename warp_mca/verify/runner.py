@@ -11,7 +11,7 @@ from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.files import check_folder
 from warp_mca.step.device import check_device
 from warp_mca.verify import cases
-from warp_mca.verify.case import USUAL, Case, Level, Setup
+from warp_mca.verify.case import Case, Level, Setup
 from warp_mca.verify.report import Outcome, lines, write
 
 
@@ -48,7 +48,7 @@ def verify(
     Args:
         names: of cases or groups; all by default.
         device, precision: as in `warp_mca.run`.
-        element: formulation of every body; those of `case.USUAL` in turn if None.
+        element: formulation of every body; each that a case is for in turn if None.
         level: of the meshes.
         out: folder for verification.md and its figure.
 
@@ -60,10 +60,9 @@ def verify(
     check_device(device)
     if out is not None:
         check_folder("out", out)
-    elements = [element] if element else list(USUAL)
     outcomes = []
     for case in chosen:
-        for item in elements if case.uses_elements else elements[:1]:
+        for item in case.taken(element):
             found = outcome(case, Setup(device=device, precision=precision, element=item, level=level))
             print("\n".join(lines(found)), flush=True)
             outcomes.append(found)

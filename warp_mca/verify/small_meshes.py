@@ -1,12 +1,19 @@
-"""Owns meshes of a few cells for patch tests: distorted hexahedra, and cells of every type side by side."""
+"""Owns meshes of a few cells for patch tests, distorted or of every type, and bricks of them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.geometry.degenerate import stored
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.physics.elements import ELEMENTS
+
+Array = NDArray[np.float64]
 
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)
 INNER = np.array(
@@ -55,3 +62,27 @@ def mixed_cube() -> Mesh:
         hexahedra.append(stored(points, np.array(cells), kind))
     tetrahedra = stored(points, np.array(tetrahedra), "tetrahedron")
     return Mesh(points, np.concatenate(hexahedra).astype(np.int32), {}, {}, tetrahedra)
+
+
+def brick(
+    element: str,
+    divisions: tuple[int, int, int],
+    size: tuple[float, float, float],
+    move: Callable[[Array], Array] | None = None,
+) -> Mesh:
+    """A brick with a corner at the origin and node sets as `mca.Box`, of hexahedra, or of wedges for their elements.
+
+    Args:
+        element: formulation that will compute it.
+        divisions: cells along x, y, z; a cell of wedges is cut in two along z.
+        size: lengths along x, y, z [m].
+        move: positions [m], shape (node_count, 3), float64 -> those that nodes take instead.
+    """
+    mesh = mca.Box(size=size, divisions=divisions).build()
+    if move is not None:
+        mesh = replace(mesh, points=move(mesh.points.copy()))
+    if ELEMENTS[element].cell != "wedge":
+        return mesh
+    h = mesh.hexahedra
+    halves = np.concatenate([h[:, [0, 1, 2, 4, 5, 6]], h[:, [0, 2, 3, 4, 6, 7]]])
+    return replace(mesh, hexahedra=stored(mesh.points, halves, "wedge"), cell_sets={})
