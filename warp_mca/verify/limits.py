@@ -19,6 +19,8 @@ UPSET = 1.045  # mean pressure over the yield stress when the cube is shortened 
 MOMENT = {
     "hex8": (0.02, 0.31),
     "hex8r": (6.5, 0.36),
+    "hex8w": (0.02, 0.02),
+    "hex8w3": (0.02, 0.02),
     "tet4": (1.3, 0.78),
     "tet10": (0.075, 0.035),
     "tet10_mean": (0.25, 0.02),
