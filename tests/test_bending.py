@@ -115,6 +115,8 @@ def test_the_warning_has_sign_and_size_of_the_error(case: str):
         ((0.04, 0.004, 0.002), (6, 1, 1), "hex8r"),
         ((0.03, 0.004, 0.0039), (36, 5, 5), "hex8"),
         ((0.04, 0.004, 0.002), (20, 2, 1), "wedge6"),
+        ((0.04, 0.004, 0.002), (6, 1, 1), "hex8i"),
+        ((0.04, 0.004, 0.002), (6, 1, 1), "hex8w"),
     ],
 )
 def test_nothing_is_said_of_a_strip_that_bends_right(size, cells, element: str):
@@ -209,12 +211,29 @@ def test_plastic_moment_of_a_brick(long: float, wide: float, moment: float):
     assert sums[FLOWING] / sums[FLOW] == pytest.approx(moment, rel=0.02)
 
 
+def test_plastic_moment_of_a_brick_of_internal_modes():
+    """Points at 0.577 of half the depth, ideally plastic, bent ten times as far as the surface stays elastic."""
+    metal = mca.J2Bilinear(E=1e9, nu=0.3, rho=1000.0, sigma_y=1e6, E_t=0.0)
+    model = model_of(grid((0.5, 0.5, 1.0), (1, 1, 1)), metal, "hex8i")
+    (sums,) = seen(model, samples_of(model), bent(model, 2e-2, 0.5), np.zeros((0, 6)))
+    assert sums[FLOWING] / sums[FLOW] == pytest.approx(2.0 / np.sqrt(3.0), rel=1e-3)
+
+
 YIELDING = {  # cells, element, load over that at which the surface yields, and what must be said
     "early": ((40, 4, 1), "hex8", 0.7, "yield too early in bending, at about 0.7"),
     "late": ((10, 2, 1), "hex8", 2.5, "yield too late in bending"),
     "not at all": ((20, 2, 1), "hex8r", 0.8, "hex8r does not let strip yield"),
     "two layers of one point": ((20, 2, 2), "hex8r", 0.8, "hex8r does not let strip yield"),
     "elastic": ((20, 2, 1), "hex8r", 0.4, ""),
+    "one layer that bends right": (
+        (20, 2, 1),
+        "hex8i",
+        1.0,
+        "at about 1.15 times the plastic moment; take two or more",
+    ),
+    "two layers that bend right": ((20, 2, 2), "hex8i", 1.0, ""),
+    "points in each half": ((20, 2, 1), "hex8w", 1.0, ""),
+    "elastic and right": ((20, 2, 1), "hex8i", 0.4, ""),
 }
 
 

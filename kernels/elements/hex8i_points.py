@@ -228,6 +228,15 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         return kept
 
     @wp.func
+    def conjugate(R0: mat33, R1: mat33, R2: mat33, y: mat33, last: vec3):
+        Q = mat43()
+        Q[0] = R1 * y[2] + R2 * y[1]
+        Q[1] = R0 * y[2] + R2 * y[0]
+        Q[2] = R0 * y[1] + R1 * y[0]
+        Q[3] = last
+        return Q
+
+    @wp.func
     def points_stress(
         x: mat73,
         volume: R,
@@ -279,16 +288,8 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         B0, C0 = closed_form(s0, r0, G0, Y[0], y[0], inverse, K, G)
         B1, C1 = closed_form(s1, r1, G1, Y[1], y[1], inverse, K, G)
         B2, C2 = closed_form(s2, r2, G2, Y[2], y[2], inverse, K, G)
-        R0 = R0 - share * B0
-        R1 = R1 - share * B1
-        R2 = R2 - share * B2
         if wp.static(finite):
             mean = mean - share * (C0 + C1 + C2)
-        Q = mat43()
-        Q[0] = volume * (R1 * y[2] + R2 * y[1])
-        Q[1] = volume * (R0 * y[2] + R2 * y[0])
-        Q[2] = volume * (R0 * y[1] + R1 * y[0])
-        Q[3] = volume * along
-        return mean, Q, largest
+        return mean, volume * conjugate(R0 - share * B0, R1 - share * B1, R2 - share * B2, y, along), largest
 
     return points_stress
