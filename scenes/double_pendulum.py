@@ -41,7 +41,6 @@ def build(
 ) -> mca.Scene:
     """Angles as in `RigidPhase`; hinges lie in the middle of the links' end faces. plate_vx is that of hinge A."""
     box = mca.Box(size=(length, depth, width), divisions=(axial, deep, wide), origin=(0.0, -0.5 * depth, -0.5 * width))
-    rates = (rate_OA, rate_AB)
     arm = length * link_axes(np.array(theta_OA))[0]
     vx, vy = -rate_OA * perpendicular(arm)
     places = ((0.0, 0.0, 0.0), (float(arm[0]), float(arm[1]), 0.0))
@@ -59,7 +58,7 @@ def build(
             rigid=rigid,
         )
         for name, rho, place, theta, speed, rate in zip(
-            ("OA", "AB"), (rho_OA, rho_AB), places, (theta_OA, theta_AB), speeds, rates, strict=True
+            ("OA", "AB"), (rho_OA, rho_AB), places, (theta_OA, theta_AB), speeds, (rate_OA, rate_AB), strict=True
         )
     )
     tied: dict[str, Any] = {"nodes": joint_nodes} | ({"pin_radius": pin_radius} if joint_nodes == "pin" else {})

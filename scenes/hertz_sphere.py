@@ -27,7 +27,6 @@ def build(
     pole_layers: Annotated[int, Param("cells from the patch to the coarse mesh around it", low=1)] = 8,
 ) -> mca.Scene:
     """A quarter of the sphere, which moves along -y onto y = 0, with its planes of symmetry held."""
-    material = mca.Elastic(E=E, nu=nu, rho=rho)
     ring = max(2, section // 2)
     patch = {"section": section, "ring": ring, "pole_size": pole_size, "pole_layers": pole_layers}
     moving = mca.Body(
@@ -55,7 +54,7 @@ def build(
             layers=2 * pole_layers,
             part="quarter",
         )
-        bodies.append(mca.Body(name="block", geometry=block, element="hex8", material=material))
+        bodies.append(mca.Body(name="block", geometry=block, element="hex8", material=mca.Elastic(E=E, nu=nu, rho=rho)))
         held = {"xmin": "x", "zmin": "z", "bottom": "y"}
         fixed += [mca.Fixed(body="block", nodes=nodes, axes=axes) for nodes, axes in held.items()]
         master = mca.Surface(body="block", nodes="contact")

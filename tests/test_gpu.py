@@ -108,7 +108,7 @@ def hinged(other: str | None, scaled: float | None) -> mca.Scene:
 
 @pytest.mark.parametrize("precision", ["mixed", "float64"])
 @pytest.mark.parametrize("other", [None, "b"], ids=["ground", "two bodies"])
-@pytest.mark.parametrize("scaled", [None, 1.028])
+@pytest.mark.parametrize("scaled", [None, 1.01])
 def test_steps_of_one_launch_take_pins_and_mass_scaling(precision, other, scaled):
     runs = [begun(hinged(other, scaled), device="cuda:0", precision=precision) for _ in range(3)]
     assert runs[0].solver.resident is not None
@@ -307,7 +307,7 @@ def test_blocks_that_compute_several_patches_give_the_forces_of_the_cpu(element,
             np.testing.assert_allclose(a.history.numpy(), b.history.numpy(), rtol=0, atol=10.0 * tolerance * scale)
 
 
-@pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
+@pytest.mark.parametrize("element", ["hex8", "hex8i", "hex8r", "tet4"])
 @pytest.mark.parametrize("name", ["elastic", "flows", "everything"])
 @pytest.mark.parametrize("precision", ["mixed", "float64"])
 def test_kernels_that_begin_early_change_no_bit(element, name, precision, monkeypatch):
