@@ -13,7 +13,8 @@ import warp as wp
 
 RANGE_MULTIPLE = 64  # ranges of threads begin at multiples of it: results do not depend on how elements are divided
 
-_INLINE_THRESHOLD = 60_000  # cost by LLVM's count; `hex8` at finite strain costs 47,000, Warp's own limit is 9,000
+_INLINE_THRESHOLD = 300_000  # cost by LLVM's count; `hex8` at finite strain costs 47,000, Warp's own limit is 9,000
+_ACCESSES = 10_000  # to memory in a loop; above 100, LLVM does not see that the number of threads stays the same
 
 _PREAMBLE = """
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -24,11 +25,13 @@ _PREAMBLE = """
 def vectorised(kernel: Any, large: bool = False) -> Any:
     """The kernel, with options of its module that vectorise it on the CPU.
 
-    A `large` kernel would remain a function call, which prevents vectorisation: the limit of inlining is raised for it.
+    A `large` kernel would remain a function call, or a loop of unknown length, which prevents vectorisation: limits are
+    raised for it.
     """
     options: dict[str, object] = {"extra_build_options": wp.ModuleBuildOptions(extra_cpu_preamble=_PREAMBLE)}
     flags = wp.config.cpu_compiler_flags
     if large and flags:
-        options["cpu_compiler_flags"] = re.sub(r"(-inline-threshold=)\d+", rf"\g<1>{_INLINE_THRESHOLD}", flags)
+        raised = re.sub(r"(-inline-threshold=)\d+", rf"\g<1>{_INLINE_THRESHOLD}", flags)
+        options["cpu_compiler_flags"] = f"{raised} -mllvm=-memssa-check-limit={_ACCESSES}"
     wp.set_module_options(options, module=kernel.module)
     return kernel
