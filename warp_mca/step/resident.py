@@ -106,11 +106,13 @@ class Resident:
     def __init__(self, solver: Solver, roles: Any) -> None:
         """Allocate on the current device; `roles` are those of `roles_of`."""
         self.solver, self.roles, self.blocks = solver, roles, int(roles.end)
-        contact, block = surface_of(solver), solver.elements[0].block
+        (patches,) = solver.elements
+        assert isinstance(patches, PatchStage)
+        contact, block = surface_of(solver), patches.block
         item = contact.items[0] if contact else None
         friction, stress_free = (item.mu > 0.0, contact.stress_free) if item and contact else (False, False)
         self.kernel = resident_kernel(
-            solver.elements[0].maker,
+            patches.maker,
             solver.precision,
             block.law,
             solver.nodes.kind.turned,

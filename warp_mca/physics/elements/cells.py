@@ -101,8 +101,8 @@ def body_cells(body: Body, mesh: Mesh) -> list[Cells]:
                     found.append(Cells(other, finite, conn[mine][:, CELL_TYPES[kind].own_corners], index[mine]))
                     conn, index = conn[~mine], index[~mine]
             if len(conn):
-                if hasattr(element, "oriented"):
-                    conn = element.oriented(body, mesh, conn, index)
+                oriented = getattr(element, "oriented", None)
+                conn = oriented(body, mesh, conn, index) if oriented else conn
                 found.append(Cells(element, finite, conn, index))
     return found
 
