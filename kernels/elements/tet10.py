@@ -15,7 +15,7 @@ import warp as wp
 from warp_mca.kernels.elements.formulation import MEAN, OWN, Formulation, Maker, parts_of
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
-from warp_mca.kernels.elements.tet10_points import BESIDE, FAR, POINT, between, tet10_functions
+from warp_mca.kernels.elements.tet10_points import BESIDE, FAR, POINT, between, centre_function, tet10_functions
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import keep_functions
@@ -55,24 +55,73 @@ def formulation(precision: str, law_name: str, finite: bool, name: str, pressure
 
 
 @cache
-def spread_functions(precision: str) -> tuple[Any, Any]:
+def spin_functions(precision: str) -> tuple[Any, Any]:
+    """Functions: axial vector of the skew part of P H^T; skew matrix of an axial vector.
+
+    At small strain the rotation Q of the centroid turns with the nodes, too. Its part of the slope of the energy is
+    that of a skew stress at the centroid, minus the sum of the skew parts of P H^T there, but for terms of the third
+    order. Without it an element that turns by 0.05 rad within itself lost 0.4 % of its energy.
+    """
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+
+    @wp.func
+    def spin_of(P: mat33, H: mat33):
+        M = P * wp.transpose(H)
+        half = R(0.5)
+        return vec3(half * (M[2, 1] - M[1, 2]), half * (M[0, 2] - M[2, 0]), half * (M[1, 0] - M[0, 1]))
+
+    @wp.func
+    def skew(a: vec3):
+        zero = R(0.0)
+        return mat33(zero, -a[2], a[1], a[2], zero, -a[0], -a[1], a[0], zero)
+
+    return spin_of, skew
+
+
+@cache
+def spread_functions(precision: str) -> tuple[Any, Any, Any]:
     """The functions of forces on nodes f and of sums over the points, for corners 1 to 3: the transpose of
     `tet10_points`.
 
-    (f, sums, nominal stress P, cofactors, W, g) -> f and sums with those of point g; (f, sums, first entry, entries to
-    the next node, force_out) stores f with the forces that all points cause alike.
+    (f, sums, spin, nominal stress P, H, weight, cofactors, W, g) -> f, sums and spin with those of point g; f and sums
+    with a stress at the centroid; (f, sums, first entry, entries to the next node, force_out) stores f with the forces
+    that all points cause alike.
     """
     t = scalars(precision)
     R, vec3, mat33, mat103 = t.real, t.vec3, t.mat33, t.mat103
+    spin_of, _skew = spin_functions(precision)
 
     @wp.func
-    def add_point(f: mat103, sums: mat33, P: mat33, cofactors: mat33, W: mat33, g: int):
+    def add_point(
+        f: mat103, sums: mat33, spin: vec3, P: mat33, H: mat33, weight: R, cofactors: mat33, W: mat33, g: int
+    ):
         world = R(POINT) * (P + W * P)
         for i in range(3):
             t = world * cofactors[i]
             sums[i] = sums[i] + t
             f[between(i + 1, g)] = f[between(i + 1, g)] - R(BESIDE) * t
             f[between(0, g)] = f[between(0, g)] + R(BESIDE) * t
+        return f, sums, spin + weight * spin_of(P, H)
+
+    @wp.func
+    def add_centre(f: mat103, sums: mat33, B: mat33, cofactors: mat33, det: R, W: mat33):
+        """With what a stress times volume B [N m] at the centroid adds, where differences have all of s_i."""
+        world = (R(1.0) / det) * (B + W * B)
+        t1 = world * cofactors[0]
+        t2 = world * cofactors[1]
+        t3 = world * cofactors[2]
+        t0 = -(t1 + t2 + t3)
+        rest = R(1.0) - R(FAR)
+        f[4] = f[4] - rest * (t0 + t1)
+        f[5] = f[5] - rest * (t1 + t2)
+        f[6] = f[6] - rest * (t0 + t2)
+        f[7] = f[7] - rest * (t0 + t3)
+        f[8] = f[8] - rest * (t1 + t3)
+        f[9] = f[9] - rest * (t2 + t3)
+        sums[0] = sums[0] + t1
+        sums[1] = sums[1] + t2
+        sums[2] = sums[2] + t3
         return f, sums
 
     @wp.func
@@ -92,7 +141,7 @@ def spread_functions(precision: str) -> tuple[Any, Any]:
             for i in range(3):  # by components, as in `hexahedron.store_function`
                 force_out[first + a * count][i] = f[a, i]
 
-    return add_point, store_forces
+    return add_point, add_centre, store_forces
 
 
 @cache
@@ -130,7 +179,9 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
     t = scalars(precision)
     R, vec3, mat33, mat103 = t.real, t.vec3, t.mat33, t.mat103
     _TenNodes, load_tet10, point_gradient = tet10_functions(precision, finite)
-    add_point, store_forces = spread_functions(precision)
+    add_point, add_centre, store_forces = spread_functions(precision)
+    _spin_of, skew = spin_functions(precision)
+    centre = centre_function(precision)
     plastic, mean, update = bool(law_name), form.pressure == MEAN, point.update
     own, later = not mean, point.general and mean  # pressures of points, known by themselves or behind them
     by_law = point.general
@@ -174,6 +225,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
         largest = R(0.0)
         smallest = R(1.0)
         behind = R(0.0)
+        spin = vec3()
         f = mat103()
         sums = mat33()
         for g in range(4):
@@ -192,17 +244,21 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
             if wp.static(later):
                 behind += pressure * weight / volume
                 pressure = R(0.0)
-            f, sums = add_point(f, sums, nominal(H, S, N, d, pressure), cofactors, it.W, g)
+            f, sums, spin = add_point(f, sums, spin, nominal(H, S, N, d, pressure), H, weight, cofactors, it.W, g)
         if wp.static(later):
             for g in range(4):
                 H, cofactors, weight = point_gradient(it, g)
-                f, sums = add_point(f, sums, nominal(H, mat33(), mat33(), vec3(), behind), cofactors, it.W, g)
+                P = nominal(H, mat33(), mat33(), vec3(), behind)
+                f, sums, spin = add_point(f, sums, spin, P, H, weight, cofactors, it.W, g)
+        if wp.static(not finite):
+            cofactors, det = centre(it)
+            f, sums = add_centre(f, sums, skew(-spin), cofactors, det, it.W)
         if wp.static(plastic):
             if flows != flag:
                 yielded_out[e] = flows
         keep_strain(e, largest, extreme_out)
-        smallest = smallest * wp.determinant(wp.identity(n=3, dtype=R) + it.W)  # -1 of elements turned inside out
-        keep_volume(e, R(1.0) - smallest, extreme_out)
+        turned = wp.determinant(wp.identity(n=3, dtype=R) + it.W)  # -1 of elements turned inside out
+        keep_volume(e, R(1.0) - smallest * turned, extreme_out)
         store_forces(f, sums, slot + e, count, force_out)
 
     return tet10_force

@@ -147,3 +147,20 @@ def tet10_functions(precision: str, finite: bool) -> tuple[Any, Any, Any]:
         return H, cofactors, R(POINT) * det
 
     return TenNodes, load_tet10, point_gradient
+
+
+@cache
+def centre_function(precision: str) -> Any:
+    """The function struct -> (cofactors as rows, determinant) at the centroid, of an element at small strain."""
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    TenNodes, _load_tet10, _point_gradient = tet10_functions(precision, False)
+    edge_gradient = edge_gradient_function(precision)
+
+    @wp.func
+    def centre(it: TenNodes):
+        corners = wp.matrix_from_rows(it.x[1], it.x[2], it.x[3])
+        _H, cofactors, det = edge_gradient(corners + (R(1.0) / R(FAR)) * (it.x_common - corners), mat33())
+        return cofactors, det
+
+    return centre
