@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.internal_modes import FOUR_THIRDS, PLANE, layers, mode_functions, place_functions
+from warp_mca.kernels.elements.internal_modes import FOUR_THIRDS, LEAST, PLANE, layers, mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.point import flow_function, history_functions
 
@@ -29,7 +29,7 @@ def internal_function(precision: str) -> Any:
     def internal_vector(D: tensor, y: vec3, plastic: vec3, K: R, G: R):
         # The traction of the pressure, along y, apart: in `solve` it would leave a small difference of large numbers.
         lame = R(0.5) * K - R(THIRD) * G  # of twice the strain
-        share = lame / (K + R(FOUR_THIRDS) * G) * (D[0] + D[1] + D[2]) / wp.dot(y, y)
+        share = lame / wp.max(K + R(FOUR_THIRDS) * G, R(LEAST)) * (D[0] + D[1] + D[2]) / wp.dot(y, y)
         return -share * y - solve(G * (product(D, y) - plastic), y, K, G)
 
     return internal_vector

@@ -27,6 +27,7 @@ wp.set_module_options({"enable_backward": False})
 
 PLANE = 3.0**-0.5  # of the points along the first two natural coordinates, +-
 FOUR_THIRDS = 4.0 / 3.0
+LEAST = 1e-37  # modulus above zero [Pa], where a smaller one is none in float32
 
 
 def layers(points: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -199,8 +200,8 @@ def mode_functions(precision: str) -> Modes:
     def solve(traction: vec3, y: vec3, K: R, G: R):
         """By Sherman and Morrison."""
         inverse = R(1.0) / wp.dot(y, y)
-        share = (K + R(THIRD) * G) / (K + R(FOUR_THIRDS) * G) * inverse * wp.dot(y, traction)
-        return (inverse / G) * (traction - share * y)
+        share = (K + R(THIRD) * G) / wp.max(K + R(FOUR_THIRDS) * G, R(LEAST)) * inverse * wp.dot(y, traction)
+        return (inverse / wp.max(G, R(LEAST))) * (traction - share * y)
 
     return Modes(
         frame, twice, doubled_gradient, gradients, doubled, normals, normal, deviator, whole, invariant, product, solve

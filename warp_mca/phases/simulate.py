@@ -9,6 +9,7 @@ from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.paths import Found
 from warp_mca.phases.carry_out import Course, begin
+from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.stretch import rows_before
 from warp_mca.recorders.recorder import RunInfo
@@ -36,13 +37,14 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     ready = _prepare(scenes, meshes, request)
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
-    impact = begin(ready, request, skins=surfaces, needs=needs)
+    impact = begin(ready, request, first=False, skins=surfaces, needs=needs)
     said: list[str] = []
     recording, steps, lone = None, impact.steps, ready[0]
     if recorders:
         paths = lone.probes.position
         info = RunInfo(lone.scene, lone.model, surfaces, paths, steps.dt, steps.interval, request.span, said.append)
         recording = Recording(recorders, info, steps.intervals, steps.per_interval, impact.solver.output)
+    announce(impact)  # once recorders have begun, which may refuse the run
     passed = 0
 
     def opening() -> None:  # recorders see the impact

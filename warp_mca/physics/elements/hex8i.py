@@ -34,8 +34,10 @@ def _elasticity(K: Array, G: Array) -> Array:
 def _modes_stiffness(volume: Array, tangents: Array, K: Array, G: Array) -> Array:
     """Matrices of the amplitudes (pattern, component), shape (n, 12, 12), without the internal vectors; as in the
     kernel."""
-    n, C = len(volume), _elasticity(K, G)
-    normal = np.linalg.inv(tangents).transpose(0, 2, 1)  # rows n_k
+    n, C = len(volume), _elasticity(K / G, np.ones_like(G))  # over G: stiffness may be of any size
+    cofactor = np.cross(np.roll(tangents, -1, axis=1), np.roll(tangents, -2, axis=1))
+    with np.errstate(all="ignore"):  # a cell without volume has no stable step
+        normal = cofactor / np.einsum("ei,ei->e", tangents[:, 0], cofactor[:, 0])[:, None, None]  # rows n_k
     outer = np.zeros((n, 3, 6, 3))  # [j]: strain of a gradient a n_j, as a matrix that acts on a
     for row, (p, q) in enumerate(_VOIGT):
         outer[:, :, row, p] += normal[:, :, q]
@@ -49,13 +51,18 @@ def _modes_stiffness(volume: Array, tangents: Array, K: Array, G: Array) -> Arra
                 strain[:, :, 3 * m : 3 * m + 3] = outer[:, 3 - m - k]
         stress = C @ strain
         traction = outer[:, k].transpose(0, 2, 1) @ stress
-        inverse = np.linalg.inv(outer[:, k].transpose(0, 2, 1) @ C @ outer[:, k])
-        relaxed = strain.transpose(0, 2, 1) @ stress - traction.transpose(0, 2, 1) @ inverse @ traction
-        D += (volume / 3.0)[:, None, None] * relaxed
         square = np.einsum("ei,ei->e", normal[:, k], normal[:, k])
+        # the acoustic tensor's inverse by Sherman and Morrison, as in the kernel
+        share = (K + G / 3.0) / (K + 4.0 / 3.0 * G) / square
+        inverse = np.eye(3) - share[:, None, None] * normal[:, k, :, None] * normal[:, k, None, :]
+        relaxed = (
+            strain.transpose(0, 2, 1) @ stress
+            - traction.transpose(0, 2, 1) @ inverse @ traction / square[:, None, None]
+        )
+        D += (volume / 3.0)[:, None, None] * relaxed
         along = tangents[:, k, :, None] * tangents[:, k, None, :]
-        D[:, 9:, 9:] += (volume * (4.0 / 27.0) * G * square**2)[:, None, None] * along
-    return D
+        D[:, 9:, 9:] += (volume * (4.0 / 27.0) * square**2)[:, None, None] * along
+    return G[:, None, None] * D
 
 
 class Hex8i:
