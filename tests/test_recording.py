@@ -41,6 +41,7 @@ def bar(material=STEEL, velocity=(2.0, 0.0, 0.0), wall=0.1, **more) -> mca.Scene
                 name="bar",
                 geometry=mca.Box(size=(0.1, 0.01, 0.01), divisions=(20, 2, 2)),
                 material=material,
+                element="hex8",
                 velocity=velocity,
             ),
         ),

@@ -93,6 +93,7 @@ def chain(rigid: str, nodes: str = "axis", spin: float = 20.0) -> mca.Scene:
             name=name,
             geometry=BAR,
             material=SOFT,
+            element="hex8",
             kinematics="finite",  # whose forces have no moment, to rounding
             rigid=name in rigid,
             position=(0.3 * k, 0.0, 0.0),
@@ -165,8 +166,10 @@ def ball(rigid: str, **contact: object) -> mca.Scene:
     plate = mca.Box(size=(0.03, 0.01, 0.03), divisions=(8, 3, 8), origin=(-0.015, -0.01, -0.015))
     half_turn = (0.0, 0.0, -0.5 * np.pi)
     bodies = (
-        mca.Body(name="ball", geometry=sphere, material=SOFT, position=(0.0, 0.02, 0.0), rotation=half_turn),
-        mca.Body(name="plate", geometry=plate, material=SOFT),
+        mca.Body(
+            name="ball", geometry=sphere, material=SOFT, element="hex8", position=(0.0, 0.02, 0.0), rotation=half_turn
+        ),
+        mca.Body(name="plate", geometry=plate, material=SOFT, element="hex8"),
     )
     bodies = (replace(bodies[0], velocity=(3.0, -10.0, 1.0), exact_mass=False), bodies[1])
     bodies = tuple(replace(body, rigid=body.name in rigid) for body in bodies)

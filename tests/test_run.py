@@ -30,6 +30,7 @@ def bar(material=None, *, position=(0.0, 0.0, 0.0), penalty=1.0, **impact):
                 name="bar",
                 geometry=mca.Box(size=(0.2, 0.01, 0.01), divisions=(100, 1, 1)),
                 material=material or mca.Elastic(**ALUMINIUM),
+                element="hex8",
                 position=position,
                 velocity=(1.0, 0.0, 0.0),
             ),

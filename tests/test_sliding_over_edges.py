@@ -20,7 +20,9 @@ def turn(rotation: tuple) -> np.ndarray:
 
 def box(name: str, size: tuple, cells: tuple, at: tuple, R: np.ndarray, **more) -> mca.Body:
     geometry = mca.Box(size=size, divisions=cells, origin=tuple(-s / 2 for s in size))
-    return mca.Body(name=name, geometry=geometry, material=SOFT, position=tuple(R @ np.array(at)), **more)
+    return mca.Body(
+        name=name, geometry=geometry, material=SOFT, element="hex8", position=tuple(R @ np.array(at)), **more
+    )
 
 
 def slide(
@@ -93,14 +95,20 @@ def row(n: int, m: int, merged: bool, v: float, **contact) -> mca.Scene:
     R, size, cells = np.eye(3), (0.015, W, 0.02), (3 * m // 2, m, 2 * m)
     block = box("block", (W, W, W), (n, n, n), (0.008, W + 1e-6, 0.0), R, velocity=(v, 0.0, 0.0))
     plates = [mca.Box(size=size, divisions=cells, origin=(x, -W / 2, -W / 2)) for x in (0.0, 0.015)]
-    bodies = [mca.Body(name=f"plate {k}", geometry=plate, material=SOFT) for k, plate in enumerate(plates)]
+    bodies = [
+        mca.Body(name=f"plate {k}", geometry=plate, material=SOFT, element="hex8") for k, plate in enumerate(plates)
+    ]
     if merged:
         meshes = [plate.build() for plate in plates]
         count = len(meshes[0].points)
         points = np.concatenate([mesh.points for mesh in meshes])
         cells_of_both = np.concatenate([mesh.hexahedra + k * count for k, mesh in enumerate(meshes)]).astype(np.int32)
         foot = np.flatnonzero(np.isclose(points[:, 1], -W / 2)).astype(np.int32)
-        bodies = [mca.Body(name="row", geometry=mca.Mesh(points, cells_of_both, {"ymin": foot}), material=SOFT)]
+        bodies = [
+            mca.Body(
+                name="row", geometry=mca.Mesh(points, cells_of_both, {"ymin": foot}), material=SOFT, element="hex8"
+            )
+        ]
     surface = mca.Surface(body="block", nodes="boundary")
     return mca.Scene(
         name="row",

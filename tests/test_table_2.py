@@ -21,7 +21,7 @@ from warp_mca.paper.page import Page, as_html, as_markdown
 from warp_mca.paper.pure_claims import PURE
 from warp_mca.paper.studies import LEVELS, MAIN, MESH, pure_case
 from warp_mca.paper.table_2 import HEAD, compare, enough, event_end, stored, table_rows
-from warp_mca.phases import pure_fem
+from warp_mca.phases import flexible_swing
 
 COARSE = {
     "section": 2,
@@ -50,7 +50,7 @@ def scene(mu: float = 0.47) -> mca.Scene:
 def no_pictures() -> Iterator[None]:
     """Drawing takes longer than the runs; blocks are so short that the swing has several."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pure_fem, "BLOCK", 2)
+        patch.setattr(flexible_swing, "BLOCK", 2)
         for figure in ("force_figure.save_forces", "energy_figure.save_energies"):
             patch.setattr(f"warp_mca.results.{figure}", lambda *_: None)
         yield

@@ -167,7 +167,8 @@ class Impact:
         Raises:
             RequestError: all steps are taken already, and it is to pause later.
         """
-        if until is not None and None in self.stopped and self.state.steps > self.steps.count:
+        whole = self.steps.count
+        if until is not None and until > whole and None in self.stopped and self.state.steps > whole:
             raise bad_value("Impact.steps.count", self.steps.count, "all are taken; let Impact.take give it more")
         if None not in self.stopped or self.state.steps > self.steps.count:
             return  # with the last record of all
