@@ -100,9 +100,11 @@ def registered(register: Callable[..., object]) -> None:
 def test_forces_are_those_of_tet10(kinematics: str):
     rng = np.random.default_rng(0)
     own, theirs = held_of(mixed_cube(), "own_tet10", kinematics), held_of(mixed_cube(), "tet10", kinematics)
-    u = 0.02 * rng.normal(size=own.solver.model.X.shape)
+    # at small strain `tet10` knows that its frame turns, which is of the second order in u
+    size, tolerance = (0.02, 1e-13) if kinematics == "finite" else (1e-8, 1e-6)
+    u = size * rng.normal(size=own.solver.model.X.shape)
     expected = theirs.forces(u)
-    np.testing.assert_allclose(own.forces(u), expected, atol=1e-13 * np.abs(expected).max())
+    np.testing.assert_allclose(own.forces(u), expected, atol=tolerance * np.abs(expected).max())
 
 
 def striking(element: str = "own_tet10") -> mca.Scene:
