@@ -40,7 +40,7 @@ def stress_modes_function(precision: str) -> Any:
     """The function (x, H, q, y, n0, n1, n2, K, G) -> elastic stress over the element, by the way in which it varies.
 
     (Deviators of the mean, linear in each coordinate, and product of the two others; pressures of the mean and linear
-    in each coordinate.) n_k are what `relaxed_function` calls `plastic`.
+    in each coordinate.) n_k are what `internal_function` calls `plastic`.
     """
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73

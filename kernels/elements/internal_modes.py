@@ -31,8 +31,7 @@ LEAST = 1e-37  # modulus above zero [Pa], where a smaller one is none in float32
 
 
 def layers(points: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Natural coordinates across the third direction of an element's points, and their weights, with
-    the sum 1 over all points.
+    """Natural coordinates of an element's points in the third direction, and their weights, 1 in sum over all points.
 
     Eight points are those of Gauss, two in each direction; more are those of Gauss in each half, where the stress has a
     corner if plastic zones grow from both faces; of these the outermost come last. Each layer has four points.

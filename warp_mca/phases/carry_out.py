@@ -13,7 +13,6 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.log import warn
 from warp_mca.phases.checkpoint import Checkpoint, damage_explained
 from warp_mca.phases.flexible_swing import FlexibleSwing
-from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Prepared, Request
 from warp_mca.phases.settle import settle
 from warp_mca.phases.stretch import Stretch, steps_of
@@ -28,12 +27,8 @@ DRIVERS: dict[type, Callable[..., Stretch]] = {Settle: settle, FlexibleSwing: Fl
 Told = Callable[[], None]
 
 
-def begin(
-    ready: Sequence[Prepared], request: Request, span: float | None = None, *, first: bool = True, **more: Any
-) -> Impact:
+def begin(ready: Sequence[Prepared], request: Request, span: float | None = None, **more: Any) -> Impact:
     """The impact phase of scenes side by side, of a `span` [s] if not that of the request; `more` as in `Impact`.
-
-    The `first` one of a run says what it is.
 
     Raises:
         RequestError: steps cannot be chosen, or bodies overlap that must not.
@@ -44,8 +39,6 @@ def begin(
     request.tell("compile", 0.0)
     impact = Impact(ready, span or request.span, **request.settings.solver, **more)
     request.clock.lap("compile")
-    if first:
-        announce(impact)
     return impact
 
 

@@ -13,6 +13,7 @@ from warp_mca.base.errors import GuardError
 from warp_mca.kernels.records.columns import NORMAL_IMPULSE
 from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.film import Film
+from warp_mca.phases.forecast import announce
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.motion import ImpactPart, Motion
 from warp_mca.phases.plastic_history import give_history
@@ -61,9 +62,11 @@ class ImpactDriver:
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None
         film = self.film
         shown = {"skins": film.surfaces, "needs": film.needs} if film else {}
-        impact = begin([ready], setup.request, span, first=self.count == 1, shape=shape, **shown)
+        impact = begin([ready], setup.request, span, shape=shape, **shown)
         if film:
             film.watch(impact, motion.t)
+        if self.count == 1:
+            announce(impact)
         self._advance(impact)
         setup.request.clock.lap("fe")
         if impact.stopped[0] is not None:

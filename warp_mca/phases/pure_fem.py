@@ -14,6 +14,7 @@ from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.cycle_rows import SPENT, STORED
 from warp_mca.phases.every import METHOD
 from warp_mca.phases.flexible_swing import FlexibleSwing
+from warp_mca.phases.forecast import announce
 from warp_mca.phases.history_rows import phase_facts
 from warp_mca.phases.prepare import Request, place
 from warp_mca.phases.stretch import rows_before
@@ -37,6 +38,7 @@ def run_pure(scene: Scene, meshes: Mapping[str, Mesh] | None, request: Request) 
     ready = setup.ready(setup.start.positions, setup.start.velocities)
     swing = FlexibleSwing(ready, request.span)
     impact = begin([ready], request, swing.span)
+    announce(impact)
     course = Course(impact, request, METHOD)
     swing.carried_out_by(course)
     whole = swing.predicted + request.span

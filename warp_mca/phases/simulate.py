@@ -37,7 +37,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     ready = _prepare(scenes, meshes, request)
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
-    impact = begin(ready, request, first=False, skins=surfaces, needs=needs)
+    impact = begin(ready, request, skins=surfaces, needs=needs)
     said: list[str] = []
     recording, steps, lone = None, impact.steps, ready[0]
     if recorders:

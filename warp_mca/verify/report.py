@@ -112,13 +112,15 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
         return [*text, f"{outcomes[0].skipped}.".capitalize(), ""]
     text += ["| element | precision | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 2) + "|"]
     reasons: dict[str, str] = {}
+    found: dict[tuple[str, str], list[str]] = {}  # precisions that gave the same row of an element
     for outcome in outcomes:
-        who = f"| {outcome.element} | {outcome.setup.precision} | "
+        shown = [" | ".join(cells(row)) for row in outcome.rows]
+        shown += [f"{outcome.failure} | | | | | | NOT MET"] if outcome.failure else []
+        for row in shown:
+            found.setdefault((outcome.element, row), []).append(outcome.setup.precision)
         for row in outcome.rows:
-            text.append(who + " | ".join(cells(row)) + " |")
             reasons.setdefault(row.quantity, row.why + (f"; open: {row.open}" if row.verdict == "OPEN" else ""))
-        if outcome.failure:
-            text.append(who + f"{outcome.failure} | | | | | | NOT MET |")
+    text += [f"| {element} | {', '.join(precisions)} | {row} |" for (element, row), precisions in found.items()]
     text += ["", "Tolerances: " + "; ".join(f"{key}: {why}" for key, why in reasons.items()) + "."]
     return [*text, ""]
 

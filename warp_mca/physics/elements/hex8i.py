@@ -32,8 +32,7 @@ def _elasticity(K: Array, G: Array) -> Array:
 
 
 def _modes_stiffness(volume: Array, tangents: Array, K: Array, G: Array) -> Array:
-    """Matrices of the amplitudes (pattern, component), shape (n, 12, 12), without the internal vectors; as in the
-    kernel."""
+    """Matrices of the amplitudes (pattern, component) [N/m], shape (n, 12, 12), with the internal vectors condensed."""
     n, C = len(volume), _elasticity(K / G, np.ones_like(G))  # over G: stiffness may be of any size
     cofactor = np.cross(np.roll(tangents, -1, axis=1), np.roll(tangents, -2, axis=1))
     with np.errstate(all="ignore"):  # a cell without volume has no stable step

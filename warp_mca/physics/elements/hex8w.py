@@ -81,10 +81,9 @@ def _named(body: Body, edge: Array, whole: NDArray[np.bool_]) -> NDArray[np.intp
     cosine = np.where(whole, np.abs(edge @ across) / np.where(size > 0.0, size, 1.0), 0.0)
     off = int((cosine.max(axis=1) < LEAST).sum())
     if off:
-        remedy = (
-            f"{off} of its cells have no edges within 45 degrees of it; give the direction through the wall in the "
-        )
-        raise bad_value(f"Body {body.name}.across", body.across, f"{remedy}body's frame, or leave it out")
+        what = f"{off} of its cells have no edges within 45 degrees of it"
+        remedy = "give the direction through the wall in the body's frame, or leave it out"
+        raise bad_value(f"Body {body.name}.across", body.across, f"{what}; {remedy}")
     return cosine.argmax(axis=1)
 
 
