@@ -206,6 +206,13 @@ def _(beyond: bool) -> list[str]:
     return told(energy.soft_springs, scene=stacked(2, 2), shares={"c": over(energy.soft_springs, beyond)})
 
 
+@pair(energy.lagging_vectors)
+def _(beyond: bool) -> list[str]:
+    model = SimpleNamespace(blocks=[SimpleNamespace(element="hex8i", plastic=True)])
+    sums = {"hourglass": over(energy.lagging_vectors, beyond), "plastic": 1.0}
+    return told(energy.lagging_vectors, model=model, ledger=ledger(energy=lambda: sums))
+
+
 # contacts
 
 

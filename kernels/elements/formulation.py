@@ -43,6 +43,7 @@ class Formulation:
         enriched: (struct, e, m, flag, law, history) -> struct with what the history adds; None if nothing does.
         modes: (struct, K, G, flag, history, e) -> (stored, dissipated) energy of what deforms without strain at the
             points [J]; None where nothing does.
+        lags: whether internal vectors lag behind: their extremes have a row LAG_LOSS, the energy that this took [J].
     """
 
     name: str
@@ -59,6 +60,7 @@ class Formulation:
     place: Any = None
     enriched: Any = None
     modes: Any = None
+    lags: bool = False
 
 
 Maker = Callable[[str, str, bool], Formulation]  # of a precision, a law, and whether strains may be large

@@ -18,7 +18,7 @@ from warp_mca.kernels.elements.patterns import corner_force_function, pattern_fu
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.laws import Law, law_functions
-from warp_mca.kernels.records.extremes import keep_functions
+from warp_mca.kernels.records.extremes import LAG_LOSS, keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,6 +26,11 @@ wp.set_module_options({"enable_backward": False})
 def keeps_vectors(law: Law, finite: bool) -> bool:
     """Whether the internal vectors are part of the history: where they have no closed form."""
     return finite or law.general
+
+
+def lags(law: Law, finite: bool) -> bool:
+    """Whether the internal vectors lag behind: where not all of the stress is elastic, at small strain."""
+    return finite or law.general or bool(law.history)
 
 
 @cache
@@ -66,16 +71,19 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
         y = frame(x)
         m = material[e]
         if wp.static(by_points):
-            P, Q, largest = points_stress(x, volume, H, q, y, e, m, law, dt, yielded_out, history_out)
+            P, Q, largest, lost = points_stress(x, volume, H, q, y, e, m, law, dt, yielded_out, history_out)
+            extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + lost
             keep_strain(e, largest, extreme_out)
         else:
             if wp.static(plastic):
                 flag = yielded_out[e]
-                P, Q, largest, flows = flow_stress(
+                P, Q, largest, flows, lost = flow_stress(
                     x, volume, H, q, y, law[m, 0], law[m, 1], e, m, flag, law, history_out
                 )
-                if flows and flag == 0:
-                    yielded_out[e] = 1
+                if flows:
+                    extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + lost
+                    if flag == 0:
+                        yielded_out[e] = 1
             else:
                 P, Q, largest = elastic_stress(x, volume, H, q, y, law[m, 0], law[m, 1])
             keep_strain(e, strain_square(largest, law[m, 1]), extreme_out)
@@ -177,7 +185,9 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
         column = g // wp.static(layer_count)
         return (column ^ (column >> 1)) + 4 * ((g % wp.static(layer_count)) // wp.static(layer_count // 2))
 
-    return Formulation("hex8i", 8, points, OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of, enriched=enriched)
+    given = (OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of)
+    lag = lags(law_functions(law_name, precision), finite)
+    return Formulation("hex8i", 8, points, *given, enriched=enriched, lags=lag)
 
 
 def kernels(points: int) -> SimpleNamespace:
@@ -188,4 +198,5 @@ def kernels(points: int) -> SimpleNamespace:
         energy_kernel=partial(energy_kernel, maker),
         stress_kernel=partial(stress_kernel, maker),
         kept=lambda law, finite: hex8i_points.KEPT if keeps_vectors(law, finite) else (),
+        lags=lags,
     )

@@ -16,7 +16,7 @@ from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, warp_barrier
 from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.kernels.records.extremes import keep_functions
+from warp_mca.kernels.records.extremes import LAG_LOSS, keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
@@ -122,7 +122,7 @@ def sums_function(precision: str) -> Any:
 
     (Lane's sum and moment of the stress, pressures that are linear in the coordinates, y, xi and eta of the lane's
     corners, K, G) -> (mean; parts of the stress that are linear in a coordinate, what `settled_function` leaves of
-    them; their pressures; w of `conjugate_function`).
+    them; their pressures; w of `conjugate_function`; energy that the lag of the internal vectors takes, per volume).
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -136,15 +136,15 @@ def sums_function(precision: str) -> Any:
         mean, R0, R1, M2 = sums(total, right, far)
         R2, M1, M0, _both = sums(moment, right, far)
         third = R(THIRD)
-        R0, p0 = settled(plane * R0, third * p[0], y[0], K, G)
-        R1, p1 = settled(plane * R1, third * p[1], y[1], K, G)
-        R2, p2 = settled(R2, third * p[2], y[2], K, G)
+        R0, p0, work0 = settled(plane * R0, third * p[0], y[0], K, G)
+        R1, p1, work1 = settled(plane * R1, third * p[1], y[1], K, G)
+        R2, p2, work2 = settled(R2, third * p[2], y[2], K, G)
         w = vec3(
             plane * wp.dot(y[0], product(M0, y[0])),
             plane * wp.dot(y[1], product(M1, y[1])),
             third * wp.dot(y[2], product(M2, y[2])),
         )
-        return mean, R0, R1, R2, vec3(p0, p1, p2), w
+        return mean, R0, R1, R2, vec3(p0, p1, p2), w, work0 + work1 + work2
 
     return lane_sums
 
@@ -234,9 +234,11 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         flows = flows and valid
         if flows:
             write_row(history, wp.static(size) * lane, e, history_out)
-        mean, R0, R1, R2, p, w = lane_sums(total, moment, p, y, right, far, K, G)
+        mean, R0, R1, R2, p, w, lost = lane_sums(total, moment, p, y, right, far, K, G)
         b, scaled_volume = mean_gradients(x)
         volume = R(VOLUME_SCALE) * scaled_volume
+        if lane_max(wp.where(flows, R(1.0), R(0.0))) > R(0.0) and lane == 0:
+            wp.atomic_add(extreme_out, LAG_LOSS, e, volume * lost)  # which waits for nothing
         Q = conjugate(x, volume, y, R0, R1, R2, p, w)
         base, top = corner_forces(x, b, volume, W, whole(mean, pressure), Q, right, far)
         if valid:

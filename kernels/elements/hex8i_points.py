@@ -5,10 +5,11 @@ With the mean deformation gradient F and the tensors A_k of `internal_modes`, ve
     a_k = F^T L(G_k F^-1) + c_k,   c_k <- c_k - 3 F^T A_k^-1 F r_k,   r_k = sum_g w_g xi_k P^T F n_k,
 
 where L gives them in closed form for isotropic elasticity, so that only what plastic flow and large strain add lags by
-a step. They add F n_k a_k to the displacement gradient, in place of a_k n_k, which is the same at small strain: in a
-compressed element the latter would soften hourglass modes below those of an element without internal vectors (Wriggers
-and Reese, Comput. Meth. Appl. Mech. Engng 135 (1996) 201; Glaser and Armero, Engng Comput. 14 (1997) 759). All parts
-turn with F, so that the energy is objective, and angular momentum is kept.
+a step; the energy that this takes is the work of what r_k has left in the change of a_k. They add F n_k a_k to the
+displacement gradient, in place of a_k n_k, which is the same at small strain: in a compressed element the latter would
+soften hourglass modes below those of an element without internal vectors (Wriggers and Reese, Comput. Meth. Appl. Mech.
+Engng 135 (1996) 201; Glaser and Armero, Engng Comput. 14 (1997) 759). All parts turn with F, so that the energy is
+objective, and angular momentum is kept.
 Logarithmic elasticity is elliptic up to stretches of about 0.21 to 1.39 only (Bruhns, Xiao and Meyers, Proc. R. Soc. A
 457 (2001) 2207), beyond which a vector would grow at will: vectors fade out before, as elastic strains grow. Plastic
 strains do not count.
@@ -20,7 +21,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.hex8i_small import internal_function
-from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
+from warp_mca.kernels.elements.internal_modes import LEAST, mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import law_functions
@@ -209,7 +210,10 @@ def closed_form_function(precision: str) -> Any:
 
 @cache
 def stress_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
-    """The function that gives mean nominal stress P, hourglass forces Q and greatest e : e of an element."""
+    """The function that gives mean nominal stress P, hourglass forces Q and greatest e : e of an element.
+
+    The last value is the energy that the lag of the internal vectors takes [J].
+    """
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
     modes, varying = mode_functions(precision), varying_function(precision, finite)
@@ -270,11 +274,14 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         s1 = solve(F * r1, Y[1], K, G)
         s2 = solve(F * r2, Y[2], K, G)
         three = R(3.0) * wp.transpose(F)
-        c[0] = c[0] - three * s0
-        c[1] = c[1] - three * s1
-        c[2] = c[2] - three * s2
         kept = kept_share(stress2, G)
-        write_vectors(history_out, e, kept * c, kept)
+        new = mat33()
+        new[0] = kept * (c[0] - three * s0)
+        new[1] = kept * (c[1] - three * s1)
+        new[2] = kept * (c[2] - three * s2)
+        write_vectors(history_out, e, new, kept)
+        change = (new - c) + (kept / wp.max(share, R(LEAST)) - R(1.0)) * (a - c)
+        lost = -volume * (wp.dot(r0, change[0]) + wp.dot(r1, change[1]) + wp.dot(r2, change[2]))
         D0 = normal(y[0])
         D1 = normal(y[1])
         D2 = normal(y[2])
@@ -290,6 +297,6 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         B2, C2 = closed_form(s2, r2, G2, Y[2], y[2], inverse, K, G)
         if wp.static(finite):
             mean = mean - share * (C0 + C1 + C2)
-        return mean, volume * conjugate(R0 - share * B0, R1 - share * B1, R2 - share * B2, y, along), largest
+        return mean, volume * conjugate(R0 - share * B0, R1 - share * B1, R2 - share * B2, y, along), largest, lost
 
     return points_stress

@@ -109,7 +109,8 @@ def settled_function(precision: str) -> Any:
     """The function (S, p, y_k, K, G) -> S, p less the stress of an elastic strain s y_k that takes all their traction.
 
     S + p I is the part of the stress that is linear in coordinate k. So the forces are conjugate to the closed form of
-    the internal vectors.
+    the internal vectors. The third value is 3 t . s of the traction t: in the next step the vector changes by -3 s, and
+    t does so much work, per volume, that no force does.
     """
     R, vec3, tensor = scalars(precision).real, scalars(precision).vec3, wp.types.vector(6, scalars(precision).real)
     modes = mode_functions(precision)
@@ -117,8 +118,10 @@ def settled_function(precision: str) -> Any:
 
     @wp.func
     def settled(S: tensor, p: R, y: vec3, K: R, G: R):
-        D = twice(solve(product(S, y) + p * y, y, K, G), y)
-        return S - G * D, p - (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2])
+        t = product(S, y) + p * y
+        s = solve(t, y, K, G)
+        D = twice(s, y)
+        return S - G * D, p - (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2]), R(3.0) * wp.dot(t, s)
 
     return settled
 
@@ -172,8 +175,9 @@ def elastic_function(precision: str, points: int) -> Any:
 def stress_function(precision: str, law_name: str, points: int) -> Any:
     """The function that gives mean stress P, hourglass forces Q, greatest elastic S : S / 2 and whether points flow.
 
-    All points take the return map of the law. The internal vectors come before, with the plastic strain of
-    the step before: in closed form, and the forces lag by one step's flow.
+    The last value is the energy that the lag of the internal vectors takes [J], if points flow. All points take the
+    return map of the law. The internal vectors come before, with the plastic strain of the step before: in closed form,
+    and the forces lag by one step's flow.
     """
     t = scalars(precision)
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
@@ -244,10 +248,11 @@ def stress_function(precision: str, law_name: str, points: int) -> Any:
             M2 = M2 + (xi * eta) * total
         w = vec3(wp.dot(y[0], product(M0, y[0])), wp.dot(y[1], product(M1, y[1])), wp.dot(y[2], product(M2, y[2])))
         p = R(THIRD) * p
-        R0, p0 = settled(R0, p[0], y[0], K, G)
-        R1, p1 = settled(R1, p[1], y[1], K, G)
-        R2, p2 = settled(R2, p[2], y[2], K, G)
-        return whole(mean, pressure), conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w), largest, flows
+        R0, p0, work0 = settled(R0, p[0], y[0], K, G)
+        R1, p1, work1 = settled(R1, p[1], y[1], K, G)
+        R2, p2, work2 = settled(R2, p[2], y[2], K, G)
+        Q = conjugate(x, volume, y, R0, R1, R2, vec3(p0, p1, p2), w)
+        return whole(mean, pressure), Q, largest, flows, volume * (work0 + work1 + work2)
 
     return flow_stress
 

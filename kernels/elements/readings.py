@@ -8,7 +8,7 @@ import warp as wp
 from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
-from warp_mca.kernels.records.extremes import STRAIN_SQUARE, VOLUME_LOSS
+from warp_mca.kernels.records.extremes import LAG_LOSS, STRAIN_SQUARE, VOLUME_LOSS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -59,7 +59,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     load = load_function(maker, precision, law_name, finite)
     gradient, rotation, modes, points = form.gradient, form.rotation, form.modes, form.points
     shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
-    plastic, general, has_modes, read = bool(law_name), point.general, form.modes is not None, point.read
+    plastic, general, read = bool(law_name), point.general, point.read
+    has_modes, lags = form.modes is not None, form.lags
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
     k, R = kinematics(precision, finite), scalars(precision).real
     dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
@@ -124,6 +125,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         if wp.static(has_modes):
             hourglass, spent = modes(shape, K, G, flag, history, e)
             dissipated += spent
+        if wp.static(lags):
+            hourglass = extreme[LAG_LOSS, e]
         energy_out[1, first + e] = dissipated
         energy_out[4, first + e] = hourglass
 

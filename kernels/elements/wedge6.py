@@ -17,16 +17,21 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.materials.point import material_point
-from warp_mca.kernels.records.extremes import keep_functions
+from warp_mca.kernels.records.extremes import LAG_LOSS, keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-__all__ = ["energy_kernel", "force_kernel", "kept", "stress_kernel"]
+__all__ = ["energy_kernel", "force_kernel", "kept", "lags", "stress_kernel"]
 
 
 def kept(law: Law, finite: bool) -> tuple[str, ...]:
-    """Covariant components of the inelastic part of the internal vector, and the energy that its lag took [J]."""
-    return ("scalar",) * 4 if law.general or law.history else ()
+    """Covariant components of the inelastic part of the internal vector."""
+    return ("scalar",) * 3 if lags(law, finite) else ()
+
+
+def lags(law: Law, finite: bool) -> bool:
+    """Whether the internal vector has an inelastic part."""
+    return law.general or bool(law.history)
 
 
 @cache
@@ -34,7 +39,6 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
     """Its six points, of which each shows its stress at the nearest corner."""
     R = scalars(precision).real
     Wedge6, load_shape, enriched, strain_at = shape_functions(precision, law_name, finite)
-    lost = POINTS * law_functions(law_name, precision).size + 3
 
     @wp.func
     def gradient(shape: Wedge6, g: int):
@@ -51,12 +55,8 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
     def corner_of(g: int, j: int):
         return g
 
-    @wp.func
-    def modes(shape: Wedge6, K: R, G: R, flag: int, history: wp.array2d(dtype=R), e: int):
-        return history[wp.static(lost), e], R(0.0)
-
     given = (OWN, Wedge6, load_shape, gradient, rotation, 1, corner_of)
-    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, modes=modes if law_name else None)
+    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=bool(law_name))
 
 
 @cache
@@ -71,12 +71,19 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
     first = POINTS * law_functions(law_name, precision).size
 
     @wp.func
-    def keep_vector(shape: Wedge6, left: vec3, loose: vec3, e: int, history_out: wp.array2d(dtype=R)):
+    def keep_vector(
+        shape: Wedge6,
+        left: vec3,
+        loose: vec3,
+        e: int,
+        history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
+    ):
         change = R(0.5) * (shape.G * loose)
         for i in range(3):
             history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
         work = R(0.5) * R(SIXTH) * shape.volume * wp.dot(left, loose)
-        history_out[wp.static(first + 3), e] = history_out[wp.static(first + 3), e] + work
+        extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + work
 
     return keep_vector
 
@@ -146,7 +153,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         f, left, loose = forces(shape, law[m, 0], law[m, 1], A, M, Mz, Mr, Ms)
         if wp.static(plastic):
             if wp.static(general) or flows != 0:
-                keep_vector(shape, left, loose, e, history_out)
+                keep_vector(shape, left, loose, e, history_out, extreme_out)
             if flows != flag:
                 yielded_out[e] = flows
         keep_strain(e, largest, extreme_out)

@@ -1,12 +1,12 @@
-"""Owns the greatest values that kernels keep from step to step: strain, loss of volume, speed, contact force."""
+"""Owns what kernels keep over all steps: greatest strain, loss of volume, speed and contact force; lost energy."""
 
 from functools import cache
 from typing import Any
 
 import warp as wp
 
-# Rows of the extremes of elements:
-STRAIN_SQUARE, VOLUME_LOSS = 0, 1
+# Rows of the extremes of elements; the last one only where internal vectors lag behind:
+STRAIN_SQUARE, VOLUME_LOSS, LAG_LOSS = 0, 1, 2
 
 
 # Smaller values are left to check records, so that most elements write nothing in a step.

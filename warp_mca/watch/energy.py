@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
+from warp_mca.physics.elements import ELEMENTS
 from warp_mca.watch.ledger import MIN_EXCHANGE
 from warp_mca.watch.row import Finished, Values, row
 
@@ -73,6 +74,22 @@ def soft_springs(c: Finished, most: float) -> Iterator[Values]:
         if share is not None and share > most:
             default = "" if contact.penalty is None else " or leave it to its default"
             yield dict(share=share, name=name, loss=PEAK_LOSS * share, default=default)
+
+
+@row(
+    "{hourglass:.2g} J, {share:.1%} of the plastic work, went to internal vectors, which lag a step behind the flow:",
+    "lower time_step_scale, with which it goes down, and compare",
+    0.03,
+    "of the plastic work at most",
+)
+def lagging_vectors(c: Finished, most: float) -> Iterator[Values]:
+    """Energy that internal vectors of `hex8i`, `hex8w` or `wedge6` lost as they lagged, over the plastic work."""
+    energy = c.ledger.energy()
+    spent, plastic = energy["hourglass"], energy["plastic"]
+    if spent > most * plastic > 0.0 and all(
+        getattr(ELEMENTS[block.element], "lags", False) for block in c.model.blocks if block.plastic
+    ):
+        yield dict(hourglass=spent, share=spent / plastic)
 
 
 def spring_shares(ledger: Ledger, model: Model, names: Sequence[str]) -> dict[str, float | None]:

@@ -27,6 +27,7 @@ class Element(Protocol):
         leaves: may be left out; types stored as this cell that other elements compute, the default ones of their types.
         one_rate: may be left out; True where forces depend on neighbouring elements too, so that all of a block take
             the same step.
+        lags: may be left out; True where all of its hourglass energy is what internal vectors lose as they lag.
         oriented: may be left out; as `Hex8w.oriented`, where the order of the corners of cells matters.
     """
 

@@ -74,6 +74,7 @@ class Hex8i:
     cell = "hexahedron"
     leaves = ("wedge",)
     patches = True
+    lags = True
     lumped_masses = staticmethod(lumped_masses)
 
     def __init__(self, name: str = "hex8i", points: int = 8) -> None:

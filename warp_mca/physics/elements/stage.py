@@ -54,6 +54,7 @@ class ElementStage:
         dt: time step of level 0 [s], for laws that depend on rates; 0, as it is at first, asks for the stress of the
             history as it stands.
         points: integration points that keep a history.
+        lags: whether internal vectors lag behind, see `ElementState.extreme`.
         kept: kinds of what the history of an element holds, of `kernels.materials.laws.ROWS`, point by point.
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
@@ -70,7 +71,7 @@ class ElementStage:
             block: the elements.
             precision: as in `warp_mca.run`.
             kernels: module that makes force_kernel, energy_kernel and stress_kernel, and says by `kept(law, finite)`
-                what follows the history of the points, if anything does.
+                what follows the history of the points, if anything does, and by `lags` whether vectors lag behind.
             points: integration points that keep a history.
         """
         self.block, self.corners, self.index = block, block.conn.shape[0], 0
@@ -83,6 +84,7 @@ class ElementStage:
         self.law = law_functions(block.law, precision)
         more = kernels.kept(self.law, block.finite) if hasattr(kernels, "kept") else ()
         self.kept: tuple[str, ...] = points * self.law.history + more
+        self.lags = hasattr(kernels, "lags") and kernels.lags(self.law, block.finite)
         self.real = scalars(precision).real
         self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
         kind = (precision, block.law, block.finite)
@@ -107,7 +109,7 @@ class ElementStage:
         return ElementState(
             yielded=wp.zeros(self.count if self.block.plastic else 0, dtype=wp.int32),
             history=wp.zeros((row_count(self.kept), self.count if self.kept else 0), dtype=self.real),
-            extreme=wp.zeros((2, self.count), dtype=self.real),
+            extreme=wp.zeros((3 if self.lags else 2, self.count), dtype=self.real),
         )
 
     def rotated(self, history: NDArray, rotation: NDArray[np.float64]) -> NDArray:

@@ -16,8 +16,9 @@ class ElementState:
         history: history that the law keeps at each integration point [-], as `kernels.materials.laws.Law.history` says,
             point by point, then what the element keeps besides, shape (row_count, element_count), float32 or float64;
             empty where elastic.
-        extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on,
-            shape (2, element_count), float32 or float64.
+        extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on;
+            where internal vectors lag behind, the energy that this took [J]; shape (2 or 3, element_count), float32 or
+            float64.
     """
 
     yielded: wp.array

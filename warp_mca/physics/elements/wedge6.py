@@ -91,6 +91,7 @@ class Wedge6:
     name = "wedge6"
     cell = "wedge"
     patches = False
+    lags = True
 
     def lumped_masses(self, x: Array, rho: Array) -> Array:
         """Row sums of the consistent masses."""
