@@ -218,11 +218,12 @@ def test_plastic_moment_of_a_brick_of_internal_modes(beyond: bool):
     assert 2.0 / 3.0 * DEEP / of_section == pytest.approx(1.0 + bending_flow.limit, abs=0.03)
 
 
-@pytest.mark.parametrize("long", [0.25, 1.0, 2.0])
+@pytest.mark.parametrize(("long", "layers"), [(0.25, 1), (1.0, 1), (2.0, 1), (0.5, 2), (1.0, 2), (1.0, 4)])
 @pytest.mark.parametrize("element", ["hex8i", "hex8", "hex8r"])
-def test_plastic_moment_told_is_that_of_the_forces(element: str, long: float):
-    """One layer bent to ten times the curvature at which it yields, beside sigma_y b h^2 / 4, by the kernels."""
-    body = Statics(Setup(element=element, precision="float64"), brick(element, (1, 1, 1), (long, 1.0, 1.0)), METAL)
+def test_plastic_moment_told_is_that_of_the_forces(element: str, long: float, layers: int):
+    """Layers bent to ten times the curvature at which they yield, beside sigma_y b h^2 / 4, by the kernels."""
+    mesh = brick(element, (1, 1, layers), (long, 1.0, 1.0))
+    body = Statics(Setup(element=element, precision="float64"), mesh, METAL)
     x, y, z = body.body.X.T
     near, far = x < 1e-9, x > long - 1e-9
     held = np.stack([near | far, y < 1e-9, near & (z < 1e-9)], axis=1)
@@ -230,10 +231,10 @@ def test_plastic_moment_told_is_that_of_the_forces(element: str, long: float):
     error = force[far, 0] @ (z[far] - 0.5) / (0.25 * SIGMA_Y) - 1.0
     model = body.body.model
     (sums,) = seen(model, samples_of(model), body.body.state.u.numpy(), np.zeros((0, COLUMNS)))
-    if element == "hex8r":
+    if element == "hex8r" and layers == 1:
         assert error > 5.0 and sums[MISSED] > 0.9 * sums[SPENT]
     else:
-        assert sums[FLOWING] / sums[FLOW] == pytest.approx(1.0 + error, rel=0.02)
+        assert sums[FLOWING] / sums[FLOW] == pytest.approx(1.0 + error, rel=0.03)
 
 
 YIELDING = {  # cells, element, load over that at which the surface yields, and what must be said
