@@ -2,18 +2,20 @@
 
     python -m benchmarks.verification --device cuda:0 --processes 20    run, write verification.json and the page
     python -m benchmarks.verification chain_mujoco                      run these cases only, on a CPU
+    python -m benchmarks.verification --missing                         what is not stored
     python -m benchmarks.verification --render                          write the page from verification.json again
 
-Outcomes replace those of the same case, element and precision; a case that is skipped, because a module is missing,
-leaves the one that is stored. The text above the tables is verification.template.md.
+Outcomes replace those of the same case, element and precision, and are stored as they come; a case that is skipped,
+because a module is missing, leaves the one that is stored. The text above the tables is verification.template.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import multiprocessing
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -60,13 +62,18 @@ def key(found: dict[str, Any]) -> tuple[str, ...]:
     return found["case"], found["element"], found["precision"]
 
 
-def run(todo: list[Task], stored: list[dict[str, Any]], processes: int) -> list[dict[str, Any]]:
-    """Stored outcomes with those of `todo` in their place; cases that took longest begin first."""
-    wall = {key(found): found["wall"] for found in stored}
-    order = sorted(todo, key=lambda task: -wall.get(task[:3], 0.0))
+def run(todo: list[Task], stored: list[dict[str, Any]], processes: int) -> Iterator[list[dict[str, Any]]]:
+    """Outcomes after each of `todo`: it in place of one stored, others dropped; cases that took longest begin first."""
+    wanted = [task[:3] for task in tasks((), "", "")]
+    wall: dict[str, float] = {}
+    for item in stored:
+        wall[item["case"]] = max(item["wall"], wall.get(item["case"], 0.0))
+    order = sorted(todo, key=lambda task: -wall.get(task[0], math.inf))
+    found = {key(item): item for item in stored}
     with multiprocessing.get_context("spawn").Pool(processes) as pool:
-        new = pool.map(measure, order, chunksize=1)
-    return [*{key(found): found for found in [*stored, *filter(None, new)]}.values()]
+        for new in filter(None, pool.imap_unordered(measure, order)):
+            found[key(new)] = new
+            yield [found[item] for item in wanted if item in found]
 
 
 def write_page(stored: list[dict[str, Any]], folder: Path) -> None:
@@ -98,13 +105,17 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--level", default="full", choices=("quick", "full"))
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--missing", action="store_true", help="only what is not stored")
     parser.add_argument("--data", type=Path, default=FOLDER / "verification.json", help="where outcomes are kept")
     parser.add_argument("--render", action="store_true", help="only write the page from the outcomes kept")
     args = parser.parse_args()
     stored = json.loads(args.data.read_text(encoding="utf-8")) if args.data.exists() else []
     if not args.render:
-        stored = run(tasks(args.cases, args.device, args.level), stored, args.processes)
-        args.data.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+        known = {key(item) for item in stored if args.missing}
+        todo = [task for task in tasks(args.cases, args.device, args.level) if task[:3] not in known]
+        for found in run(todo, stored, args.processes):
+            stored = found
+            args.data.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
         note(args.data, args.device)
     write_page(stored, FOLDER)
 

@@ -12,7 +12,7 @@ from warp_mca.verify.taylor import mushroom
 @pytest.fixture(scope="module")
 def found() -> tuple[float, float]:
     """Length, and radius of the foot [mm], of `hex8` with 2 cells over the radius and 12 along the bar."""
-    return mushroom(Setup(), 12, "held")
+    return mushroom(Setup(element="hex8"), 12, "held")
 
 
 @pytest.mark.parametrize("law", LAWS)

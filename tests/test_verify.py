@@ -18,12 +18,12 @@ from warp_mca.verify.runner import outcome, verify
 ROOT = Path(__file__).parent.parent
 
 
-# All cases with hex8; with the others those that show what is theirs, but for the long ones.
+# All cases with the default; with the others those that show what is theirs, but for the long ones.
 SHORT = [
     (case, element)
     for case in cases()
     for element in case.taken()
-    if element == "hex8" or case.group in ("elements", "material", "friction")
+    if element == Setup.element or case.group in ("elements", "material", "friction")
     if element != "tet4" or case.name not in ("cantilever_vibration", "near_incompressible_bending", "rolling_sphere")
 ]
 

@@ -95,7 +95,7 @@ def free_swing(value: int, element: str) -> Trial:
     # equal masses: 1/2 of them at `side`, 1/4 at its diagonal from the hinge
     inertia, arm = 0.5 * side**2 + 0.25 * 2.0 * side**2, 0.5 * math.sqrt(2.0) * side
     period = 4.0 * math.sqrt(inertia / (g * arm)) * float(ellipk(math.sin(0.5 * amplitude) ** 2))
-    dt = {"hex8": 1.119e-5, "hex8r": 1.119e-5, "tet4": 7.38e-6}[element]
+    dt = 7.38e-6 if element == "tet4" else 1.119e-5
     duration = value * dt
     rows = max(400, min(200_000, int(20.0 * duration / period)))
     scene = mca.Scene(

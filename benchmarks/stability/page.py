@@ -29,6 +29,7 @@ WORDS = (
     ("of the strain energy of", "bending", "cells too long or too few over the depth bend too stiffly or too freely"),
     ("plastic moment", "plastic moment", "cells too few over the depth yield too early or too late in bending"),
     ("does not let", "no yield", "cells of `hex8r` too few over the depth do not yield in bending"),
+    ("went to internal vectors", "lag", "internal vectors lag behind the flow: lower `time_step_scale`"),
     ("contact springs held", "soft springs", "contact springs are soft beside the bodies: raise `penalty`"),
     ("m thick: contact", "through", "nodes sank through a good part of a thin body"),
     ("acted on", "few nodes", "the force acted on too few nodes: refine"),

@@ -14,7 +14,7 @@ from warp_mca.phases.prepare import Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
-from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.case import SHAPES, Row, Setup, case
 
 Array = NDArray[np.float64]
 
@@ -162,6 +162,7 @@ def _column_amplitude(setup: Setup, wave: str, cells: int) -> float:
     group="waves",
     title="An absorbing end sends back nothing of waves that meet it at right angles",
     reference="Lysmer and Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859; traction rho c v of a plane wave.",
+    elements=SHAPES,
 )
 def absorbing_end(setup: Setup) -> list[Row]:
     """Column between planes of symmetry; Gaussian pulse, k = 1 / width at its strongest: wavelength 1, length 2."""
@@ -181,6 +182,7 @@ def absorbing_end(setup: Setup) -> list[Row]:
     group="waves",
     title="An absorbing side sends back of oblique waves what theory says of its dashpots",
     reference="Lysmer and Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859, for the spectrum of each packet.",
+    elements=SHAPES,
 )
 def absorbing_angles(setup: Setup) -> list[Row]:
     """Plane strain, nu = 0.25; packets of P and SV waves, one wavelength the standard deviation of their envelope."""

@@ -17,7 +17,8 @@ from warp_mca.physics.elements import ELEMENTS
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
 
-USUAL = ("hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
+USUAL = ("hex8i", "hex8", "hex8r", "tet4")  # elements that cases are run with where none is named
+SHAPES = ("hex8i", "tet4")  # one of each shape, where cases see only masses and faces of cells, or plane waves
 Level = Literal["quick", "full"]
 T = TypeVar("T")
 EPSILON = {"mixed": 2.0**-23, "float64": 2.0**-52}  # round-off by precision
@@ -35,7 +36,7 @@ class Setup:
 
     device: str = "cpu"
     precision: str = "mixed"
-    element: str = "hex8"
+    element: str = USUAL[0]
     level: Level = "quick"
 
     def by_element(self, value: T, **others: T) -> T:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warp_mca as mca
-from warp_mca.verify.case import Row, Setup, case, crossings
+from warp_mca.verify.case import SHAPES, Row, Setup, case, crossings
 
 COULOMB = "Coulomb's law and the motion of a rigid body."
 MASS, MU, GRAVITY, SPEED = 0.2, 0.3, 300.0, 1.0  # of sliding_block and block_on_belt [kg, -, m/s^2, m/s]
@@ -55,6 +55,7 @@ def slid(time: NDArray[np.float64], slip: NDArray[np.float64]) -> float:
     group="friction",
     title="A block slides to rest: over v^2 / (2 mu g), in v / (mu g), and all its energy becomes heat",
     reference=COULOMB,
+    elements=SHAPES,
 )
 def sliding_block(setup: Setup) -> list[Row]:
     """v = 1 m/s, mu = 0.3, g = 300 m/s^2, 0.2 kg; the speed is that of the centre of mass, out of the impulse."""
@@ -79,6 +80,7 @@ def sliding_block(setup: Setup) -> list[Row]:
     group="friction",
     title="A belt takes a block along: at its speed after v / (mu g); half its work is heat, half motion",
     reference=COULOMB,
+    elements=SHAPES,
 )
 def block_on_belt(setup: Setup) -> list[Row]:
     """As `sliding_block`, seen from the ground on which the block was at rest."""
@@ -112,6 +114,7 @@ def block_on_belt(setup: Setup) -> list[Row]:
     group="friction",
     title="Friction's energy is its force times the slip",
     reference="The work of a force; a spring at its limit mu F_n holds mu^2 / (1 + mu^2) of its contact's energy.",
+    elements=SHAPES,
 )
 def friction_work(setup: Setup) -> list[Row]:
     """The block of `block_on_belt`, held, while the belt slides at v = 1 m/s: slip is the belt's way.
@@ -136,6 +139,7 @@ def friction_work(setup: Setup) -> list[Row]:
     group="friction",
     title="Sticking contact gives all of its elastic energy back, at the frequency of its springs",
     reference="Rigid mass on springs: omega = sqrt(k / m), k = penalty K A^2 / V a node, of equal faces.",
+    elements=SHAPES,
 )
 def sticking_energy(setup: Setup) -> list[Row]:
     """10 periods at 80 % of the limit of friction; height and so normal force are held."""
@@ -173,6 +177,7 @@ def sticking_energy(setup: Setup) -> list[Row]:
         "Rigid mass m on a spring k: it sticks for mu F_n / (k v), then x = mu F_n / k + (v / omega) sin(omega t), "
         "omega = sqrt(k / m), whose speed is the belt's again after 2 pi / omega; heat mu F_n v 2 pi / omega by then."
     ),
+    elements=SHAPES,
 )
 def stick_slip(setup: Setup) -> list[Row]:
     """v = 0.1 m/s, mu F_n = 1 N, k = 20 kN/m, m = 2 g and a third of the spring's 0.008 g."""

@@ -130,7 +130,6 @@ def yielding_bar(setup: Setup) -> list[Row]:
     group="impact",
     title="A steel block strikes a clamped strip of one layer of cells, which throws it back",
     reference="The strip of four layers of hex8i: 0.2158 mm and 35.07 mN s; two layers differ by 0.1 and 0.2 %.",
-    elements=("hex8", "hex8i", "hex8r", "tet4"),
 )
 def struck_strip(setup: Setup) -> list[Row]:
     """Block 10 x 10 x 25 mm at 1 m/s, strip 100 x 10 x 2 mm of 80 x 8 x 1 cells.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warp_mca.base.arrays import Array
-from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.case import SHAPES, Row, Setup, case
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
@@ -139,6 +139,7 @@ def chain_energy(setup: Setup) -> list[Row]:
     group="rigid",
     title="Hand-off to finite elements and back keeps momenta and energy",
     reference="Conservation laws: lumped nodal masses carry what the links carried.",
+    elements=SHAPES,
 )
 def handoff_conservation(setup: Setup) -> list[Row]:
     """The two-link manipulator at contact with inertia="mesh"; then back, with and without a vibration on top."""

@@ -6,7 +6,7 @@ import numpy as np
 
 import warp_mca as mca
 from warp_mca.geometry.quality import volumes
-from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.case import SHAPES, Row, Setup, case
 from warp_mca.verify.friction import COULOMB, impulse
 
 
@@ -14,6 +14,7 @@ from warp_mca.verify.friction import COULOMB, impulse
     group="friction",
     title="A sphere that slides at first ends up rolling, at 5 v / 7 from 2 v / (7 mu g) on",
     reference=COULOMB + " Its moment of inertia is 2 m R^2 / 5.",
+    elements=SHAPES,
 )
 def rolling_sphere(setup: Setup) -> list[Row]:
     """v = 10 m/s, mu = 0.3, g = 12000 m/s^2, R = 10 mm; half of the sphere is run, on a contact radius of 0.055 R.

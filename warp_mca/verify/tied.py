@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.case import SHAPES, Row, Setup, case
 
 
 @case(
@@ -14,6 +14,7 @@ from warp_mca.verify.case import Row, Setup, case
     title="A tie of a fine mesh to one of twice its cells sends back nothing of a pulse but what the cells do",
     reference="One-dimensional wave theory: bars of one impedance send back nothing; Graff, Wave Motion in Elastic "
     "Solids (1975), chapter 2.",
+    elements=SHAPES,
 )
 def tied_bar(setup: Setup) -> list[Row]:
     """Square bar, nu = 0; the pulse beside that in a longer bar of the fine mesh, on both sides of the tie."""

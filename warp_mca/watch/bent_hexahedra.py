@@ -104,25 +104,32 @@ def full_hexahedra(u: Array, cells: Cells) -> Array:
     if cells.sigma_y > 0.0:
         mean, point = np.sqrt(2.0 / 3.0 * deviator_square(strain)), np.sqrt(2.0 / 3.0 * bent / (G * V))
         if 3.0 * G * (mean + 3.0 * point).max() > cells.sigma_y:  # right strains at the surface are no larger
-            share = point**2 / np.maximum(mean**2 + point**2, _LITTLE)
+            share, sheared = point**2 / np.maximum(mean**2 + point**2, _LITTLE), _sheared(modes, bricks) / 9.0
             outer = np.sqrt(_right(modes, G, 0.5, share) / (3.0 * G))  # flow keeps volumes
             flows = 3.0 * G * (mean + np.maximum(point, outer)) > cells.sigma_y
-            found[3:5] = V[flows] @ _flowing(mean, point)[flows], V[flows] @ _flow(mean, outer)[flows]
+            flowing = _flowing(mean, point**2, sheared)
+            found[3:5] = V[flows] @ flowing[flows], V[flows] @ _flow(mean, outer)[flows]
     return found
 
 
 def one_point_hexahedra(u: Array, cells: Cells) -> Array:
-    """What `bent_cells` names of cells of `hex8r` that are looked at, shape (COLUMNS,)."""
+    """What `bent_cells` names of cells of `hex8r` that are looked at, shape (COLUMNS,).
+
+    Stress of bending relaxes as the one point flows: outer/mean of the yield stress is left at the surface.
+    """
     bricks, strain, p = _strains(u, cells)
     common, modes = _common(strain, p, bricks, cells.K, cells.G), _modes(p, bricks, cells.G)
-    bent = bricks.volume / 6.0 * _driven(modes, cells.G, cells.nu)
+    V, bent = bricks.volume, bricks.volume / 6.0 * _driven(modes, cells.G, cells.nu)
     found = np.zeros(COLUMNS)
     found[:2] = (common + bent).sum()
     found[2] = bent.sum()
     if cells.sigma_y > 0.0:
-        mean = cells.G * np.sqrt(6.0 * deviator_square(strain)) / cells.sigma_y
-        outer = mean + np.sqrt(6.0 * cells.E * bent / bricks.volume) / cells.sigma_y
-        found[5] = (bent * np.clip(outer - 1.0, 0.0, 1.0))[mean < 1.0].sum()
+        mean, outer = _equivalent(strain, modes, cells.G)
+        flows = 3.0 * cells.G * mean > cells.sigma_y
+        flowing = mean + outer**2 / np.maximum(3.0 * mean, _LITTLE)
+        found[3:5] = V[flows] @ flowing[flows], V[flows] @ _flow(mean, outer)[flows]
+        surface = 3.0 * cells.G * mean + np.sqrt(6.0 * cells.E * bent / V)
+        found[5] = (bent * np.clip(surface / cells.sigma_y - 1.0, 0.0, 1.0))[~flows].sum()
     return found
 
 
@@ -135,10 +142,15 @@ def enriched_hexahedra(u: Array, cells: Cells) -> Array:
     found = np.zeros(COLUMNS)
     found[:2] = (_common(strain, p, bricks, cells.K, cells.G) + bent).sum()
     found[2] = bent.sum()
-    mean, outer = np.sqrt(2.0 / 3.0 * deviator_square(strain)), np.sqrt(_driven(modes, cells.G, 0.5) / (3.0 * cells.G))
+    mean, outer = _equivalent(strain, modes, cells.G)
     flows = 3.0 * cells.G * (mean + outer) > DEEP * cells.sigma_y
     found[3:5] = V[flows] @ np.maximum(mean, outer / np.sqrt(3.0))[flows], V[flows] @ _flow(mean, outer)[flows]
     return found
+
+
+def _equivalent(strain: Array, modes: Modes, G: float) -> tuple[Array, Array]:
+    """Equivalent strains [-]: the mean one, and that of right bending at the surface where flow keeps volumes."""
+    return np.sqrt(2.0 / 3.0 * deviator_square(strain)), np.sqrt(_driven(modes, G, 0.5) / (3.0 * G))
 
 
 Modes = list[tuple[Array, Array, Array, Array]]  # e_i, e_j and the forces f_i, f_j of hex8 against them, by edge k
@@ -159,6 +171,15 @@ def _modes(p: Array, bricks: Bricks, G: float) -> Modes:
 def _spent(modes: Modes) -> Array:
     """Energy of bending of hex8 over V/6 [Pa]."""
     return sum((f_i * e_i + f_j * e_j for e_i, e_j, f_i, f_j in modes), np.zeros_like(modes[0][0]))
+
+
+def _sheared(modes: Modes, bricks: Bricks) -> Array:
+    """Energy of the shear that bending brings in hex8, over G V/6 [-]."""
+    found, h = np.zeros_like(modes[0][0]), bricks.half
+    for k, (e_i, e_j, _, _) in enumerate(modes):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        found += (h[i] / h[k] * e_i) ** 2 + (h[j] / h[k] * e_j) ** 2
+    return found
 
 
 def _driven(modes: Modes, G: float, nu: float) -> Array:
@@ -190,9 +211,15 @@ def _right(modes: Modes, G: float, nu: float, share: Array) -> Array:
     return share * _free(modes, G, nu) + (1.0 - share) * _driven(modes, G, nu)
 
 
-def _flowing(mean: Array, point: Array) -> Array:
-    """Mean equivalent strain of the two layers of points: mean strain and bending as they stand to each other there."""
-    square, mixed = mean**2 + point**2, 2.0 * _ALIGNED * mean * point
+def _flowing(mean: Array, bent: Array, sheared: Array) -> Array:
+    """Mean equivalent strain of the two layers of points: mean strain and bending as they stand to each other there.
+
+    Args:
+        mean: equivalent mean strain [-].
+        bent: square of that of bending at the points, with its shear, which no mean strain is aligned with [-].
+        sheared: square of that of the shear [-].
+    """
+    square, mixed = mean**2 + bent, 2.0 * _ALIGNED * mean * np.sqrt(np.maximum(bent - sheared, 0.0))
     return 0.5 * (np.sqrt(square + mixed) + np.sqrt(square - mixed))
 
 
