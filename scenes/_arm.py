@@ -69,7 +69,7 @@ def _bodies(
 ) -> tuple[mca.Body, ...]:
     """The rods, the last one with its tip, and the plate."""
     *inner, last = (
-        mca.Body(name=link, geometry=rod, element="hex8", material=materials["body"], exact_mass=False)
+        mca.Body(name=link, geometry=rod, element=plate.element, material=materials["body"], exact_mass=False)
         for link, rod in zip(links, rods, strict=True)  # published figures of these scenes are of the mass of its cells
     )
     tip = replace(last, material={"body": materials["body"], "tip": materials["tip"]})
@@ -146,6 +146,7 @@ def arm(
     t_end: float | None = None,
     absorbs: str = "none",
     rigid_bodies: str | None = None,
+    element: str = mca.Body.element,
 ) -> mca.Scene:
     """Equal rods, hinged in a row from O at the origin, whose hemispherical tip will strike a plate H below O.
 
@@ -171,13 +172,14 @@ def arm(
         absorbs: boundaries of the plate through which waves leave: "none"; its "ends"; "all" but the top, with springs
             in place of the support.
         rigid_bodies: names of the bodies that stay rigid in the impact, with commas between them.
+        element: of rods and plate.
     """
     last, tip_centre = links[-1], (length - radius, 0.0, 0.0)
     top = mca.Surface(body="plate", nodes="top")
     ground = mca.Body(
         name="plate",
         geometry=plate,
-        element="hex8",
+        element=element,
         material=materials["plate"],
         position=(0.0, -H, 0.0),
         velocity=(v_plate, 0.0, 0.0),

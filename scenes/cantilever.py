@@ -30,7 +30,7 @@ def build(
     bar = mca.Box(size=(length, depth, width), divisions=(axial, deep, wide), origin=(0.0, -0.5 * depth, 0.0))
     return mca.Scene(
         name="cantilever",
-        bodies=(mca.Body(name="bar", geometry=bar, element="hex8", material=mca.Elastic(E=E, nu=nu, rho=rho)),),
+        bodies=(mca.Body(name="bar", geometry=bar, material=mca.Elastic(E=E, nu=nu, rho=rho)),),
         fixed=(
             mca.Fixed(body="bar", nodes="xmin", axes="xy"),
             mca.Fixed(body="bar", nodes="zmin", axes="z"),

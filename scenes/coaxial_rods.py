@@ -35,8 +35,8 @@ def build(
     return mca.Scene(
         name="coaxial_rods",
         bodies=(
-            mca.Body(name="short", geometry=short, element="hex8", material=material, velocity=(v, 0.0, 0.0)),
-            mca.Body(name="long", geometry=long, element="hex8", material=material),
+            mca.Body(name="short", geometry=short, material=material, velocity=(v, 0.0, 0.0)),
+            mca.Body(name="long", geometry=long, material=material),
         ),
         contacts=(contact,),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / 660.0),

@@ -49,7 +49,6 @@ def build(
         mca.Body(
             name=name,
             geometry=box,
-            element="hex8",
             material=mca.Elastic(E=E, nu=nu, rho=rho),
             position=place,
             rotation=(0.0, 0.0, -theta - 0.5 * math.pi),

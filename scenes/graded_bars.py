@@ -38,8 +38,8 @@ def build(
     return mca.Scene(
         name="graded_bars",
         bodies=(
-            mca.Body(name="left", geometry=left, element="hex8", material=material, velocity=(v, 0.0, 0.0)),
-            mca.Body(name="right", geometry=right, element="hex8", material=material, velocity=(-v, 0.0, 0.0)),
+            mca.Body(name="left", geometry=left, material=material, velocity=(v, 0.0, 0.0)),
+            mca.Body(name="right", geometry=right, material=material, velocity=(-v, 0.0, 0.0)),
         ),
         contacts=(
             mca.Contact(

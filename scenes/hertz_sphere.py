@@ -32,7 +32,6 @@ def build(
     moving = mca.Body(
         name="sphere",
         geometry=mca.Sphere(radius=radius, part="quarter", **patch),  # pyright: ignore[reportArgumentType]
-        element="hex8",
         material=mca.Elastic(E=E_ratio * E, nu=nu, rho=rho),
         rigid=rigid_sphere,
         position=(0.0, radius, 0.0),
@@ -54,7 +53,7 @@ def build(
             layers=2 * pole_layers,
             part="quarter",
         )
-        bodies.append(mca.Body(name="block", geometry=block, element="hex8", material=mca.Elastic(E=E, nu=nu, rho=rho)))
+        bodies.append(mca.Body(name="block", geometry=block, material=mca.Elastic(E=E, nu=nu, rho=rho)))
         held = {"xmin": "x", "zmin": "z", "bottom": "y"}
         fixed += [mca.Fixed(body="block", nodes=nodes, axes=axes) for nodes, axes in held.items()]
         master = mca.Surface(body="block", nodes="contact")

@@ -39,7 +39,7 @@ def build(
     times = tuple(end * i / _TABLE for i in range(_TABLE + 1))
     return mca.Scene(
         name="pulse_bar",
-        bodies=(mca.Body(name="bar", geometry=bar, element="hex8", material=plastic or elastic),),
+        bodies=(mca.Body(name="bar", geometry=bar, material=plastic or elastic),),
         fixed=(mca.Fixed(body="bar", nodes="ymin", axes="y"), mca.Fixed(body="bar", nodes="zmin", axes="z")),
         prescribed=(
             mca.Prescribed(

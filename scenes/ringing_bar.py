@@ -45,7 +45,6 @@ def build(
             mca.Body(
                 name="bar",
                 geometry=bar,
-                element="hex8",
                 material=mca.Elastic(E=E, nu=nu, rho=rho),
                 velocity=(v, 0.0, 0.0) if motion == "along" else (0.0, v, 0.0),
                 exact_mass=False,  # published figures of this scene are of the mass of its cells

@@ -30,15 +30,7 @@ def build(
     duration = 1.25 * 2.0 * length / math.sqrt(E / rho)
     return mca.Scene(
         name="rod_on_wall",
-        bodies=(
-            mca.Body(
-                name="rod",
-                geometry=rod,
-                element="hex8",
-                material=mca.Elastic(E=E, nu=nu, rho=rho),
-                velocity=(v, 0.0, 0.0),
-            ),
-        ),
+        bodies=(mca.Body(name="rod", geometry=rod, material=mca.Elastic(E=E, nu=nu, rho=rho), velocity=(v, 0.0, 0.0)),),
         contacts=(mca.Contact(slave=mca.Surface(body="rod", nodes="xmax"), master=wall, penalty=penalty),),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / 400.0),
         tip=mca.Point(body="rod", at=(0.5 * length, 0.0, 0.0)),

@@ -38,7 +38,6 @@ def build(
     ball = mca.Body(
         name="ball",
         geometry=sphere,
-        element="hex8",
         material=material,
         position=(0.0, radius - depth, 0.0),
         rotation=(0.0, 0.0, -0.5 * math.pi + 0.5 * turn),

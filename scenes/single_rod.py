@@ -42,7 +42,6 @@ def build(
             mca.Body(
                 name="rod",
                 geometry=rod,
-                element="hex8",
                 material=mca.Elastic(E=E, nu=nu, rho=rho),
                 velocity=(v, 0.0, 0.0),
                 exact_mass=False,  # published figures of this scene are of the mass of its cells

@@ -37,7 +37,6 @@ def build(
     block = mca.Body(
         name="block",
         geometry=mca.Box(size=size, divisions=divisions),
-        element="hex8",
         material=material,
         position=(0.0, -weight / springs, 0.0),
         velocity=(v, 0.0, 0.0),

@@ -35,9 +35,7 @@ def build(
     line = mca.Line(body="rod", start=(first, 0.0, 0.0), end=(first + length, 0.0, 0.0))
     return mca.Scene(
         name="spinning_rod",
-        bodies=(
-            mca.Body(name="rod", geometry=rod, element="hex8", material=material, angular_velocity=(0.0, 0.0, omega)),
-        ),
+        bodies=(mca.Body(name="rod", geometry=rod, material=material, angular_velocity=(0.0, 0.0, omega)),),
         joints=(mca.Revolute(name="O", body="rod", at=(0.0, 0.0, 0.0)),) if hinged else (),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / samples),
         paths=(mca.Path(name="axis", lines=(line,), spacing=length / axial),),

@@ -54,7 +54,6 @@ def build(
             mca.Body(
                 name="bar",
                 geometry=mesh,
-                element="hex8",
                 material={"spring": spring, "block": block},
                 position=(0.0, -depth, 0.0),
                 velocity=(v, 0.0, 0.0),

@@ -31,7 +31,6 @@ def build(
     block = mca.Body(
         name="block",
         geometry=mca.Box(size=(cells * edge, edge, cells * edge), divisions=(cells, 1, cells)),
-        element="hex8",
         material=material,
         position=(0.0, -depth, 0.0),
         velocity=(share * mu * depth * omega, 0.0, 0.0),

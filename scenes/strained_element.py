@@ -71,7 +71,6 @@ def build(
             mca.Body(
                 name="cube",
                 geometry=mesh,
-                element="hex8",
                 material=mca.J2Bilinear(E=E, nu=nu, rho=rho, sigma_y=sigma_y, E_t=E_t, beta=beta),
             ),
         ),

@@ -48,7 +48,6 @@ def build(
             mca.Body(
                 name="bar",
                 geometry=rod,
-                element="hex8",
                 material=metal,
                 kinematics=measure,
                 velocity=(v, 0.0, 0.0),

@@ -34,7 +34,7 @@ def build(
 
     def half(name: str, x: float, divisions: tuple[int, int, int]) -> mca.Body:
         box = mca.Box(size=(length, side, side), divisions=divisions, origin=(x, -0.5 * side, -0.5 * side))
-        return mca.Body(name=name, geometry=box, element="hex8", material=mca.Elastic(E=E, nu=nu, rho=rho))
+        return mca.Body(name=name, geometry=box, material=mca.Elastic(E=E, nu=nu, rho=rho))
 
     def axis(name: str, x: float) -> mca.Line:
         return mca.Line(body=name, start=(x, 0.0, 0.0), end=(x + length, 0.0, 0.0), position=x)

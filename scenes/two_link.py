@@ -182,6 +182,7 @@ def build(
         t_end=t_end,
         absorbs=plate_absorbs,
         rigid_bodies=rigid_bodies,
+        element="hex8",  # the paper's
     )
     scene = with_nested_plate(scene) if plate_mesh == "nested" else scene
     return scene if fine_length is None else with_coarse_rods(scene, fine_length, rod_section, rod_ring)

@@ -42,7 +42,7 @@ def build(
     times = tuple(2.0 * rise * i / _TABLE for i in range(_TABLE + 1))
     return mca.Scene(
         name="two_metal_bar",
-        bodies=(mca.Body(name="bar", geometry=mesh, element="hex8", material=material),),
+        bodies=(mca.Body(name="bar", geometry=mesh, material=material),),
         prescribed=(
             mca.Prescribed(
                 body="bar",

@@ -147,7 +147,7 @@ def _check_elements(scene: Scene, meshes: Mapping[str, Mesh]) -> None:
         kind = CELL_TYPES[element.cell]
         stored = [meshes[body.name].cells[kind.stored_as] for body in asked if not body.rigid]
         usual = element is default_element(kind.name) and kind.stored_as == kind.name
-        usual = usual or element.name == "hex8"  # which built-in scenes name for bodies that a parameter makes rigid
+        usual = usual or element.name == "hex8"  # which two_link names for bodies that a parameter makes rigid
         if asked and not usual and not any(among(cells, kind.name).any() for cells in stored):
             names = ", ".join(body.name for body in asked)
             cell = kind.field or (kind.name if kind.stored_as == kind.name else f"{kind.name}s")
