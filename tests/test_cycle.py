@@ -30,7 +30,7 @@ COARSE = {
     "plate_extension": 3,
     "output_interval": 2e-6,
 }
-T_END = {"single_link": 0.5, "three_link": 0.8}
+T_END = {"single_link": 0.5, "three_link": 0.85}
 
 
 def scene(name: str, **parameters) -> mca.Scene:
@@ -189,15 +189,15 @@ def test_probes_and_sections_record_swings_and_impacts(name: str):
     """Probes move on through hand-offs and ways back; rigid links have no force in sections."""
     _, _, result = cycle(name)
     (end,), (cut,) = result.probes, result.sections
-    moved = np.diff(end.position, axis=0)
-    way = 0.5 * (end.velocity[1:] + end.velocity[:-1]) * np.diff(end.time)[:, None]
-    error = np.linalg.norm(moved - way, axis=1) / np.linalg.norm(moved, axis=1).max()
     starts = [np.argmin(np.abs(end.time + result.summary["t_contact"] - p.start)) for p in impacts(name)]
     inside = [k + n for k, p in zip(starts, impacts(name), strict=True) for n in range(p.impact.rows)]
     known = np.zeros(len(end.time), dtype=bool)
     known[inside] = True
-    back = known[:-1] & ~known[1:]  # steps in which vibration is left out
-    assert error[~back].max() < 2e-3 and error[back].max() < 0.15
+    back = known[:-1] & ~known[1:]  # steps at whose start vibration is left out
+    moved, before, after = np.diff(end.position, axis=0), end.velocity[:-1], end.velocity[1:]
+    way = np.where(back[:, None], after, 0.5 * (before + after)) * np.diff(end.time)[:, None]
+    error = np.linalg.norm(moved - way, axis=1) / np.linalg.norm(moved, axis=1).max()
+    assert error[~back].max() < 2e-3 and error[back].max() < 0.04
     assert np.array_equal(~np.isnan(cut.force[:, 0]), known) and np.nanmax(np.abs(cut.force)) > 10.0
     assert [len(result.impact(k).probes[0].time) for k in (0, 1)] == [p.impact.rows for p in impacts(name)]
 

@@ -34,13 +34,13 @@ COARSE = {
     "plate_layers": 2,
     "plate_extension": 2,
 }
-OPEN_TIMES = (2e-6, 5e-5, 1e-3)  # the last one does not end within the run
+OPEN_TIMES = (2e-6, 4e-5, 1e-3)  # the last one does not end within the run
 
 
 def scene(mu: float = 0.47) -> mca.Scene:
     """A short, coarse rod that turns fast strikes a plate."""
     made = mca.make_scene(
-        "single_link", theta=46.6, output_interval=2e-6, duration=6e-4, rigid_inertia="mesh", mu=mu, **COARSE
+        "single_link", theta=46.6, output_interval=2e-6, duration=6.6e-4, rigid_inertia="mesh", mu=mu, **COARSE
     )
     assert made.rigid is not None
     return replace(made, rigid=replace(made.rigid, theta_dot=(-10.0,)))
