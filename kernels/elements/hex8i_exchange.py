@@ -1,6 +1,6 @@
-"""Owns what four lanes of a GPU that share an element of `hex8i` exchange.
+"""Owns what two lanes of a GPU that share an element of `hex8i` exchange.
 
-Bits 0 and 1 of a lane are xi and eta of its corners and points.
+Bit 0 of a lane is xi of its corners and points; it has those of both eta, near ones (eta = -1) first.
 """
 
 from functools import cache
@@ -16,10 +16,10 @@ wp.set_module_options({"enable_backward": False})
 
 @cache
 def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
-    """Functions over the four lanes of an element, each of which knows its signs xi and eta.
+    """Functions over the two lanes of an element, each of which knows its sign xi.
 
-    They take its lower and upper corners to the patterns of all; a tensor to its sums over the lanes, by itself and
-    times xi, eta and xi eta; and a vector and a scalar to their sum and maximum.
+    They take its lower and upper corners, near and far, to the patterns of all; a near and a far tensor to their sums
+    over the lanes, by themselves and times xi, eta and xi eta; and a vector and a scalar to their sum and maximum.
     """
     t = scalars(precision)
     R, vec3, mat73 = t.real, t.vec3, t.mat73
@@ -27,50 +27,49 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
     _, exchange = shared_functions(precision)
 
     @wp.func
-    def other(x: vec3, mask: int):
-        return vec3(exchange(x[0], mask), exchange(x[1], mask), exchange(x[2], mask))
+    def other(x: vec3):
+        return vec3(exchange(x[0], 1), exchange(x[1], 1), exchange(x[2], 1))
 
     @wp.func
-    def patterns(lower: vec3, upper: vec3, xi: R, eta: R):
-        s = upper + lower
-        d = upper - lower
-        s1 = other(s, 1)
-        d1 = other(d, 1)
-        ss = s + s1
-        sx = xi * (s - s1)
-        ds = d + d1
-        dx = xi * (d - d1)
-        ss1 = other(ss, 2)
-        sx1 = other(sx, 2)
-        ds1 = other(ds, 2)
-        dx1 = other(dx, 2)
+    def patterns(near_lower: vec3, near_upper: vec3, far_lower: vec3, far_upper: vec3, xi: R):
+        near_sum = near_upper + near_lower
+        near_step = near_upper - near_lower
+        far_sum = far_upper + far_lower
+        far_step = far_upper - far_lower
+        s = near_sum + far_sum
+        s_eta = far_sum - near_sum
+        d = near_step + far_step
+        d_eta = far_step - near_step
+        s1 = other(s)
+        s1_eta = other(s_eta)
+        d1 = other(d)
+        d1_eta = other(d_eta)
         p = mat73()
-        p[0] = sx + sx1
-        p[1] = eta * (ss - ss1)
-        p[2] = ds + ds1
-        p[3] = eta * (ds - ds1)
-        p[4] = dx + dx1
-        p[5] = eta * (sx - sx1)
-        p[6] = eta * (dx - dx1)
+        p[0] = xi * (s - s1)
+        p[1] = s_eta + s1_eta
+        p[2] = d + d1
+        p[3] = d_eta + d1_eta
+        p[4] = xi * (d - d1)
+        p[5] = xi * (s_eta - s1_eta)
+        p[6] = xi * (d_eta - d1_eta)
         return p
 
     @wp.func
-    def sums(S: tensor, xi: R, eta: R):
+    def sums(near: tensor, far: tensor, xi: R):
         total = tensor()
         along = tensor()
         across = tensor()
         both = tensor()
         for i in range(6):
             if i != 2:  # zz of a traceless tensor follows
-                s = exchange(S[i], 1)
-                a = S[i] + s
-                b = xi * (S[i] - s)
-                a1 = exchange(a, 2)
-                b1 = exchange(b, 2)
-                total[i] = a + a1
-                across[i] = eta * (a - a1)
-                along[i] = b + b1
-                both[i] = eta * (b - b1)
+                s = near[i] + far[i]
+                d = far[i] - near[i]
+                s1 = exchange(s, 1)
+                d1 = exchange(d, 1)
+                total[i] = s + s1
+                along[i] = xi * (s - s1)
+                across[i] = d + d1
+                both[i] = xi * (d - d1)
         total[2] = -total[0] - total[1]
         across[2] = -across[0] - across[1]
         along[2] = -along[0] - along[1]
@@ -79,12 +78,10 @@ def lane_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
     @wp.func
     def vector_sum(x: vec3):
-        x = x + other(x, 1)
-        return x + other(x, 2)
+        return x + other(x)
 
     @wp.func
     def lane_max(value: R):
-        value = wp.max(value, exchange(value, 1))
-        return wp.max(value, exchange(value, 2))
+        return wp.max(value, exchange(value, 1))
 
     return patterns, sums, vector_sum, lane_max

@@ -1,4 +1,7 @@
-"""Owns how four lanes of a GPU compute an element of `hex8i` that yields, each a column of its points."""
+"""Owns how two lanes of a GPU compute an element of `hex8i` that yields, each two columns of its points.
+
+The columns of a lane do not depend on each other, so that one fills the time that the other waits.
+"""
 
 from functools import cache
 from typing import Any
@@ -54,10 +57,11 @@ def kept_function(precision: str) -> Any:
 
 @cache
 def column_functions(points: int, precision: str, law_name: str) -> tuple[Any, Any]:
-    """Functions of a lane's column of points.
+    """Functions of a column of points.
 
-    (history row, y, xi, eta) -> its part of the tractions of plastic strain; (elastic stress at the middle and its
-    slope, history row, law, m) -> sum and moment of the stress, new history row, greatest elastic S : S / 2, flow.
+    (History rows of the near and the far column, y, xi, eta of the far one) -> their part of the tractions of plastic
+    strain; (elastic stress at the middle and its slope, history row, G, law, m) -> sum and moment of the stress, new
+    history row, greatest elastic S : S / 2, flow.
     """
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
@@ -77,15 +81,19 @@ def column_functions(points: int, precision: str, law_name: str) -> tuple[Any, A
         return tensor(h0, h1, -h0 - h1, history[first + 2], history[first + 3], history[first + 4])
 
     @wp.func
-    def plastic_parts(history: row, y: mat33, xi: R, eta: R):
+    def plastic_parts(near: row, far: row, y: mat33, xi: R, eta: R):
         total = tensor()
+        across = tensor()
         moment = tensor()
         for k in range(wp.static(count)):
             zeta, share = layer_place(k)
-            strain = plastic_strain(history, wp.static(size) * k)
-            total = total + (R(6.0) * share) * strain
-            moment = moment + (R(6.0) * share * zeta) * strain
-        return xi * product(total, y[0]), eta * product(total, y[1]), product(moment, y[2])
+            strain = plastic_strain(near, wp.static(size) * k)
+            other = plastic_strain(far, wp.static(size) * k)
+            both = strain + other
+            total = total + (R(6.0) * share) * both
+            across = across + (R(6.0) * share) * (other - strain)
+            moment = moment + (R(6.0) * share * zeta) * both
+        return xi * product(total, y[0]), eta * product(across, y[1]), product(moment, y[2])
 
     @wp.func
     def flow_column(middle: tensor, slope: tensor, history: row, G: R, law: wp.array2d(dtype=R), m: int):
@@ -120,9 +128,9 @@ def column_functions(points: int, precision: str, law_name: str) -> tuple[Any, A
 def sums_function(precision: str) -> Any:
     """The function that sums the stress over the lanes.
 
-    (Lane's sum and moment of the stress, pressures that are linear in the coordinates, y, xi and eta of the lane's
-    corners, K, G) -> (mean; parts of the stress that are linear in a coordinate, what `settled_function` leaves of
-    them; their pressures; w of `conjugate_function`; energy that the lag of the internal vectors takes, per volume).
+    (Sums and moments of the stress of the lane's columns, pressures that are linear in the coordinates, y, xi of the
+    lane's corners, K, G) -> (mean; parts of the stress that are linear in a coordinate, what `settled_function` leaves
+    of them; their pressures; w of `conjugate_function`; energy that the lag of the vectors takes, per volume).
     """
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -131,10 +139,12 @@ def sums_function(precision: str) -> Any:
     settled, product = settled_function(precision), mode_functions(precision).product
 
     @wp.func
-    def lane_sums(total: tensor, moment: tensor, p: vec3, y: mat33, right: R, far: R, K: R, G: R):
+    def lane_sums(
+        near: tensor, near_moment: tensor, far: tensor, far_moment: tensor, p: vec3, y: mat33, xi: R, K: R, G: R
+    ):
         plane = R(PLANE)
-        mean, R0, R1, M2 = sums(total, right, far)
-        R2, M1, M0, _both = sums(moment, right, far)
+        mean, R0, R1, M2 = sums(near, far, xi)
+        R2, M1, M0, _both = sums(near_moment, far_moment, xi)
         third = R(THIRD)
         R0, p0, work0 = settled(plane * R0, third * p[0], y[0], K, G)
         R1, p1, work1 = settled(plane * R1, third * p[1], y[1], K, G)
@@ -151,32 +161,29 @@ def sums_function(precision: str) -> Any:
 
 @cache
 def corners_function(precision: str) -> Any:
-    """The function that gives the sums over the corners of a lane, and over them with the sign of zeta, of the forces.
+    """The function that gives the forces of a lower and an upper corner: their half sum, and half difference.
 
-    (Patterns x, gradients b, volume, W = Q - I, mean stress P, hourglass forces Q, xi and eta of the corners) ->
-    (base, top), of which the upper corner has -base - top, the lower one top - base.
+    (Gradients b, W = Q - I, mean stress P less what the amplitudes do in it, times VOLUME_SCALE, hourglass forces Q,
+    xi and eta of the corners) -> (base, top), of which the upper corner has -base - top, the lower one top - base.
     """
     t = scalars(precision)
-    R, mat33, mat43, mat63, mat73 = t.real, t.mat33, t.mat43, t.mat63, t.mat73
+    R, mat33, mat43, mat63 = t.real, t.mat33, t.mat43, t.mat63
     add_product = fused(precision).add_product
 
     @wp.func
-    def lane_corner_forces(x: mat73, b: mat63, volume: R, W: mat33, P: mat33, Q: mat43, right: R, far: R):
-        for n in range(4):  # amplitudes depend on the mean gradient, too
-            P = P - wp.outer((R(1.0) / volume) * Q[n], x[3 + n])
-        P = R(VOLUME_SCALE) * P
-        # patterns of the forces, as the signs of the lane's corners add them
-        both = right * far
-        base = add_product(both * Q[2], P, right * b[0] + far * b[1] + both * b[5])
-        top = add_product(far * Q[0] + right * Q[1] + both * Q[3], P, b[2] + far * b[3] + right * b[4])
+    def corner_forces(b: mat63, W: mat33, P: mat33, Q: mat43, xi: R, eta: R):
+        # patterns of the forces, as the signs of the corners add them
+        both = xi * eta
+        base = add_product(both * Q[2], P, xi * b[0] + eta * b[1] + both * b[5])
+        top = add_product(eta * Q[0] + xi * Q[1] + both * Q[3], P, b[2] + eta * b[3] + xi * b[4])
         return add_product(base, W, base), add_product(top, W, top)
 
-    return lane_corner_forces
+    return corner_forces
 
 
 @cache
 def flow_function(points: int, precision: str, law_name: str) -> Any:
-    """The function by which four lanes compute an element of a patch."""
+    """The function by which two lanes compute an element of a patch."""
     R, point = scalars(precision).real, POINT[precision]
     _, _, load_corners = load_functions(precision)
     patterns, _, vector_sum, lane_max = lane_functions(precision)
@@ -207,44 +214,64 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         extreme_out: wp.array2d(dtype=R),
         force_out: wp.array(dtype=R),
     ):
-        """Four lanes, 0 to 3, compute the element of a thread. Returns whether a lane's points flow."""
-        history = read_row(history_out, wp.static(size) * lane, e)  # first, because it takes longest
-        a = lane ^ (lane >> 1)  # corners run around the faces
+        """Two lanes, 0 and 1, compute the element of a thread. Returns whether a lane's points flow."""
+        near_history = read_row(history_out, wp.static(size) * lane, e)  # first, because it takes longest
+        far_history = read_row(history_out, wp.static(size) * (lane + 2), e)
+        a = lane  # corners run around the faces
+        c = 3 - lane
         x0, _d0, x1, _d1 = load_corners(points, pool, patches, e, a, first, exponent)
+        x2, _d2, x3, _d3 = load_corners(points, pool, patches, e, c, first, exponent)
         m = material_of(patches.corner[0, e], patches.corner[1, e])
         H, q, W = kept(thread, force_out)
         warp_barrier()
-        right = wp.where((lane & 1) != 0, R(1.0), R(-1.0))
-        far = wp.where(lane > 1, R(1.0), R(-1.0))
-        xi, eta = column_place(lane)
-        x = patterns(x0, x1, right, far)
+        right = wp.where(lane != 0, R(1.0), R(-1.0))
+        far = R(1.0)
+        xi, eta = column_place(lane + 2)
+        x = patterns(x0, x1, x2, x3, right)
         y = frame(x)
         K = law[m, 0]
         G = law[m, 1]
-        n0, n1, n2 = plastic_parts(history, y, xi, eta)
+        n0, n1, n2 = plastic_parts(near_history, far_history, y, xi, eta)
         S, S0, S1, S2, N0, N1, N2, pressure, p = stress_modes(
             x, H, q, y, vector_sum(n0), vector_sum(n1), vector_sum(n2), K, G
         )
-        middle = (S + xi * S0) + eta * (S1 + xi * N2)
-        slope = (S2 + xi * N1) + eta * N0
-        total, moment, history, largest, flows = flow_column(middle, slope, history, G, law, m)
-        largest = lane_max(largest)
+        S = S + xi * S0
+        S1 = S1 + xi * N2
+        S2 = S2 + xi * N1
+        near, near_moment, near_history, near_largest, near_flows = flow_column(
+            S - eta * S1, S2 - eta * N0, near_history, G, law, m
+        )
+        beyond, far_moment, far_history, far_largest, far_flows = flow_column(
+            S + eta * S1, S2 + eta * N0, far_history, G, law, m
+        )
+        largest = lane_max(wp.max(near_largest, far_largest))
         if valid and lane == 0:
             keep_strain(e, strain_square(largest, G), extreme_out)
-        flows = flows and valid
-        if flows:
-            write_row(history, wp.static(size) * lane, e, history_out)
-        mean, R0, R1, R2, p, w, lost = lane_sums(total, moment, p, y, right, far, K, G)
+        near_flows = near_flows and valid
+        far_flows = far_flows and valid
+        if near_flows:
+            write_row(near_history, wp.static(size) * lane, e, history_out)
+        if far_flows:
+            write_row(far_history, wp.static(size) * (lane + 2), e, history_out)
+        flows = near_flows or far_flows
+        mean, R0, R1, R2, p, w, lost = lane_sums(near, near_moment, beyond, far_moment, p, y, right, K, G)
         b, scaled_volume = mean_gradients(x)
         volume = R(VOLUME_SCALE) * scaled_volume
         if lane_max(wp.where(flows, R(1.0), R(0.0))) > R(0.0) and lane == 0:
             wp.atomic_add(extreme_out, LAG_LOSS, e, volume * lost)  # which waits for nothing
         Q = conjugate(x, volume, y, R0, R1, R2, p, w)
-        base, top = corner_forces(x, b, volume, W, whole(mean, pressure), Q, right, far)
+        P = whole(mean, pressure)
+        for n in range(4):  # amplitudes depend on the mean gradient, too
+            P = P - wp.outer((R(1.0) / volume) * Q[n], x[3 + n])
+        P = R(VOLUME_SCALE) * P
+        base, top = corner_forces(b, W, P, Q, right, -far)
+        beyond_base, beyond_top = corner_forces(b, W, P, Q, right, far)
         if valid:
             for i in range(3):
                 force_out[(3 * a + i) * wp.static(ROW) + thread] = top[i] - base[i]
                 force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = -base[i] - top[i]
+                force_out[(3 * c + i) * wp.static(ROW) + thread] = beyond_top[i] - beyond_base[i]
+                force_out[(3 * (c + 4) + i) * wp.static(ROW) + thread] = -beyond_base[i] - beyond_top[i]
         return flows
 
     return flow

@@ -93,7 +93,7 @@ def element(points: int, precision: str, law_name: str) -> PatchElement:
                 list_element(lane, listed_out)
                 keep(H, q, W, lane, force_out)
 
-    return PatchElement("hex8i", load_patterns, load_displacement_patterns, compute_element, prepare, flow, lanes=4)
+    return PatchElement("hex8i", load_patterns, load_displacement_patterns, compute_element, prepare, flow, lanes=2)
 
 
 def kernels(points: int) -> SimpleNamespace:
