@@ -194,6 +194,18 @@ def test_the_softest_penalty_is_taken_whose_springs_hold_next_to_nothing():
     assert penalty == 3.0
 
 
+@pytest.mark.parametrize(
+    ("own", "other", "longer"), [("hex8i", "hex8r", 0.5), ("hex8r", "hex8i", 2.0), ("hex8w", "hex8", 2 / 3)]
+)
+def test_time_with_another_element_is_foreseen(own: str, other: str, longer: float):
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
+    block = mca.Body(name="it", geometry=box, material=mca.Elastic(E=1e9, nu=0.3, rho=1e3))
+    scene = mca.Scene(name="it", bodies=(replace(block, element=own),), impact=mca.ImpactPhase(duration=1e-3))
+    bench = Bench(scene, "cpu", 1, None)
+    bench.base = measured("as written", Variant(), 3.0, 100.0)
+    assert bench.foreseen_steps(Variant(element=other)) == pytest.approx(longer * 3.0)
+
+
 def test_element_steps_of_several_rates():
     groups = [{"step": 4e-8, "elements": 30}, {"step": 1e-8, "elements": 10}]
     summary = {"n_elements": 40, "n_steps": 100}

@@ -29,7 +29,7 @@ AUTO_PENALTY = 4.0  # about what "auto" chooses for links and balls, to foresee 
 MULTI_RATE = 0.4  # share of element steps that remain with several rates, roughly
 COMPILING = 2.0  # longer waits before the first step are compilations of kernels, which happen once [s]
 FORESEEN = 0.05  # share of the steps after which the time of all can be estimated
-ELEMENTS = {"hex8r": 0.5}  # time of an element over that of hex8, on a CPU
+ELEMENTS = {"hex8r": 0.5, "hex8w": 1.5, "hex8w3": 2.3}  # time of an element over that of hex8 or hex8i, on a CPU
 
 
 class OutOfTimeError(McaError):
@@ -133,7 +133,7 @@ class Bench:
         return found.wall[self.clock]
 
     def work_of(self, found: Measured) -> float:
-        """What a variant costs by counts, in element steps of hex8 in `mixed`: the same each time, as counts are."""
+        """What a variant costs by counts, in the scene's element steps in `mixed`: always the same, as counts are."""
         work = found.element_steps * self._share(found.trial.variant)
         return work + (FIXED * found.steps if self.device != "cpu" else 0.0)
 
@@ -165,7 +165,9 @@ class Bench:
         """Time of an element over that of the scene as written [-]."""
         double = variant.precision == "float64"
         if self.device == "cpu":
-            return ELEMENTS.get(variant.element or "", 1.0) * (1.1 if double else 1.0)
+            own = str(self.scene.bodies[0].element)
+            share = ELEMENTS.get(variant.element or own, 1.0) / ELEMENTS.get(own, 1.0)
+            return share * (1.1 if double else 1.0)
         return 2.0 if double else 1.0
 
 
