@@ -58,7 +58,6 @@ def test_a_free_body_that_turns_is_sent_to_float64_only_by_a_guard():
         name="bar",
         geometry=mca.Box(size=(0.01, 0.2, 0.01), divisions=(2, 12, 2), origin=(-0.005, -0.1, -0.005)),
         material=mca.Elastic(E=200e9, nu=0.3, rho=7800.0),
-        element="hex8",
         angular_velocity=(20.0, 0.0, 0.0),
     )
     scene = mca.Scene(name="spin", bodies=(bar,), impact=mca.ImpactPhase(duration=3e-3, output_interval=1e-4))

@@ -93,7 +93,6 @@ def chain(rigid: str, nodes: str = "axis", spin: float = 20.0) -> mca.Scene:
             name=name,
             geometry=BAR,
             material=SOFT,
-            element="hex8",
             kinematics="finite",  # whose forces have no moment, to rounding
             rigid=name in rigid,
             position=(0.3 * k, 0.0, 0.0),
@@ -166,10 +165,8 @@ def ball(rigid: str, **contact: object) -> mca.Scene:
     plate = mca.Box(size=(0.03, 0.01, 0.03), divisions=(8, 3, 8), origin=(-0.015, -0.01, -0.015))
     half_turn = (0.0, 0.0, -0.5 * np.pi)
     bodies = (
-        mca.Body(
-            name="ball", geometry=sphere, material=SOFT, element="hex8", position=(0.0, 0.02, 0.0), rotation=half_turn
-        ),
-        mca.Body(name="plate", geometry=plate, material=SOFT, element="hex8"),
+        mca.Body(name="ball", geometry=sphere, material=SOFT, position=(0.0, 0.02, 0.0), rotation=half_turn),
+        mca.Body(name="plate", geometry=plate, material=SOFT),
     )
     bodies = (replace(bodies[0], velocity=(3.0, -10.0, 1.0), exact_mass=False), bodies[1])
     bodies = tuple(replace(body, rigid=body.name in rigid) for body in bodies)
@@ -178,7 +175,7 @@ def ball(rigid: str, **contact: object) -> mca.Scene:
         name="ball",
         bodies=bodies,
         contacts=(mca.Contact(mu=0.2, **{**surfaces, **contact}),),  # type: ignore[arg-type]
-        impact=mca.ImpactPhase(duration=1.5e-4, output_interval=1e-6),
+        impact=mca.ImpactPhase(duration=1.5e-4, output_interval=1e-6, time_step_scale=0.6),
     )
 
 
@@ -190,7 +187,7 @@ OTHER_WAY = {"slave": mca.Surface(body="plate", nodes="ymax"), "master": mca.Sur
 def test_contact_of_rigid_bodies_keeps_momentum_and_energy(rigid: str, contact: dict[str, object]):
     impact = keeps_momentum(ball(rigid, **contact), axes=range(3))
     summary = result_of(impact).summary
-    assert summary["F_n_max"] > 1e3 and summary["energy_error"] < 2e-3
+    assert summary["F_n_max"] > 1e3 and summary["energy_error"] < 1e-3
     assert not summary["contact_open_at_end"] or summary["contacts"]
 
 
@@ -258,7 +255,8 @@ def test_scenes_of_a_batch_compute_what_they_do_alone():
         alone = begun(scene)
         assert alone.solver.dt == together.solver.dt
         alone.advance()
-        assert np.array_equal(alone.state.u.numpy(), u)
+        own = alone.state.u.numpy()  # beside another scene, nodes of hinges are rounded otherwise
+        assert np.abs(own - u).max() <= 1e-15 * np.abs(own).max()
 
 
 @pytest.mark.gpu

@@ -20,17 +20,16 @@ ALUMINIUM = {"E": 70e9, "nu": 0.0, "rho": 2700.0}
 C = np.sqrt(70e9 / 2700.0)
 
 
-def bar(material=None, *, position=(0.0, 0.0, 0.0), penalty=1.0, **impact):
-    """A bar of 0.2 m with one element across, nu = 0, that runs into a wall at 1 m/s."""
+def bar(material=None, *, position=(0.0, 0.0, 0.0), penalty=1.0, divisions=(100, 1, 1), **impact):
+    """A bar of 0.2 m, nu = 0, that runs into a wall at 1 m/s."""
     point = (0.2 + position[0], position[1], position[2])
     return mca.Scene(
         name="bar",
         bodies=(
             mca.Body(
                 name="bar",
-                geometry=mca.Box(size=(0.2, 0.01, 0.01), divisions=(100, 1, 1)),
+                geometry=mca.Box(size=(0.2, 0.01, 0.01), divisions=divisions),
                 material=material or mca.Elastic(**ALUMINIUM),
-                element="hex8",
                 position=position,
                 velocity=(1.0, 0.0, 0.0),
             ),
@@ -63,15 +62,15 @@ def test_yielding_bar_carries_the_elastic_precursor_and_a_slower_plastic_wave():
     """Uniaxial bilinear bar, Karman and Taylor: the wall sees sigma_y + rho c_t (v - v_y), c_t = sqrt(E_t / rho)."""
     sigma_y, E_t = 8e6, 17.5e9
     v_y = sigma_y / (2700.0 * C)
-    result = mca.run(bar(mca.J2Bilinear(**ALUMINIUM, sigma_y=sigma_y, E_t=E_t)))
+    result = mca.run(bar(mca.J2Bilinear(**ALUMINIUM, sigma_y=sigma_y, E_t=E_t), divisions=(200, 2, 2)))
     wall = 1e-4 * (sigma_y + 2700.0 * np.sqrt(E_t / 2700.0) * (1.0 - v_y))
     assert result.F_n[(result.time > 1e-5) & (result.time < 6e-5)].mean() == pytest.approx(
         wall, rel=0.01
     )  # it spreads sideways
     plateau = (result.time > 2.4e-5) & (result.time < 3.4e-5)  # between the two waves at the middle
-    assert result["tip_vx"][plateau].mean() == pytest.approx(1.0 - v_y, rel=0.03)
+    assert result["tip_vx"][plateau].mean() == pytest.approx(1.0 - v_y, rel=0.02)
     assert result.summary["max_plastic_strain"] > 0.0
-    assert result.summary["energy_error"] < 2e-3
+    assert result.summary["energy_error"] < 2e-4
 
 
 def test_precisions_agree():
