@@ -1,6 +1,7 @@
 """Owns gallery.md of docs/measurements/: runs and pictures each built-in scene, with its figure beside the known one.
 
-python -m benchmarks.gallery                 run all scenes, then write gallery.json, gallery.md and the pictures
+python -m benchmarks.gallery                 run all scenes, then all with hex8 and with hex8i; write gallery.json,
+                                             gallery.elements.json, gallery.md and the pictures
 python -m benchmarks.gallery two_link        run one again; the others stay
 python -m benchmarks.gallery --render        write gallery.md from gallery.json again
 """
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import warp_mca as mca
+from benchmarks import gallery_elements
 from benchmarks.gallery_scenes import SCENES
 from benchmarks.measurements import FOLDER, measured, note
 from benchmarks.pictures import shrink
@@ -43,7 +45,7 @@ def run_scene(name: str, folder: Path = PICTURES) -> dict[str, Any]:
 def render(rows: list[dict[str, Any]]) -> str:
     """The page."""
     text = (FOLDER / "gallery.template.md").read_text(encoding="utf-8").replace("{measured}", measured("gallery"))
-    return text + "".join(_section(row) for row in rows)
+    return text + "".join(_section(row) for row in rows) + gallery_elements.section(rows)
 
 
 def figure(value: float, unit: str) -> str:
@@ -83,12 +85,14 @@ def main() -> None:
     asked = parser.parse_args()
     stored = FOLDER / "gallery.json"
     rows = {row["scene"]: row for row in json.loads(stored.read_text(encoding="utf-8"))} if stored.exists() else {}
-    for name in [] if asked.render else asked.scenes or SCENES:
+    names = [] if asked.render else asked.scenes or SCENES
+    for name in names:
         rows[name] = run_scene(name)
         print(f"{name}: {rows[name]['measured']:.6g} {rows[name]['unit']}, known {rows[name]['known']}", flush=True)
         ordered = [rows[scene] for scene in SCENES if scene in rows]
         stored.write_text(json.dumps(ordered, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         note(stored, "cpu")
+    gallery_elements.measure(names)
     ordered = [rows[scene] for scene in SCENES if scene in rows]
     (FOLDER / "gallery.md").write_text(render(ordered), encoding="utf-8")
 
