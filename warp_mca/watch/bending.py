@@ -127,8 +127,8 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
 
 
 @row(
-    "{elements} makes {body} too {which} in bending, its deflections about {error:.0%} too {small}: {bent:.0%} of the "
-    "strain energy of {body} lay {where} when it was greatest;",
+    "{elements} {makes} {body} too {which} in bending, its deflections about {error:.0%} too {small}: {bent:.0%} of "
+    "the strain energy of {body} lay {where} when it was greatest;",
     "{remedy}",
     ERROR,
     f"of deflections at most; {JUMPING:g} where strain jumps between cells, {STRUCK:g} where bodies struck",
@@ -144,7 +144,8 @@ def bending(c: Finished, most: float) -> Iterator[Values]:
             single = "in bending of single cells" if kinds.elements != {"tet4"} else ""
             where = " and ".join(filter(None, (single, "in jumps of strain between cells" if kinds.jump else "")))
             yield dict(
-                elements=" and ".join(sorted(kinds.elements)), body=body, error=abs(error), where=where,
+                elements=" and ".join(sorted(kinds.elements)), makes="make" if len(kinds.elements) > 1 else "makes",
+                body=body, error=abs(error), where=where,
                 which="flexible" if error > 0.0 else "stiff", small="large" if error > 0.0 else "small",
                 bent=sums[BENT] / sums[SPENT], remedy=kinds.remedy,
             )  # fmt: skip
@@ -191,16 +192,20 @@ class Kinds(NamedTuple):
 
     @property
     def remedy(self) -> str:
-        """What makes a body of such cells bend right: hex8r only where nothing yields."""
+        """What makes a body of such cells bend right."""
+        if "tet4" in self.elements:
+            return "choose tet10, or smaller cells"
+        layers = "two or more cells over the thickness, or hex8w"
         if self.elements == {"hex8i"}:
-            return "take two or more cells over the thickness, or hex8w"
-        layers = "four or more cells over the thickness, no longer than deep"
+            return f"take {layers}"
+        way = ["choose hex8i"] if self.elements & {"hex8", "hex8r"} else []
         if self.jump:
-            if self.elements == {"tet4"}:
-                return "choose tet10, or smaller cells"
-            turned = "let axes of wedges go through the wall, " if "wedge6" in self.elements else ""
-            return f"{turned}choose smaller cells, or hexahedra, {layers if self.yields else 'with hex8r'}"
-        return f"take {layers}" if self.yields else f"choose hex8r, or {layers}"
+            way.append("let axes of wedges go through the wall")
+        if self.yields:
+            way.append(f"where walls yield, take {layers}")
+        elif self.jump:
+            way.append("or choose smaller cells")
+        return ", ".join(way)
 
 
 def _bodies(c: Finished) -> Iterator[tuple[str, Array]]:
