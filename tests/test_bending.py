@@ -114,6 +114,29 @@ def test_the_warning_has_sign_and_size_of_the_error(case: str):
 
 
 @pytest.mark.parametrize(
+    ("cells", "lean", "element"),
+    [
+        ((20, 2, 1), 0.2, "hex8i"),
+        ((20, 2, 1), 0.4, "hex8i"),
+        ((20, 2, 1), 0.4, "hex8r"),
+        ((20, 2, 2), 0.4, "hex8w"),
+        ((10, 1, 1), 0.2, "hex8w3"),
+    ],
+)
+def test_sides_that_lean_across_the_wall_in_turn(cells, lean: float, element: str):
+    """Top and bottom of the strip move by `lean` half depths along it, every second section the other way."""
+    mesh = grid((0.04, 0.004, 0.002), cells)
+    x, y, z = mesh.points.T
+    inner = (x > 1e-9) & (x < 0.04 - 1e-9)
+    way = np.where(np.rint(x / 0.04 * cells[0]) % 2 == 0, 1.0, -1.0)
+    points = np.column_stack([x + inner * way * lean * (z - 0.001), y, z])
+    ratio, result = sagging(dataclasses.replace(mesh, points=points), 0.3, element)
+    assert ratio < 0.97
+    assert told(result) == pytest.approx(ratio, rel=0.15)
+    assert any("let the sides of cells go straight through the wall" in text for text in result.warnings)
+
+
+@pytest.mark.parametrize(
     ("size", "cells", "element"),
     [
         ((0.04, 0.004, 0.002), (20, 2, 1), "hex8r"),
