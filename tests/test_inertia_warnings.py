@@ -42,6 +42,15 @@ def test_tetrahedra_too():
     assert excess(mca.Body(name="tet", geometry=mesh, material={"*": LIGHT}), mesh) == pytest.approx(4.0)
 
 
+@pytest.mark.parametrize("element", ["hex8i", "hex8"])
+def test_wedges_too(element: str):
+    """Two halves of a unit cube about its centre: rho / 6 about each axis, whatever computes them."""
+    points = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build().points
+    halves = np.array([[0, 1, 3, 3, 4, 5, 7, 7], [0, 3, 2, 2, 4, 7, 6, 6]], np.int32)
+    body = mca.Body(name="halves", geometry=mca.Mesh(points, halves), material=LIGHT, element=element)
+    assert inertias(body, body.geometry)[0] == pytest.approx(300.0 / 6.0 * np.eye(3), abs=1e-9)  # type: ignore[arg-type]
+
+
 BALL = mca.Sphere(radius=0.01, section=4, ring=2, pole_layers=4)
 ROD = mca.Rod(radius=0.005, length=0.05, tip="flat", section=4, ring=2)
 

@@ -29,6 +29,7 @@ SOLIDS = {
     7: (1, (1, 2, 11, 41, 41, 41, 41, 41)),
 }
 WEDGE = (14, 11, 12, 13, 21, 21, 22, 22)  # its last nodes are those of the edge
+WEDGE18 = "1,2,3,11,12,13,14,21,22,\n31,41,99,2,3,4,11,12,13\n"  # as gmsh writes one
 HEAD = "*KEYWORD\n$ a comment\n*TITLE\nparts\n"
 TAIL = """*PART
 steel block
@@ -145,6 +146,7 @@ def test_sets_of_segments_columns_and_solids(tmp_path: Path):
         ("*TITLE", "*SET_NODE_LIST_COLLECT", "SET_NODE_LIST_COLLECT is not read: it adds to other sets"),
         ("*PART\n", "*NODE\n11, 0, 0, 1.01\n*PART\n", "node 11 is given twice"),
         ("*PART\n", "*ELEMENT_SOLID\n7,1,1,2,11,41\n*PART\n", "element 7 is given twice"),
+        ("*PART\n", f"*ELEMENT_SOLID\n8,1,{WEDGE18}*PART\n", "a solid with 18 nodes is of no known type"),
         ("*ELEMENT_SOLID", "*ELEMENT_SOLID_ORTHO", "ELEMENT_SOLID_ORTHO is not read"),
         ("*KEYWORD", "*KEYWORD LONG=Y", "long fields"),
         ("*NODE\n", "*NODE+\n", "long fields"),

@@ -79,6 +79,29 @@ def test_other_formats_hold_stress_by_component(tmp_path: Path, bars: FlyingBars
     assert {path.stem for path in tmp_path.iterdir()} == {"end"}
 
 
+def test_gmsh_opens_a_file_of_hexahedra_and_wedges(tmp_path: Path):
+    import gmsh
+
+    box = mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build()
+    halves = np.array([[0, 1, 3, 3, 4, 5, 7, 7], [0, 3, 2, 2, 4, 7, 6, 6]], np.int32)
+    steel, file = mca.Elastic(E=210e9, nu=0.3, rho=7850.0), tmp_path / "end.msh"
+    bodies = (
+        mca.Body(name="hexahedron", geometry=box, material=steel),
+        mca.Body(name="wedges", geometry=mca.Mesh(box.points, halves), material=steel, position=(2.0, 0.0, 0.0)),
+    )
+    scene = mca.Scene(name="two", bodies=bodies, impact=mca.ImpactPhase(duration=1e-5, output_interval=1e-5))
+    mca.run(scene, recorders=[FinalState(file)])
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(file))
+        kinds, tags, _ = gmsh.model.mesh.getElements(3)
+        assert {int(kind): len(of_kind) for kind, of_kind in zip(kinds, tags, strict=True)} == {5: 1, 6: 2}
+        assert len(gmsh.view.getTags()) == 12
+    finally:
+        gmsh.finalize()
+
+
 def test_vtk_reads_the_components_of_stress_by_their_names(tmp_path: Path, bars: FlyingBars):
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader

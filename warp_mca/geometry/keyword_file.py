@@ -167,6 +167,8 @@ def _solid(nodes: list[int], by_gmsh: bool) -> tuple[str, list[int]]:
     nodes = nodes[: 1 + max(k for k, node in enumerate(nodes) if node)] if any(nodes) else []
     if len(nodes) == 10 and len(set(nodes)) == 10:
         return "tetra10", nodes
+    if set(nodes[8:]) - {0, *nodes[:8]}:
+        raise ValueError(f"a solid with {len(nodes)} nodes is of no known type")
     nodes = nodes[:8]
     different = list(dict.fromkeys(nodes))
     if len(nodes) == 8 and len(different) == 8:

@@ -150,9 +150,12 @@ def _mesh(
 
 
 def _write(path: Path, mesh: meshio.Mesh) -> None:
-    """Let meshio write, and suppress what it prints."""
+    """Let meshio write, and suppress what it prints; its newer version of gmsh's format holds cells of one type."""
+    kind = _format(path)
+    if kind == "gmsh" and len({block.type for block in mesh.cells}) > 1:
+        kind = "gmsh22"
     with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-        _load_meshio().write(path, mesh, file_format=_format(path))
+        _load_meshio().write(path, mesh, file_format=kind)
 
 
 def _try(path: Path) -> tuple[list[str], list[str]]:

@@ -32,7 +32,9 @@ SINGLE = (
 # Cells of a body up to which all are looked at, and how many, evenly spread, of more: where strain jumps those around
 # them count, too, and all of 80,000 take 0.2 s.
 WHOLE, SAMPLE = {False: 1024, True: 16_384}, {False: 1024, True: 256}
+STRAIGHT = {"hex8i", "hex8w", "hex8w3", "hex8r"}  # bend right but where sides of their cells lean across the wall
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+LEANING = "let the sides of cells go straight through the wall, or choose tet10"
 LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says nothing
 FREE = 1e-4  # of all energy: rounding leaves less in bodies that move free of stress
 LOOKS = 8  # in a run, besides that at its end
@@ -42,6 +44,8 @@ _ENERGIES: dict[tuple[str, bool], tuple[Callable[[Array, Cells], Array], Callabl
     ("hex8", False): (bent_hexahedra.full_hexahedra, bent_hexahedra.bricks_of),
     ("hex8", True): (partial(strain_jumps.wedges, element="hex8"), strain_jumps.wedges_of),
     ("hex8i", False): (bent_hexahedra.enriched_hexahedra, bent_hexahedra.bricks_of),
+    ("hex8w", False): (bent_hexahedra.walls, bent_hexahedra.bricks_of),
+    ("hex8w3", False): (bent_hexahedra.walls, bent_hexahedra.bricks_of),
     ("hex8r", False): (bent_hexahedra.one_point_hexahedra, bent_hexahedra.bricks_of),
     ("hex8r", True): (partial(strain_jumps.wedges, element="hex8r"), strain_jumps.one_point_wedges_of),
     ("wedge6", True): (partial(strain_jumps.wedges, element="wedge6"), strain_jumps.wedges_of),
@@ -60,12 +64,13 @@ def samples_of(model: Model) -> list[Cells]:
         for k in np.flatnonzero(np.bincount(kind)):
             body, material = divmod(int(k), len(model.law))
             sigma_y = float(model.law[material, 2:3].sum()) if block.plastic else 0.0
-            if block.element in ("hex8r", "hex8i") and not sigma_y and not wedge[kind == k].any():
-                continue  # they bend right
             for jumps in (False, True):
                 own = np.flatnonzero((kind == k) & (wedge == jumps))
                 if len(own) and (block.element, jumps) in _ENERGIES:
-                    found.append(_sample(model, block, own, body, material, jumps, sigma_y))
+                    cells = _sample(model, block, own, body, material, jumps, sigma_y)
+                    yields = sigma_y > 0.0 and block.element in ("hex8i", "hex8r")
+                    if jumps or yields or block.element not in STRAIGHT or bent_hexahedra.lean(cells):
+                        found.append(cells)
     return found
 
 
@@ -127,8 +132,8 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
 
 
 @row(
-    "{elements} makes {body} too {which} in bending, its deflections about {error:.0%} too {small}: {bent:.0%} of the "
-    "strain energy of {body} lay {where} when it was greatest;",
+    "{elements} {makes} {body} too {which} in bending, its deflections about {error:.0%} too {small}: {bent:.0%} of "
+    "the strain energy of {body} lay {where} when it was greatest;",
     "{remedy}",
     ERROR,
     f"of deflections at most; {JUMPING:g} where strain jumps between cells, {STRUCK:g} where bodies struck",
@@ -144,9 +149,11 @@ def bending(c: Finished, most: float) -> Iterator[Values]:
             single = "in bending of single cells" if kinds.elements != {"tet4"} else ""
             where = " and ".join(filter(None, (single, "in jumps of strain between cells" if kinds.jump else "")))
             yield dict(
-                elements=" and ".join(sorted(kinds.elements)), body=body, error=abs(error), where=where,
+                elements=" and ".join(sorted(kinds.elements)), makes="make" if len(kinds.elements) > 1 else "makes",
+                body=body, error=abs(error), where=where,
                 which="flexible" if error > 0.0 else "stiff", small="large" if error > 0.0 else "small",
-                bent=sums[BENT] / sums[SPENT], remedy=kinds.remedy,
+                bent=sums[BENT] / sums[SPENT],
+                remedy=kinds.remedy if kinds.jump or "hex8" in kinds.elements else LEANING,
             )  # fmt: skip
 
 
@@ -191,16 +198,20 @@ class Kinds(NamedTuple):
 
     @property
     def remedy(self) -> str:
-        """What makes a body of such cells bend right: hex8r only where nothing yields."""
+        """What makes a body of such cells bend right."""
+        if "tet4" in self.elements:
+            return "choose tet10, or smaller cells"
+        layers = "two or more cells over the thickness, or hex8w"
         if self.elements == {"hex8i"}:
-            return "take two or more cells over the thickness, or hex8w"
-        layers = "four or more cells over the thickness, no longer than deep"
+            return f"take {layers}"
+        way = ["choose hex8i"] if self.elements & {"hex8", "hex8r"} else []
         if self.jump:
-            if self.elements == {"tet4"}:
-                return "choose tet10, or smaller cells"
-            turned = "let axes of wedges go through the wall, " if "wedge6" in self.elements else ""
-            return f"{turned}choose smaller cells, or hexahedra, {layers if self.yields else 'with hex8r'}"
-        return f"take {layers}" if self.yields else f"choose hex8r, or {layers}"
+            way.append("let axes of wedges go through the wall")
+        if self.yields:
+            way.append(f"where walls yield, take {layers}")
+        elif self.jump:
+            way.append("or choose smaller cells")
+        return ", ".join(way)
 
 
 def _bodies(c: Finished) -> Iterator[tuple[str, Array]]:

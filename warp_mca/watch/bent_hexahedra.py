@@ -1,4 +1,4 @@
-"""Owns the bending of single hexahedra: energy that `hex8` and `hex8r` spend on it, and that of one that bends right.
+"""Owns the bending of single hexahedra: energy that their elements spend on it, and that of one that bends right.
 
 Displacements u_i = p xi_i xi_k along edge i bend a brick of half edges h: they ask for strains e_i xi_k, e_i = p/h_i,
 and bring a shear (h_i/h_k) e_i xi_i that bending does not have. Strains that vary along edge k, with i, j the others:
@@ -7,12 +7,13 @@ and bring a shear (h_i/h_k) e_i xi_i that bending does not have. Strains that va
     hex8                   W = V/6 G (4/3 (e_i^2 + e_j^2 - e_i e_j) + (h_i/h_k)^2 e_i^2 + (h_j/h_k)^2 e_j^2)
 
 The mean dilatation leaves the deviator's energy to `hex8`, with 1/(2 (1 + nu)) of the stiffness; the shear adds to it
-what cells longer than deep lock by (Hughes, The Finite Element Method (1987), section 4.4). `hex8r` has the exact
-energy.
+what cells longer than deep lock by (Hughes, The Finite Element Method (1987), section 4.4). The others have the exact
+energy in bricks; cells whose sides lean across the wall lock in all of them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -25,6 +26,7 @@ from warp_mca.watch.bent_cells import COLUMNS, Array, Cells, deviator_square, tu
 # What positions of the corners have of the three edges, and of bending in each pair of them, shape (6, 8).
 _SHAPES = np.stack([*CORNERS.T, *(CORNERS[:, (m + 1) % 3] * CORNERS[:, (m + 2) % 3] for m in range(3))]) / 8.0
 _LITTLE = 1e-300  # against division by zero
+LEAST = 0.01  # of the energy of bending that sides change as they lean
 DEEP = 1.4  # of the strain at yield: from there on, the moment of hex8i is a tenth above that of the section
 _ALIGNED = np.sqrt(0.75)  # cosine between the deviators of stretching and of bending in hex8
 
@@ -91,6 +93,38 @@ def _common(strain: Array, p: Array, bricks: Bricks, K: float, G: float) -> Arra
     return bricks.volume * density
 
 
+def _wasted(strain: Array, p: Array, bricks: Bricks, E: float, projected: bool = True) -> Array:
+    """Energy that cells spend beyond what is right where their sides lean as they bend [J], shape (cell_count,).
+
+    A side that leans by c_i xi_i xi_k along edge i turns by p xi_i / h_k, which asks for a strain -p c_i / h_k^2 along
+    edge k: its neighbours lean the other way and do not allow it to vanish. With gradients of hourglass modes that are
+    `projected`, cells that stretch in turn by p c_i / (3 h_i^2) bend by less than their sides turn.
+    """
+    found, h = np.zeros_like(bricks.volume), bricks.half
+    for m, i, k, lean in _leaning(bricks):
+        across = np.einsum("an,abn,bn->n", bricks.edge[:, k], strain, bricks.edge[:, k])
+        more = projected * (lean / h[i]) ** 2 / 3.0
+        found -= (1.0 + more) * p[m, i] * (lean / h[k] ** 2 * across + more / 3.0 * p[m, i] / h[i] ** 2)
+    return 0.5 * E * bricks.volume * found
+
+
+def _leaning(bricks: Bricks) -> Iterator[tuple[int, int, int, Array]]:
+    """Axes m, i, k, and how far sides across edge i lean along it over half of edge k [m], shape (cell_count,)."""
+    for m in range(3):
+        for i, k in (((m + 1) % 3, (m + 2) % 3), ((m + 2) % 3, (m + 1) % 3)):
+            yield m, i, k, np.einsum("an,an->n", bricks.mode[m], bricks.edge[:, i])
+
+
+def lean(cells: Cells) -> bool:
+    """Whether sides of some cells lean enough to change their energy of bending by `LEAST`."""
+    bricks = cast(Bricks, cells.shape)
+    h = bricks.half
+    return any(
+        max((3.0 * (side * h[i] / h[k] ** 2) ** 2).max(), ((side / h[i]) ** 2 / 3.0).max()) > LEAST
+        for _, i, k, side in _leaning(bricks)
+    )
+
+
 def full_hexahedra(u: Array, cells: Cells) -> Array:
     """What `bent_cells` names of cells of `hex8` that are looked at, shape (COLUMNS,)."""
     bricks, strain, p = _strains(u, cells)
@@ -99,6 +133,7 @@ def full_hexahedra(u: Array, cells: Cells) -> Array:
     bent = V / 6.0 * _spent(modes)
     spent = common + bent
     right = common + V / 6.0 * _right(modes, G, cells.nu, bent / np.maximum(spent, _LITTLE))
+    right -= _wasted(strain, p, bricks, cells.E, projected=False)
     found = np.zeros(COLUMNS)
     found[:3] = right.sum(), spent.sum(), bent.sum()
     if cells.sigma_y > 0.0:
@@ -112,18 +147,31 @@ def full_hexahedra(u: Array, cells: Cells) -> Array:
     return found
 
 
+def walls(u: Array, cells: Cells) -> Array:
+    """What `bent_cells` names of cells of `hex8w` and `hex8w3` that are looked at, shape (COLUMNS,)."""
+    return _found(*_strains(u, cells), cells)
+
+
+def _found(bricks: Bricks, strain: Array, p: Array, cells: Cells) -> Array:
+    """The same of cells that bend right where their sides do not lean, without flow."""
+    bent = bricks.volume / 6.0 * _driven(_modes(p, bricks, cells.G), cells.G, cells.nu)
+    wasted = _wasted(strain, p, bricks, cells.E).sum()
+    spent = _common(strain, p, bricks, cells.K, cells.G).sum() + bent.sum()
+    found = np.zeros(COLUMNS)
+    found[:3] = spent - wasted, spent, bent.sum() + wasted
+    return found
+
+
 def one_point_hexahedra(u: Array, cells: Cells) -> Array:
     """What `bent_cells` names of cells of `hex8r` that are looked at, shape (COLUMNS,).
 
     Stress of bending relaxes as the one point flows: outer/mean of the yield stress is left at the surface.
     """
     bricks, strain, p = _strains(u, cells)
-    common, modes = _common(strain, p, bricks, cells.K, cells.G), _modes(p, bricks, cells.G)
-    V, bent = bricks.volume, bricks.volume / 6.0 * _driven(modes, cells.G, cells.nu)
-    found = np.zeros(COLUMNS)
-    found[:2] = (common + bent).sum()
-    found[2] = bent.sum()
+    found, V = _found(bricks, strain, p, cells), bricks.volume
     if cells.sigma_y > 0.0:
+        modes = _modes(p, bricks, cells.G)
+        bent = V / 6.0 * _driven(modes, cells.G, cells.nu)
         mean, outer = _equivalent(strain, modes, cells.G)
         flows = 3.0 * cells.G * mean > cells.sigma_y
         flowing = mean + outer**2 / np.maximum(3.0 * mean, _LITTLE)
@@ -134,17 +182,14 @@ def one_point_hexahedra(u: Array, cells: Cells) -> Array:
 
 
 def enriched_hexahedra(u: Array, cells: Cells) -> Array:
-    """What `bent_cells` names of cells of `hex8i` that are looked at, shape (COLUMNS,): they bend right until they
-    yield, which their points, at 0.577 of the depth, do later than their surface."""
+    """What `bent_cells` names of cells of `hex8i` that are looked at, shape (COLUMNS,): their points, at 0.577 of the
+    depth, yield later than their surface."""
     bricks, strain, p = _strains(u, cells)
-    modes, V = _modes(p, bricks, cells.G), bricks.volume
-    bent = V / 6.0 * _driven(modes, cells.G, cells.nu)
-    found = np.zeros(COLUMNS)
-    found[:2] = (_common(strain, p, bricks, cells.K, cells.G) + bent).sum()
-    found[2] = bent.sum()
-    mean, outer = _equivalent(strain, modes, cells.G)
-    flows = 3.0 * cells.G * (mean + outer) > DEEP * cells.sigma_y
-    found[3:5] = V[flows] @ np.maximum(mean, outer / np.sqrt(3.0))[flows], V[flows] @ _flow(mean, outer)[flows]
+    found, V = _found(bricks, strain, p, cells), bricks.volume
+    if cells.sigma_y > 0.0:
+        mean, outer = _equivalent(strain, _modes(p, bricks, cells.G), cells.G)
+        flows = 3.0 * cells.G * (mean + outer) > DEEP * cells.sigma_y
+        found[3:5] = V[flows] @ np.maximum(mean, outer / np.sqrt(3.0))[flows], V[flows] @ _flow(mean, outer)[flows]
     return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.rotation import mean_pose
 from warp_mca.geometry import hexahedron, tetra10, tetrahedron
-from warp_mca.geometry.cell_types import HEXAHEDRON, TETRA10, TETRAHEDRON, linear_type
+from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, TETRA10, linear_type
 from warp_mca.geometry.hexahedron import CORNERS, shape_functions
 from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.shape_volume import of_cells
@@ -204,9 +204,10 @@ def _inertia(square: Array) -> Array:
 
 def _points(x: Array, cell: str) -> tuple[Array, Array]:
     """Integration points [m] and weights [m^3] of cells with nodes x, exact for squares in bricks and tetrahedra."""
-    if linear_type(cell) is HEXAHEDRON:
-        return _AT_GAUSS @ x, hexahedron.determinants(x)
     if cell == TETRA10.name:
         return tetra10.shape_functions(tetra10.POINTS) @ x, tetra10.determinants(x)
-    corners = x[:, : TETRAHEDRON.corners]
+    if (stored := linear_type(CELL_TYPES[cell].stored_as)) is HEXAHEDRON:
+        corners = x[:, CELL_TYPES[cell].stored_corners]  # of wedges, some coincide
+        return _AT_GAUSS @ corners, hexahedron.determinants(corners)
+    corners = x[:, : stored.corners]
     return tetra10.POINTS @ corners, np.repeat(tetrahedron.volumes(corners)[:, None] / 4.0, 4, axis=1)
